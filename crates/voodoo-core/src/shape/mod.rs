@@ -1,1 +1,241 @@
 //! The shape of a limb: a tapered elliptic cylinder and its closest-point, bounding and ray queries.
+//!
+//! The axis is +z, from the proximal end `z = 0` to the distal end `z = length`. The semi-axes are linear in `t = z / length`:
+//! `a(t) = a0 + (a1 - a0) t` along x and `b(t) = b0 + (b1 - b0) t` along y (the "degenerated cylinder" of K06 and K07).
+//! The surface is closed: the side `P(θ, t) = (a(t) cos θ, b(t) sin θ, length t)` and two elliptic caps. The side is ruled:
+//! for a fixed θ it is a straight segment, and every query here is built on that. The solid is convex only if
+//! `a0 b1 = a1 b0`; nothing here assumes it.
+//!
+//! | query | file |
+//! |---|---|
+//! | [`TaperedEllipticCylinder::closest_point`], exact, f64 | `closest` |
+//! | [`TaperedEllipticCylinder::closest_points`], many points at once, f32 | `batch`, `kernel` |
+//! | [`TaperedEllipticCylinder::approximate_distance`] | `approximate` |
+//! | [`TaperedEllipticCylinder::cast_ray`] | `ray` |
+//! | [`TaperedEllipticCylinder::aabb`] | `bounds` |
+
+mod approximate;
+mod batch;
+mod bounds;
+mod closest;
+mod kernel;
+mod ray;
+mod ruling;
+
+use crate::geometry::Vec3;
+use thiserror::Error;
+
+pub use batch::SurfaceBatch;
+pub use ray::RayHit;
+
+/// A length below this, metres, is taken for a mistake: it is the accuracy of the queries.
+pub const MIN_SIZE: f64 = 1e-6;
+/// A length above this, metres, is taken for a mistake (of units, most likely).
+pub const MAX_SIZE: f64 = 1e3;
+/// On a rim the normal is the direction to the query when it is farther than this, metres, and the mean of the two adjacent
+/// faces' normals when it is nearer.
+pub const RIM_NORMAL_DISTANCE: f64 = 1e-4;
+
+/// Why a shape was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum ShapeError {
+    /// A length or semi-axis is not a number, infinite, negative or absurdly large.
+    #[error("{name} must be between {min} and {MAX_SIZE} m, found {value}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// The least value allowed, metres.
+        min: f64,
+        /// The value found.
+        value: f64,
+    },
+    /// Both ends have (nearly) no extent along one axis, so the body would have no inside.
+    #[error(
+        "one of {first} and {second} must be at least {MIN_SIZE} m, found {first_value} and {second_value}: the limb would be flat"
+    )]
+    Flat {
+        /// The semi-axis of the proximal end.
+        first: &'static str,
+        /// The semi-axis of the distal end.
+        second: &'static str,
+        /// Its value, metres.
+        first_value: f64,
+        /// Its value, metres.
+        second_value: f64,
+    },
+    /// A scale factor is not a positive number.
+    #[error("the scale factor must be positive and finite, found {value}")]
+    Scale {
+        /// The value found.
+        value: f64,
+    },
+}
+
+/// The face of the closed surface on which a point lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Region {
+    /// The tapered side.
+    Side = 0,
+    /// The elliptic cap at `z = 0`.
+    ProximalCap = 1,
+    /// The elliptic cap at `z = length`.
+    DistalCap = 2,
+    /// The edge between the side and the proximal cap.
+    ProximalRim = 3,
+    /// The edge between the side and the distal cap.
+    DistalRim = 4,
+}
+
+impl Region {
+    /// The region with this number (`region as u8`), `None` if there is none.
+    pub fn from_u8(number: u8) -> Option<Self> {
+        [
+            Self::Side,
+            Self::ProximalCap,
+            Self::DistalCap,
+            Self::ProximalRim,
+            Self::DistalRim,
+        ]
+        .get(usize::from(number))
+        .copied()
+    }
+}
+
+/// The point of the surface that is closest to a query, limb frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// The point on the surface, metres.
+    pub point: Vec3,
+    /// Outward unit normal there; on a rim a direction in the cone between the normals of the two faces.
+    pub normal: Vec3,
+    /// Distance from the query to the point, metres, negative inside.
+    pub signed_distance: f64,
+    /// Face of the surface.
+    pub region: Region,
+}
+
+/// A tapered elliptic cylinder in its limb frame, metres.
+///
+/// A semi-axis may be zero at one end (needle tip, wedge), not at both. The type is small and is copied.
+///
+/// ```
+/// use voodoo_core::geometry::Vec3;
+/// use voodoo_core::shape::{Region, TaperedEllipticCylinder};
+///
+/// let forearm = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.025)?;
+/// let near = forearm.closest_point(Vec3::new(0.2, 0.0, 0.1));
+/// assert_eq!(near.region, Region::Side);
+/// assert!((near.signed_distance - 0.1575).abs() < 1e-3);
+/// # Ok::<(), voodoo_core::shape::ShapeError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TaperedEllipticCylinder {
+    length: f64,
+    a0: f64,
+    b0: f64,
+    a1: f64,
+    b1: f64,
+}
+
+impl TaperedEllipticCylinder {
+    /// A shape from its length and its semi-axes along x and y at `z = 0` (`a0`, `b0`) and `z = length` (`a1`, `b1`), metres.
+    ///
+    /// # Errors
+    /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above [`MAX_SIZE`], or the length below
+    /// [`MIN_SIZE`]; [`ShapeError::Flat`] when `a0` and `a1`, or `b0` and `b1`, are both below [`MIN_SIZE`].
+    pub fn new(length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> Result<Self, ShapeError> {
+        for (name, min, value) in [
+            ("length", MIN_SIZE, length),
+            ("a0", 0.0, a0),
+            ("b0", 0.0, b0),
+            ("a1", 0.0, a1),
+            ("b1", 0.0, b1),
+        ] {
+            if !(min..=MAX_SIZE).contains(&value) {
+                return Err(ShapeError::OutOfRange { name, min, value });
+            }
+        }
+        for (first, second, first_value, second_value) in
+            [("a0", "a1", a0, a1), ("b0", "b1", b0, b1)]
+        {
+            if first_value.max(second_value) < MIN_SIZE {
+                return Err(ShapeError::Flat {
+                    first,
+                    second,
+                    first_value,
+                    second_value,
+                });
+            }
+        }
+        Ok(Self {
+            length,
+            a0,
+            b0,
+            a1,
+            b1,
+        })
+    }
+
+    /// Length along z, metres.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Semi-axis along x at the proximal end, metres.
+    pub fn a0(&self) -> f64 {
+        self.a0
+    }
+
+    /// Semi-axis along y at the proximal end, metres.
+    pub fn b0(&self) -> f64 {
+        self.b0
+    }
+
+    /// Semi-axis along x at the distal end, metres.
+    pub fn a1(&self) -> f64 {
+        self.a1
+    }
+
+    /// Semi-axis along y at the distal end, metres.
+    pub fn b1(&self) -> f64 {
+        self.b1
+    }
+
+    /// The same shape, all five sizes multiplied by `factor`.
+    ///
+    /// # Errors
+    /// [`ShapeError::Scale`] when the factor is not positive and finite; the errors of [`Self::new`] for the result.
+    pub fn scaled(&self, factor: f64) -> Result<Self, ShapeError> {
+        if !(factor > 0.0 && factor.is_finite()) {
+            return Err(ShapeError::Scale { value: factor });
+        }
+        Self::new(
+            self.length * factor,
+            self.a0 * factor,
+            self.b0 * factor,
+            self.a1 * factor,
+            self.b1 * factor,
+        )
+    }
+
+    /// The semi-axes `(a, b)` of the slice at height `z`, clamped to the ends, metres.
+    fn semi_axes(&self, z: f64) -> (f64, f64) {
+        let t = (z / self.length).clamp(0.0, 1.0);
+        (
+            self.a0 + (self.a1 - self.a0) * t,
+            self.b0 + (self.b1 - self.b0) * t,
+        )
+    }
+
+    /// `(x b)² + (y a)² - (a b)²` at the slice of `q`: negative inside the ellipse, positive outside, no division.
+    fn ellipse_sign(&self, q: Vec3) -> f64 {
+        let (a, b) = self.semi_axes(q.z);
+        (q.x * b).powi(2) + (q.y * a).powi(2) - (a * b).powi(2)
+    }
+
+    /// True when `q` is strictly inside the solid.
+    fn contains(&self, q: Vec3) -> bool {
+        q.z > 0.0 && q.z < self.length && self.ellipse_sign(q) < 0.0
+    }
+}

@@ -1,0 +1,215 @@
+//! The exact closest point: a safeguarded Newton iteration in θ, started from as many basins as the shape can have.
+
+use super::ruling::{Angle, Foot};
+use super::{RIM_NORMAL_DISTANCE, Region, SurfacePoint, TaperedEllipticCylinder};
+use crate::geometry::Vec3;
+
+/// Number of intervals of the scan over the quadrant.
+const SCAN: usize = 16;
+/// `cos(k π / 32)`, k = 0..=16; the sines are the same numbers backwards.
+const COSINES: [f64; SCAN + 1] = [
+    1.0,
+    0.9951847266721969,
+    0.9807852804032304,
+    0.9569403357322088,
+    0.9238795325112867,
+    0.881921264348355,
+    0.8314696123025452,
+    0.773010453362737,
+    std::f64::consts::FRAC_1_SQRT_2,
+    0.6343932841636455,
+    0.5555702330196022,
+    0.4713967368259977,
+    0.38268343236508984,
+    0.29028467725446233,
+    0.19509032201612825,
+    0.09801714032956063,
+    0.0,
+];
+/// Least ratio of the semi-axes for which the scan is stretched towards the sharp tips of an ellipse.
+const SHARPEST: f64 = 1e-3;
+
+impl TaperedEllipticCylinder {
+    /// The closest point of the closed surface to `q`, limb frame, metres.
+    ///
+    /// For a query folded to `x, y >= 0` the side asks for the least of `g(θ) = min_t |P(θ, t) - q|²` on a quadrant, where
+    /// `g'(0) <= 0 <= g'(π/2)`: Newton's iteration, kept in a bracket by bisection, always ends in a minimum. `g` has only
+    /// one when `a0 b1 = a1 b0`; otherwise a scan finds the basins first. The caps compete where the query projects into
+    /// them. Where several points are equally near (on the medial axis) one of them is returned.
+    ///
+    /// A query that is not finite gives a point and a distance that are not a number.
+    pub fn closest_point(&self, q: Vec3) -> SurfacePoint {
+        if !q.is_finite() {
+            return SurfacePoint {
+                point: Vec3::NAN,
+                normal: Vec3::Z,
+                signed_distance: f64::NAN,
+                region: Region::Side,
+            };
+        }
+        let side = self.closest_on_side(Vec3::new(q.x.abs(), q.y.abs(), q.z));
+        let mut squared = side.squared;
+        let mut cap = None;
+        for (z, a, b, region, normal) in [
+            (0.0, self.a0, self.b0, Region::ProximalCap, Vec3::NEG_Z),
+            (self.length, self.a1, self.b1, Region::DistalCap, Vec3::Z),
+        ] {
+            let within = (q.x * b).powi(2) + (q.y * a).powi(2) <= (a * b).powi(2);
+            let height = (q.z - z).powi(2);
+            if within && height <= squared && a > 0.0 && b > 0.0 {
+                squared = height;
+                cap = Some((Vec3::new(q.x, q.y, z), region, normal));
+            }
+        }
+        let distance = squared.sqrt();
+        let sign = if self.contains(q) { -1.0 } else { 1.0 };
+        let signed_distance = sign * distance;
+        if let Some((point, region, normal)) = cap {
+            return SurfacePoint {
+                point,
+                normal,
+                signed_distance,
+                region,
+            };
+        }
+        let unfold = Vec3::new(1f64.copysign(q.x), 1f64.copysign(q.y), 1.0);
+        let point = side.point * unfold;
+        let side_normal = self.side_normal(side.angle, side.t) * unfold;
+        let (region, cap_normal) = if side.t <= 0.0 {
+            (Region::ProximalRim, Vec3::NEG_Z)
+        } else if side.t >= 1.0 {
+            (Region::DistalRim, Vec3::Z)
+        } else {
+            (Region::Side, side_normal)
+        };
+        let normal = if region == Region::Side {
+            side_normal
+        } else if distance > RIM_NORMAL_DISTANCE {
+            (q - point) / signed_distance
+        } else {
+            (side_normal + cap_normal).normalize_or(cap_normal)
+        };
+        SurfacePoint {
+            point,
+            normal,
+            signed_distance,
+            region,
+        }
+    }
+
+    /// Distance from `q` to the closed surface, limb frame, metres, negative inside. Exact.
+    pub fn signed_distance(&self, q: Vec3) -> f64 {
+        self.closest_point(q).signed_distance
+    }
+
+    /// `|a0 b1 - a1 b0| / (a0 b1 + a1 b0)`: 0 when the two end ellipses have one aspect (the solid is convex), 1 at most.
+    pub(super) fn aspect_change(&self) -> f64 {
+        let (first, second) = (self.a0 * self.b1, self.a1 * self.b0);
+        if first == second {
+            0.0
+        } else {
+            (first - second).abs() / (first + second)
+        }
+    }
+
+    /// The closest point of the side with its rims, for a query with `x, y >= 0`.
+    fn closest_on_side(&self, q: Vec3) -> Foot {
+        if self.aspect_change() < 1e-12 {
+            return self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q);
+        }
+        let mut best = self.scan(Angle { c: 1.0, s: 1.0 }, q);
+        for (a, b) in [(self.a0, self.b0), (self.a1, self.b1)] {
+            let ratio = a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
+            if ratio < 0.5 {
+                // Equal steps of the normal's direction instead of θ: dense at the tips of a flat ellipse.
+                let floor = SHARPEST * a.max(b);
+                let foot = self.scan(
+                    Angle {
+                        c: a.max(floor),
+                        s: b.max(floor),
+                    },
+                    q,
+                );
+                if foot.squared < best.squared {
+                    best = foot;
+                }
+            }
+        }
+        best
+    }
+
+    /// The best local minimum found from the angles `(stretch.c cos φ, stretch.s sin φ)`, φ in equal steps.
+    fn scan(&self, stretch: Angle, q: Vec3) -> Foot {
+        let feet: [Foot; SCAN + 1] = std::array::from_fn(|k| {
+            let (c, s) = (COSINES[k] * stretch.c, COSINES[SCAN - k] * stretch.s);
+            self.foot(Angle::of(c, s).unwrap_or(Angle::ZERO), q)
+        });
+        let mut best = feet[0];
+        for k in 0..=SCAN {
+            let (before, after) = (feet[k.saturating_sub(1)], feet[(k + 1).min(SCAN)]);
+            let low = before.squared.min(after.squared) >= feet[k].squared;
+            if feet[k].squared < best.squared {
+                best = feet[k];
+            }
+            if low {
+                let foot = self.refine(before.angle, feet[k].angle, after.angle, q);
+                if foot.squared < best.squared {
+                    best = foot;
+                }
+            }
+        }
+        best
+    }
+
+    /// A starting angle: the direction `(x/a, y/b)` of the slice, then one step over the evolute of its ellipse.
+    fn guess(&self, q: Vec3) -> Angle {
+        let (a, b) = self.semi_axes(q.z);
+        let near = Angle::of(q.x * b, q.y * a).unwrap_or(Angle { c: 0.8, s: 0.6 });
+        let focus = a * a - b * b;
+        let x = a * q.x - focus * near.c.powi(3);
+        let y = b * q.y + focus * near.s.powi(3);
+        let start = Angle::of(x.max(0.0), y.max(0.0)).unwrap_or(near);
+        // An end of the quadrant may be a maximum of g; start beside it.
+        Angle::of(start.c.max(1e-9), start.s.max(1e-9)).unwrap_or(near)
+    }
+
+    /// The minimum of `g` between two angles by Newton's iteration with bisection, the best foot seen.
+    fn refine(&self, mut low: Angle, start: Angle, mut high: Angle, q: Vec3) -> Foot {
+        let scale = self.a0.max(self.a1).max(self.b0).max(self.b1);
+        let mut foot = self.foot(start, q);
+        let mut best = foot;
+        let mut last_step = f64::INFINITY;
+        for _ in 0..120 {
+            if foot.slope > 0.0 {
+                high = foot.angle;
+            } else {
+                low = foot.angle;
+            }
+            let step = -foot.slope / foot.bend;
+            let converging = foot.bend > 0.0 && step.abs() < 0.5 * last_step;
+            if foot.slope == 0.0 && foot.bend >= 0.0
+                || converging && step.abs() * scale < 1e-14
+                || low.to(high) * scale < 1e-15
+            {
+                break;
+            }
+            let mut next = foot.angle.turned(step);
+            if !converging || low.to(next) <= 0.0 || next.to(high) <= 0.0 {
+                next = low.middle(high);
+                last_step = low.to(high);
+            } else {
+                last_step = step.abs();
+            }
+            foot = self.foot(next, q);
+            if foot.squared < best.squared {
+                best = foot;
+            }
+        }
+        // Near the minimum g is flat to rounding; the last iterate has the better angle, so keep it unless it is worse.
+        if foot.squared <= best.squared * (1.0 + 1e-12) {
+            foot
+        } else {
+            best
+        }
+    }
+}

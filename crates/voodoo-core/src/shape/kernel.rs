@@ -1,0 +1,288 @@
+//! The arithmetic of the batch: one point as straight-line f32 code, which the compiler turns into one SIMD lane.
+
+use super::{RIM_NORMAL_DISTANCE, Region, TaperedEllipticCylinder};
+use crate::geometry::{Mat3, Pose, Vec3};
+
+/// Points a block. The loop over a block has no branch and no bounds check, so it becomes SIMD of the target's width.
+pub(super) const BLOCK: usize = 32;
+/// Newton steps after the start; what has not converged then is redone by the exact path.
+const STEPS: usize = 2;
+/// Largest estimated error of the foot point, metres, that passes as converged.
+const CONVERGED: f32 = 3e-7;
+/// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned; it falls to 0 at the medial axis, and the error of the
+/// foot is that of the query divided by it.
+const CONDITIONED: f32 = 0.3;
+
+/// One block of points, structure of arrays.
+#[derive(Clone, Copy)]
+pub(super) struct Block {
+    pub x: [f32; BLOCK],
+    pub y: [f32; BLOCK],
+    pub z: [f32; BLOCK],
+}
+
+impl Block {
+    pub const ZERO: Self = Self {
+        x: [0.0; BLOCK],
+        y: [0.0; BLOCK],
+        z: [0.0; BLOCK],
+    };
+}
+
+/// The results of one block, in the frame of the queries.
+pub(super) struct Surface {
+    pub points: Block,
+    pub normals: Block,
+    pub signed_distance: [f32; BLOCK],
+    pub region: [u8; BLOCK],
+    /// Not zero where the exact path must decide.
+    pub doubtful: [u8; BLOCK],
+}
+
+impl Surface {
+    pub const ZERO: Self = Self {
+        points: Block::ZERO,
+        normals: Block::ZERO,
+        signed_distance: [0.0; BLOCK],
+        region: [0; BLOCK],
+        doubtful: [0; BLOCK],
+    };
+}
+
+/// What the kernel needs of shape and pose, in single precision.
+///
+/// The limb's origin is split into `origin`, exact in f32, and `rest`, the remainder turned into the limb frame: the
+/// difference of query and origin is then rounded relative to the size of the limb, not to its place in the world.
+pub(super) struct Constants {
+    /// Columns of `world_from_limb`'s rotation.
+    columns: [[f32; 3]; 3],
+    origin: [f32; 3],
+    rest: [f32; 3],
+    length: f32,
+    inverse_length: f32,
+    a0: f32,
+    b0: f32,
+    da: f32,
+    db: f32,
+    /// Squared semi-axes and their squared product, per cap.
+    proximal: [f32; 3],
+    distal: [f32; 3],
+}
+
+impl Constants {
+    pub fn new(shape: &TaperedEllipticCylinder, world_from_limb: &Pose) -> Self {
+        let rotation = Mat3::from_quat(world_from_limb.rotation);
+        let single = |v: Vec3| v.as_vec3().to_array();
+        let origin = world_from_limb.translation.as_vec3();
+        let rest = rotation.transpose() * (world_from_limb.translation - origin.as_dvec3());
+        let cap = |a: f64, b: f64| [(a * a) as f32, (b * b) as f32, (a * a * b * b) as f32];
+        Self {
+            columns: [
+                single(rotation.x_axis),
+                single(rotation.y_axis),
+                single(rotation.z_axis),
+            ],
+            origin: origin.to_array(),
+            rest: single(rest),
+            length: shape.length as f32,
+            inverse_length: (1.0 / shape.length) as f32,
+            a0: shape.a0 as f32,
+            b0: shape.b0 as f32,
+            da: (shape.a1 - shape.a0) as f32,
+            db: (shape.b1 - shape.b0) as f32,
+            proximal: cap(shape.a0, shape.b0),
+            distal: cap(shape.a1, shape.b1),
+        }
+    }
+}
+
+#[inline(always)]
+fn fma<const FMA: bool>(a: f32, b: f32, c: f32) -> f32 {
+    if FMA { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// `max` and `min` as one instruction: the standard ones treat NaN, which is caught at the end here.
+#[inline(always)]
+fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn select(condition: bool, yes: f32, no: f32) -> f32 {
+    if condition { yes } else { no }
+}
+
+/// The foot on one ruling and the derivatives of `g`, as in `ruling`.
+struct Foot {
+    t: f32,
+    a: f32,
+    b: f32,
+    e: [f32; 3],
+    slope: f32,
+    bend: f32,
+    tangent: f32,
+}
+
+#[inline(always)]
+fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> Foot {
+    let (dx, dy) = (k.da * c, k.db * s);
+    let along = fma::<FMA>(dx, dx, fma::<FMA>(dy, dy, k.length * k.length));
+    let inverse = 1.0 / along;
+    let (ax, ay) = (fma::<FMA>(-k.a0, c, x), fma::<FMA>(-k.b0, s, y));
+    let free = fma::<FMA>(ax, dx, fma::<FMA>(ay, dy, z * k.length)) * inverse;
+    let t = max(min(free, 1.0), 0.0);
+    let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
+    let (px, py) = (a * c, b * s);
+    let e = [px - x, py - y, fma::<FMA>(k.length, t, -z)];
+    let (tx, ty) = (-a * s, b * c);
+    let slope = fma::<FMA>(e[0], tx, e[1] * ty);
+    let tangent = fma::<FMA>(tx, tx, ty * ty);
+    let curved = fma::<FMA>(e[0], px, e[1] * py);
+    // P_θ · D + e · D_θ, with D_θ = (-a' s, b' c, 0).
+    let turned = fma::<FMA>(-k.da * s, e[0], (k.db * c) * e[1]);
+    let mixed = fma::<FMA>(tx, dx, fma::<FMA>(ty, dy, turned));
+    let coupling = select(t == free, mixed * mixed * inverse, 0.0);
+    Foot {
+        t,
+        a,
+        b,
+        e,
+        slope,
+        bend: tangent - curved - coupling,
+        tangent,
+    }
+}
+
+#[inline(always)]
+fn unit<const FMA: bool>(x: f32, y: f32) -> (f32, f32) {
+    let inverse = 1.0 / fma::<FMA>(x, x, y * y).sqrt();
+    (x * inverse, y * inverse)
+}
+
+/// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
+#[inline(always)]
+pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut Surface) {
+    for i in 0..BLOCK {
+        let (wx, wy, wz) = (
+            queries.x[i] - k.origin[0],
+            queries.y[i] - k.origin[1],
+            queries.z[i] - k.origin[2],
+        );
+        let turn = |axis: usize| {
+            let [cx, cy, cz] = k.columns[axis];
+            fma::<FMA>(
+                cx,
+                wx,
+                fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])),
+            )
+        };
+        let (qx, qy, z) = (turn(0), turn(1), turn(2));
+        let (x, y) = (qx.abs(), qy.abs());
+
+        // Start: the direction (x/a, y/b) in the slice, then one step over the evolute of the slice.
+        let height = max(min(z * k.inverse_length, 1.0), 0.0);
+        let (a, b) = (
+            fma::<FMA>(k.da, height, k.a0),
+            fma::<FMA>(k.db, height, k.b0),
+        );
+        let tiny = 1e-20;
+        let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
+        let focus = fma::<FMA>(a, a, -(b * b));
+        let (mut c, mut s) = unit::<FMA>(
+            max(fma::<FMA>(a, x, -(focus * c) * (c * c)), tiny),
+            max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny),
+        );
+        for _ in 0..STEPS {
+            let f = foot::<FMA>(k, c, s, x, y, z);
+            let step = -f.slope / max(f.bend, 0.1 * f.tangent + tiny);
+            let step = max(min(step, 1.0), -1.0);
+            (c, s) = unit::<FMA>(
+                max(fma::<FMA>(-step, s, c), 0.0),
+                max(fma::<FMA>(step, c, s), 0.0),
+            );
+        }
+        let f = foot::<FMA>(k, c, s, x, y, z);
+        let [ex, ey, ez] = f.e;
+        let side = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
+        let trusted = (f.slope * f.slope) * f.tangent
+            <= (CONVERGED * f.bend) * (CONVERGED * f.bend)
+            && f.bend >= CONDITIONED * f.tangent;
+
+        // Inside: between the caps and inside the slice.
+        let (xx, yy) = (x * x, y * y);
+        let (aa, bb) = (a * a, b * b);
+        let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
+        let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
+
+        // Caps, where the query projects into them.
+        let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
+        let top = z - k.length;
+        let proximal = over(k.proximal) & (z * z < side);
+        let squared = select(proximal, z * z, side);
+        let distal = over(k.distal) & (top * top < squared);
+        let squared = select(distal, top * top, squared);
+        let proximal = proximal & !distal;
+        let cap = proximal | distal;
+        let distance = squared.sqrt();
+        let sign = select(inside, -1.0, 1.0);
+
+        // The vector from the query to the surface, limb frame, unfolded.
+        let (sx, sy) = (1f32.copysign(qx), 1f32.copysign(qy));
+        let ex = select(cap, 0.0, ex * sx);
+        let ey = select(cap, 0.0, ey * sy);
+        let ez = select(distal, -top, select(proximal, -z, ez));
+
+        // Normal: P_θ × P_t on the side, the direction to the query on a rim.
+        let rim = (f.t <= 0.0) | (f.t >= 1.0);
+        let nx = select(rim, -ex * sign, f.b * c * k.length * sx);
+        let ny = select(rim, -ey * sign, f.a * s * k.length * sy);
+        let slant = fma::<FMA>(f.a * k.db, s * s, f.b * k.da * (c * c));
+        let nz = select(rim, -ez * sign, -slant);
+        let norm = fma::<FMA>(nx, nx, fma::<FMA>(ny, ny, nz * nz));
+        let inverse = 1.0 / norm.sqrt();
+        let nx = select(cap, 0.0, nx * inverse);
+        let ny = select(cap, 0.0, ny * inverse);
+        let nz = select(distal, 1.0, select(proximal, -1.0, nz * inverse));
+
+        let world = |axis: usize, x: f32, y: f32, z: f32, base: f32| {
+            fma::<FMA>(
+                k.columns[0][axis],
+                x,
+                fma::<FMA>(
+                    k.columns[1][axis],
+                    y,
+                    fma::<FMA>(k.columns[2][axis], z, base),
+                ),
+            )
+        };
+        out.points.x[i] = world(0, ex, ey, ez, queries.x[i]);
+        out.points.y[i] = world(1, ex, ey, ez, queries.y[i]);
+        out.points.z[i] = world(2, ex, ey, ez, queries.z[i]);
+        out.normals.x[i] = world(0, nx, ny, nz, 0.0);
+        out.normals.y[i] = world(1, nx, ny, nz, 0.0);
+        out.normals.z[i] = world(2, nx, ny, nz, 0.0);
+        out.signed_distance[i] = sign * distance;
+        let edge = if f.t <= 0.0 {
+            Region::ProximalRim as u8
+        } else {
+            Region::DistalRim as u8
+        };
+        let lateral = if rim { edge } else { Region::Side as u8 };
+        let flat = if distal {
+            Region::DistalCap as u8
+        } else {
+            Region::ProximalCap as u8
+        };
+        out.region[i] = if cap { flat } else { lateral };
+        // Written so that a NaN anywhere is doubtful.
+        let clear = trusted
+            & (cap | (norm > 1e-12))
+            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        out.doubtful[i] = u8::from(!clear);
+    }
+}
