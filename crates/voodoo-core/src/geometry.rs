@@ -55,11 +55,7 @@ impl Points {
 
     /// The point at `index`, in double precision.
     pub fn get(&self, index: usize) -> Vec3 {
-        Vec3::new(
-            f64::from(self.x[index]),
-            f64::from(self.y[index]),
-            f64::from(self.z[index]),
-        )
+        Vec3::new(f64::from(self.x[index]), f64::from(self.y[index]), f64::from(self.z[index]))
     }
 
     /// Replaces the point at `index`.

@@ -1,8 +1,31 @@
 //! Articulated body tracking: every measurement becomes a weighted correspondence, one step fits the body to all of them.
 //!
 //! The method is VooDoo (K06: Knoop, Vacek, Dillmann, "Sensor Fusion for 3D Human Body Tracking with an Articulated 3D
-//! Body Model", 2006; K07: the same authors, "A Human Body Model for Articulated 3D Pose Tracking", 2007).
-//! Modules depend downwards only: `tracker` → `associate`, `solver` → `correspondence` → `frame`, `body` → `shape` → `geometry`.
+//! Body Model", ICRA 2006; K07: the same authors, "A Human Body Model for Articulated 3D Pose Tracking", in "Humanoid
+//! Robots, New Developments", 2007). [`tracker::Tracker::step`] reads like the list in K06 IV-B.
+//!
+//! Modules depend downwards only: `tracker` > `solver`, `associate`, `relate` > `correspondence`, `candidates` > `frame` >
+//! `body` > `shape`, `rigid` > `geometry`.
 
+pub mod associate;
+pub mod body;
+pub mod candidates;
+pub mod config;
+pub mod correspondence;
+pub mod error;
+pub mod estimate;
+pub mod frame;
 pub mod geometry;
+mod relate;
+pub mod rigid;
 pub mod shape;
+pub mod solver;
+pub mod tracker;
+
+pub use body::Body;
+pub use config::Config;
+pub use error::{BodyError, ConfigError, TrackError};
+pub use estimate::{Estimate, Status};
+pub use frame::Frame;
+pub use shape::TaperedEllipticCylinder;
+pub use tracker::Tracker;

@@ -1,1 +1,35 @@
-//! bindings
+//! Python bindings of voodoo-core: conversions and error translation, no method of their own.
+#![allow(missing_docs, reason = "the documentation of the Python side stands in _core.pyi")]
+
+mod arrays;
+mod body;
+mod config;
+mod errors;
+mod estimate;
+mod frame;
+mod shape;
+mod tracker;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::body::PyBody;
+    #[pymodule_export]
+    use super::config::config_fields;
+    #[pymodule_export]
+    use super::estimate::PyEstimate;
+    #[pymodule_export]
+    use super::frame::PyFrame;
+    #[pymodule_export]
+    use super::shape::{PyClosestPoints, PyShape};
+    #[pymodule_export]
+    use super::tracker::PyTracker;
+
+    #[pymodule_init]
+    fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {
+        use pyo3::types::PyModuleMethods;
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -25,15 +25,7 @@ impl TaperedEllipticCylinder {
         };
         let gradient = Vec3::new(u * inv_a, v * inv_b, climb).length();
         // The level function has a cusp on the axis, where the distance is the lesser semi-axis.
-        let side = if gradient > 0.0 {
-            ((rho - 1.0) * rho / gradient).max(-a.min(b))
-        } else {
-            -a.min(b)
-        };
-        if above <= 0.0 {
-            side.max(above)
-        } else {
-            side.max(0.0).hypot(above)
-        }
+        let side = if gradient > 0.0 { ((rho - 1.0) * rho / gradient).max(-a.min(b)) } else { -a.min(b) };
+        if above <= 0.0 { side.max(above) } else { side.max(0.0).hypot(above) }
     }
 }

@@ -114,13 +114,7 @@ impl TaperedEllipticCylinder {
     }
 
     #[cold]
-    fn closest_exactly(
-        &self,
-        world_from_limb: &Pose,
-        query: [f32; 3],
-        index: usize,
-        out: &mut SurfaceBatch,
-    ) {
+    fn closest_exactly(&self, world_from_limb: &Pose, query: [f32; 3], index: usize, out: &mut SurfaceBatch) {
         let world = crate::geometry::Vec3::from_array(query.map(f64::from));
         let found = self.closest_point(world_from_limb.inverse_transform_point(world));
         out.set(index, &found, world_from_limb);
@@ -146,9 +140,7 @@ fn kernel() -> Kernel {
 
 /// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
 fn closest_baseline(constants: &Constants, queries: &Block, out: &mut Surface) {
-    closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }>(
-        constants, queries, out,
-    );
+    closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -21,14 +21,9 @@ impl TaperedEllipticCylinder {
             let squared = (x * a) * (x * a) + (y * b) * (y * b);
             Vec3::new(squared.x.sqrt(), squared.y.sqrt(), squared.z.sqrt())
         };
-        let (start, end) = (
-            world_from_limb.translation,
-            world_from_limb.transform_point(Vec3::new(0.0, 0.0, self.length)),
-        );
+        let (start, end) =
+            (world_from_limb.translation, world_from_limb.transform_point(Vec3::new(0.0, 0.0, self.length)));
         let (first, last) = (reach(self.a0, self.b0), reach(self.a1, self.b1));
-        Aabb::new(
-            (start - first).min(end - last),
-            (start + first).max(end + last),
-        )
+        Aabb::new((start - first).min(end - last), (start + first).max(end + last))
     }
 }

@@ -40,12 +40,7 @@ impl TaperedEllipticCylinder {
     /// A query that is not finite gives a point and a distance that are not a number.
     pub fn closest_point(&self, q: Vec3) -> SurfacePoint {
         if !q.is_finite() {
-            return SurfacePoint {
-                point: Vec3::NAN,
-                normal: Vec3::Z,
-                signed_distance: f64::NAN,
-                region: Region::Side,
-            };
+            return SurfacePoint { point: Vec3::NAN, normal: Vec3::Z, signed_distance: f64::NAN, region: Region::Side };
         }
         let side = self.closest_on_side(Vec3::new(q.x.abs(), q.y.abs(), q.z));
         let mut squared = side.squared;
@@ -65,12 +60,7 @@ impl TaperedEllipticCylinder {
         let sign = if self.contains(q) { -1.0 } else { 1.0 };
         let signed_distance = sign * distance;
         if let Some((point, region, normal)) = cap {
-            return SurfacePoint {
-                point,
-                normal,
-                signed_distance,
-                region,
-            };
+            return SurfacePoint { point, normal, signed_distance, region };
         }
         let unfold = Vec3::new(1f64.copysign(q.x), 1f64.copysign(q.y), 1.0);
         let point = side.point * unfold;
@@ -89,12 +79,7 @@ impl TaperedEllipticCylinder {
         } else {
             (side_normal + cap_normal).normalize_or(cap_normal)
         };
-        SurfacePoint {
-            point,
-            normal,
-            signed_distance,
-            region,
-        }
+        SurfacePoint { point, normal, signed_distance, region }
     }
 
     /// Distance from `q` to the closed surface, limb frame, metres, negative inside. Exact.
@@ -105,11 +90,7 @@ impl TaperedEllipticCylinder {
     /// `|a0 b1 - a1 b0| / (a0 b1 + a1 b0)`: 0 when the two end ellipses have one aspect (the solid is convex), 1 at most.
     pub(super) fn aspect_change(&self) -> f64 {
         let (first, second) = (self.a0 * self.b1, self.a1 * self.b0);
-        if first == second {
-            0.0
-        } else {
-            (first - second).abs() / (first + second)
-        }
+        if first == second { 0.0 } else { (first - second).abs() / (first + second) }
     }
 
     /// The closest point of the side with its rims, for a query with `x, y >= 0`.
@@ -123,13 +104,7 @@ impl TaperedEllipticCylinder {
             if ratio < 0.5 {
                 // Equal steps of the normal's direction instead of θ: dense at the tips of a flat ellipse.
                 let floor = SHARPEST * a.max(b);
-                let foot = self.scan(
-                    Angle {
-                        c: a.max(floor),
-                        s: b.max(floor),
-                    },
-                    q,
-                );
+                let foot = self.scan(Angle { c: a.max(floor), s: b.max(floor) }, q);
                 if foot.squared < best.squared {
                     best = foot;
                 }
@@ -206,10 +181,6 @@ impl TaperedEllipticCylinder {
             }
         }
         // Near the minimum g is flat to rounding; the last iterate has the better angle, so keep it unless it is worse.
-        if foot.squared <= best.squared * (1.0 + 1e-12) {
-            foot
-        } else {
-            best
-        }
+        if foot.squared <= best.squared * (1.0 + 1e-12) { foot } else { best }
     }
 }

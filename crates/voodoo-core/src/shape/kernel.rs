@@ -22,11 +22,7 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub const ZERO: Self = Self {
-        x: [0.0; BLOCK],
-        y: [0.0; BLOCK],
-        z: [0.0; BLOCK],
-    };
+    pub const ZERO: Self = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
 }
 
 /// The results of one block, in the frame of the queries.
@@ -77,11 +73,7 @@ impl Constants {
         let rest = rotation.transpose() * (world_from_limb.translation - origin.as_dvec3());
         let cap = |a: f64, b: f64| [(a * a) as f32, (b * b) as f32, (a * a * b * b) as f32];
         Self {
-            columns: [
-                single(rotation.x_axis),
-                single(rotation.y_axis),
-                single(rotation.z_axis),
-            ],
+            columns: [single(rotation.x_axis), single(rotation.y_axis), single(rotation.z_axis)],
             origin: origin.to_array(),
             rest: single(rest),
             length: shape.length as f32,
@@ -147,15 +139,7 @@ fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) 
     let turned = fma::<FMA>(-k.da * s, e[0], (k.db * c) * e[1]);
     let mixed = fma::<FMA>(tx, dx, fma::<FMA>(ty, dy, turned));
     let coupling = select(t == free, mixed * mixed * inverse, 0.0);
-    Foot {
-        t,
-        a,
-        b,
-        e,
-        slope,
-        bend: tangent - curved - coupling,
-        tangent,
-    }
+    Foot { t, a, b, e, slope, bend: tangent - curved - coupling, tangent }
 }
 
 #[inline(always)]
@@ -168,28 +152,17 @@ fn unit<const FMA: bool>(x: f32, y: f32) -> (f32, f32) {
 #[inline(always)]
 pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut Surface) {
     for i in 0..BLOCK {
-        let (wx, wy, wz) = (
-            queries.x[i] - k.origin[0],
-            queries.y[i] - k.origin[1],
-            queries.z[i] - k.origin[2],
-        );
+        let (wx, wy, wz) = (queries.x[i] - k.origin[0], queries.y[i] - k.origin[1], queries.z[i] - k.origin[2]);
         let turn = |axis: usize| {
             let [cx, cy, cz] = k.columns[axis];
-            fma::<FMA>(
-                cx,
-                wx,
-                fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])),
-            )
+            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])))
         };
         let (qx, qy, z) = (turn(0), turn(1), turn(2));
         let (x, y) = (qx.abs(), qy.abs());
 
         // Start: the direction (x/a, y/b) in the slice, then one step over the evolute of the slice.
         let height = max(min(z * k.inverse_length, 1.0), 0.0);
-        let (a, b) = (
-            fma::<FMA>(k.da, height, k.a0),
-            fma::<FMA>(k.db, height, k.b0),
-        );
+        let (a, b) = (fma::<FMA>(k.da, height, k.a0), fma::<FMA>(k.db, height, k.b0));
         let tiny = 1e-20;
         let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
         let focus = fma::<FMA>(a, a, -(b * b));
@@ -201,16 +174,12 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
             let f = foot::<FMA>(k, c, s, x, y, z);
             let step = -f.slope / max(f.bend, 0.1 * f.tangent + tiny);
             let step = max(min(step, 1.0), -1.0);
-            (c, s) = unit::<FMA>(
-                max(fma::<FMA>(-step, s, c), 0.0),
-                max(fma::<FMA>(step, c, s), 0.0),
-            );
+            (c, s) = unit::<FMA>(max(fma::<FMA>(-step, s, c), 0.0), max(fma::<FMA>(step, c, s), 0.0));
         }
         let f = foot::<FMA>(k, c, s, x, y, z);
         let [ex, ey, ez] = f.e;
         let side = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
-        let trusted = (f.slope * f.slope) * f.tangent
-            <= (CONVERGED * f.bend) * (CONVERGED * f.bend)
+        let trusted = (f.slope * f.slope) * f.tangent <= (CONVERGED * f.bend) * (CONVERGED * f.bend)
             && f.bend >= CONDITIONED * f.tangent;
 
         // Inside: between the caps and inside the slice.
@@ -253,11 +222,7 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
             fma::<FMA>(
                 k.columns[0][axis],
                 x,
-                fma::<FMA>(
-                    k.columns[1][axis],
-                    y,
-                    fma::<FMA>(k.columns[2][axis], z, base),
-                ),
+                fma::<FMA>(k.columns[1][axis], y, fma::<FMA>(k.columns[2][axis], z, base)),
             )
         };
         out.points.x[i] = world(0, ex, ey, ez, queries.x[i]);
@@ -267,22 +232,12 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         out.normals.y[i] = world(1, nx, ny, nz, 0.0);
         out.normals.z[i] = world(2, nx, ny, nz, 0.0);
         out.signed_distance[i] = sign * distance;
-        let edge = if f.t <= 0.0 {
-            Region::ProximalRim as u8
-        } else {
-            Region::DistalRim as u8
-        };
+        let edge = if f.t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
         let lateral = if rim { edge } else { Region::Side as u8 };
-        let flat = if distal {
-            Region::DistalCap as u8
-        } else {
-            Region::ProximalCap as u8
-        };
+        let flat = if distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere is doubtful.
-        let clear = trusted
-            & (cap | (norm > 1e-12))
-            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        let clear = trusted & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
         out.doubtful[i] = u8::from(!clear);
     }
 }

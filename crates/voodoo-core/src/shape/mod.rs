@@ -90,15 +90,9 @@ pub enum Region {
 impl Region {
     /// The region with this number (`region as u8`), `None` if there is none.
     pub fn from_u8(number: u8) -> Option<Self> {
-        [
-            Self::Side,
-            Self::ProximalCap,
-            Self::DistalCap,
-            Self::ProximalRim,
-            Self::DistalRim,
-        ]
-        .get(usize::from(number))
-        .copied()
+        [Self::Side, Self::ProximalCap, Self::DistalCap, Self::ProximalRim, Self::DistalRim]
+            .get(usize::from(number))
+            .copied()
     }
 }
 
@@ -145,36 +139,19 @@ impl TaperedEllipticCylinder {
     /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above [`MAX_SIZE`], or the length below
     /// [`MIN_SIZE`]; [`ShapeError::Flat`] when `a0` and `a1`, or `b0` and `b1`, are both below [`MIN_SIZE`].
     pub fn new(length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> Result<Self, ShapeError> {
-        for (name, min, value) in [
-            ("length", MIN_SIZE, length),
-            ("a0", 0.0, a0),
-            ("b0", 0.0, b0),
-            ("a1", 0.0, a1),
-            ("b1", 0.0, b1),
-        ] {
+        for (name, min, value) in
+            [("length", MIN_SIZE, length), ("a0", 0.0, a0), ("b0", 0.0, b0), ("a1", 0.0, a1), ("b1", 0.0, b1)]
+        {
             if !(min..=MAX_SIZE).contains(&value) {
                 return Err(ShapeError::OutOfRange { name, min, value });
             }
         }
-        for (first, second, first_value, second_value) in
-            [("a0", "a1", a0, a1), ("b0", "b1", b0, b1)]
-        {
+        for (first, second, first_value, second_value) in [("a0", "a1", a0, a1), ("b0", "b1", b0, b1)] {
             if first_value.max(second_value) < MIN_SIZE {
-                return Err(ShapeError::Flat {
-                    first,
-                    second,
-                    first_value,
-                    second_value,
-                });
+                return Err(ShapeError::Flat { first, second, first_value, second_value });
             }
         }
-        Ok(Self {
-            length,
-            a0,
-            b0,
-            a1,
-            b1,
-        })
+        Ok(Self { length, a0, b0, a1, b1 })
     }
 
     /// Length along z, metres.
@@ -210,22 +187,13 @@ impl TaperedEllipticCylinder {
         if !(factor > 0.0 && factor.is_finite()) {
             return Err(ShapeError::Scale { value: factor });
         }
-        Self::new(
-            self.length * factor,
-            self.a0 * factor,
-            self.b0 * factor,
-            self.a1 * factor,
-            self.b1 * factor,
-        )
+        Self::new(self.length * factor, self.a0 * factor, self.b0 * factor, self.a1 * factor, self.b1 * factor)
     }
 
     /// The semi-axes `(a, b)` of the slice at height `z`, clamped to the ends, metres.
     fn semi_axes(&self, z: f64) -> (f64, f64) {
         let t = (z / self.length).clamp(0.0, 1.0);
-        (
-            self.a0 + (self.a1 - self.a0) * t,
-            self.b0 + (self.b1 - self.b0) * t,
-        )
+        (self.a0 + (self.a1 - self.a0) * t, self.b0 + (self.b1 - self.b0) * t)
     }
 
     /// `(x b)² + (y a)² - (a b)²` at the slice of `q`: negative inside the ellipse, positive outside, no division.

@@ -38,11 +38,7 @@ impl TaperedEllipticCylinder {
         let mut through_cap = None;
         // The box is widened sideways, so that F > 0 where the ray enters it through a side.
         let size = self.local_aabb().maxs * 1.001;
-        for (axis, min, max) in [
-            (0, -size.x, size.x),
-            (1, -size.y, size.y),
-            (2, 0.0, self.length),
-        ] {
+        for (axis, min, max) in [(0, -size.x, size.x), (1, -size.y, size.y), (2, 0.0, self.length)] {
             let (start, rate) = (origin[axis], direction[axis]);
             if rate == 0.0 {
                 if start <= min || start >= max {
@@ -77,12 +73,7 @@ impl TaperedEllipticCylinder {
             } else {
                 (self.length, Vec3::Z, Region::DistalCap)
             };
-            return Some(RayHit {
-                distance: near,
-                point: Vec3::new(base.x, base.y, z),
-                normal,
-                region,
-            });
+            return Some(RayHit { distance: near, point: Vec3::new(base.x, base.y, z), normal, region });
         }
         let (turns, count) = turning_points(&self.level_along(base, direction * span));
         let mut start = 0.0;
@@ -111,11 +102,7 @@ impl TaperedEllipticCylinder {
             .or(Angle::of(point.x.abs(), point.y.abs()))
             .unwrap_or(Angle::ZERO);
         let normal = self.side_normal(angle, (point.z / self.length).clamp(0.0, 1.0));
-        Vec3::new(
-            normal.x.copysign(point.x),
-            normal.y.copysign(point.y),
-            normal.z,
-        )
+        Vec3::new(normal.x.copysign(point.x), normal.y.copysign(point.y), normal.z)
     }
 
     /// The coefficients of `F` along `base + u step`.
@@ -124,14 +111,11 @@ impl TaperedEllipticCylinder {
         let (da, db) = ((self.a1 - self.a0) * rate, (self.b1 - self.b0) * rate);
         let a = [self.a0 + da * base.z, da * step.z];
         let b = [self.b0 + db * base.z, db * step.z];
-        let product =
-            |p: [f64; 2], q: [f64; 2]| [p[0] * q[0], p[0] * q[1] + p[1] * q[0], p[1] * q[1]];
+        let product = |p: [f64; 2], q: [f64; 2]| [p[0] * q[0], p[0] * q[1] + p[1] * q[0], p[1] * q[1]];
         let mut level = [0.0; 5];
-        for (part, sign) in [
-            (product([base.x, step.x], b), 1.0),
-            (product([base.y, step.y], a), 1.0),
-            (product(a, b), -1.0),
-        ] {
+        for (part, sign) in
+            [(product([base.x, step.x], b), 1.0), (product([base.y, step.y], a), 1.0), (product(a, b), -1.0)]
+        {
             for (i, p) in part.into_iter().enumerate() {
                 for (j, q) in part.into_iter().enumerate() {
                     level[i + j] += sign * p * q;

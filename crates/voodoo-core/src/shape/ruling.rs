@@ -17,10 +17,7 @@ impl Angle {
     /// The angle of the vector `(x, y)`, `None` for the zero vector.
     pub fn of(x: f64, y: f64) -> Option<Self> {
         let norm = x.hypot(y);
-        (norm > 0.0 && norm.is_finite()).then(|| Self {
-            c: x / norm,
-            s: y / norm,
-        })
+        (norm > 0.0 && norm.is_finite()).then(|| Self { c: x / norm, s: y / norm })
     }
 
     /// Sine of `other - self`: positive when `other` is the larger angle.
@@ -72,14 +69,7 @@ impl TaperedEllipticCylinder {
             let mixed = tangent.dot(along) + e.dot(Vec3::new(-da * s, db * c, 0.0));
             bend -= mixed * mixed / along.length_squared();
         }
-        Foot {
-            angle,
-            t,
-            point,
-            squared: e.length_squared(),
-            slope,
-            bend,
-        }
+        Foot { angle, t, point, squared: e.length_squared(), slope, bend }
     }
 
     /// Outward unit normal of the side, `P_θ × P_t = (b L c, a L s, -(a b' s² + b a' c²))` with `a' = a1 - a0`.
@@ -93,11 +83,7 @@ impl TaperedEllipticCylinder {
         if a.max(b) < 1e-12 {
             (a, b) = (0.5 * (self.a0 + self.a1), 0.5 * (self.b0 + self.b1));
         }
-        let cross = Vec3::new(
-            b * self.length * c,
-            a * self.length * s,
-            -(a * db * s * s + b * da * c * c),
-        );
+        let cross = Vec3::new(b * self.length * c, a * self.length * s, -(a * db * s * s + b * da * c * c));
         cross.try_normalize().unwrap_or(Vec3::new(c, s, 0.0))
     }
 }

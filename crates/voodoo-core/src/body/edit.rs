@@ -1,0 +1,113 @@
+//! Changing a body between frames (K06 IV: scale, dimensions, adding and removing parts). Each returns a new body.
+
+use super::{Body, Joint, Limb, Site};
+use crate::error::BodyError;
+use crate::geometry::{Pose, Vec3};
+use crate::shape::TaperedEllipticCylinder;
+
+impl Body {
+    /// The body with all lengths multiplied by `factor`.
+    pub fn scaled(&self, factor: f64) -> Result<Self, BodyError> {
+        if !factor.is_finite() || factor <= 0.0 {
+            return Err(BodyError::Value {
+                key: "factor".into(),
+                expected: "a finite factor above zero",
+                found: factor.to_string(),
+            });
+        }
+        let scale_pose = |pose: &Pose| Pose::from_parts(pose.translation * factor, pose.rotation);
+        let mut body = self.clone();
+        for limb in &mut body.limbs {
+            limb.shape = limb
+                .shape
+                .scaled(factor)
+                .map_err(|source| BodyError::Shape { key: format!("limbs.{}", limb.name), source })?;
+            if let Some((_, joint)) = &mut limb.parent {
+                joint.parent_from_joint = scale_pose(&joint.parent_from_joint);
+                joint.limb_from_joint = scale_pose(&joint.limb_from_joint);
+                joint.semi_axes = joint.semi_axes.map(|axis| axis * factor);
+            }
+        }
+        for site in &mut body.sites {
+            site.position *= factor;
+        }
+        Ok(body)
+    }
+
+    /// The body with another shape for one limb; joints and sites on it move along with the change of length.
+    pub fn with_shape(&self, limb: &str, shape: TaperedEllipticCylinder) -> Result<Self, BodyError> {
+        let index = self.limb_index(limb)?;
+        let stretch = Vec3::new(1.0, 1.0, shape.length() / self.limbs[index].shape.length());
+        let mut body = self.clone();
+        body.limbs[index].shape = shape;
+        body.map_landmarks(index, |_, position| position * stretch);
+        Ok(body)
+    }
+
+    /// The body with a further limb joined to `parent`; its joint-facing proximal cap takes no matches.
+    pub fn with_limb(
+        &self,
+        name: &str,
+        parent: &str,
+        shape: TaperedEllipticCylinder,
+        joint: Joint,
+        sites: Vec<(String, Vec3)>,
+    ) -> Result<Self, BodyError> {
+        let parent = self.limb_index(parent)?;
+        let mut body = self.clone();
+        let limb = body.limbs.len();
+        body.limbs.push(Limb { name: name.into(), shape, parent: Some((parent, joint)), match_caps: [false, true] });
+        body.sites.extend(sites.into_iter().map(|(name, position)| Site { name, limb, position }));
+        body.check()?;
+        Ok(body)
+    }
+
+    /// The body without a limb, its sites and all limbs that hang on it, and the indices of the limbs that stay.
+    pub fn without_limb(&self, name: &str) -> Result<(Self, Vec<usize>), BodyError> {
+        let removed = self.limb_index(name)?;
+        if removed == 0 {
+            return Err(BodyError::Value {
+                key: "limb".into(),
+                expected: "a limb other than the root",
+                found: name.into(),
+            });
+        }
+        let mut new_index: Vec<Option<usize>> = Vec::with_capacity(self.limbs.len());
+        let mut kept = Vec::new();
+        for (index, limb) in self.limbs.iter().enumerate() {
+            let stays = index != removed && limb.parent.as_ref().is_none_or(|(parent, _)| new_index[*parent].is_some());
+            new_index.push(stays.then_some(kept.len()));
+            if stays {
+                kept.push(index);
+            }
+        }
+        let limbs = kept
+            .iter()
+            .map(|index| {
+                let mut limb = self.limbs[*index].clone();
+                limb.parent = limb.parent.and_then(|(parent, joint)| Some((new_index[parent]?, joint)));
+                limb
+            })
+            .collect();
+        let sites =
+            self.sites.iter().filter_map(|site| Some(Site { limb: new_index[site.limb]?, ..site.clone() })).collect();
+        Ok((Self::new(self.name.clone(), limbs, sites)?, kept))
+    }
+
+    /// Replaces the positions of everything fixed to a limb: its sites and the ellipses of its joints.
+    pub(super) fn map_landmarks(&mut self, limb: usize, mut map: impl FnMut(&str, Vec3) -> Vec3) {
+        for site in self.sites.iter_mut().filter(|site| site.limb == limb) {
+            site.position = map(&site.name, site.position);
+        }
+        for (index, other) in self.limbs.iter_mut().enumerate() {
+            if let Some((parent, joint)) = &mut other.parent {
+                let ellipse = match (*parent == limb, index == limb) {
+                    (true, _) => &mut joint.parent_from_joint,
+                    (_, true) => &mut joint.limb_from_joint,
+                    _ => continue,
+                };
+                ellipse.translation = map(&joint.name, ellipse.translation);
+            }
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Pose and sizes of a body from named positions in the world.
+
+use super::{Body, JointKind};
+use crate::error::TrackError;
+use crate::geometry::{Mat3, Pose, Quat, Vec3};
+use crate::rigid::Moments;
+
+/// A hinge bent by less than this does not tell its axis; radians.
+const BENT: f64 = 0.3;
+
+impl Body {
+    /// World poses of all limbs, and the body itself in the sizes that the positions tell, from positions of sites.
+    ///
+    /// Any subset of sites will do that holds three positions which do not lie on a line. Limbs about which the positions
+    /// say nothing keep their rest orientation to their parent. With `fit_sizes` the body is scaled as a whole by the
+    /// distances between known landmarks of the same limb, then every limb is stretched and its landmarks put where they
+    /// were measured.
+    pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
+        for (site, position) in positions {
+            if !position.is_finite() {
+                let name = &self.sites()[*site].name;
+                return Err(TrackError::measurement(
+                    format!("joints[{name}]"),
+                    "finite metres",
+                    format!("{position:?}"),
+                ));
+            }
+        }
+        let scale = if fit_sizes { self.scale_to(positions) } else { 1.0 };
+        let mut body = self.scaled(scale)?;
+        let world_from_rest = body.overall_orientation(positions)?;
+        let rest = body.rest_pose(Pose::identity());
+        let mut poses: Vec<Pose> = Vec::with_capacity(rest.len());
+        for limb in 0..rest.len() {
+            let (prior, anchor) = match &body.limbs()[limb].parent {
+                None => (world_from_rest * rest[0], None),
+                Some((parent, joint)) => {
+                    let prior = poses[*parent] * joint.parent_from_limb_at_rest();
+                    let measured = positions.iter().find(|(site, _)| body.sites()[*site].name == joint.name);
+                    let centre = measured
+                        .map_or(poses[*parent] * joint.parent_from_joint.translation, |(_, position)| *position);
+                    (prior, Some((joint.limb_from_joint.translation, centre)))
+                }
+            };
+            let pairs = body.known_landmarks(limb, positions);
+            let pose = body.orient_limb(limb, &pairs, prior, anchor, positions);
+            if fit_sizes {
+                body.stretch_limb(limb, &pairs, &pose);
+            }
+            poses.push(pose);
+        }
+        // The last limbs may have stretched after their parents were placed; every joint is closed once more.
+        body.close_joints(&mut poses);
+        Ok((body, poses))
+    }
+
+    /// Landmarks of a limb, in its frame, that the positions tell, with their measured positions.
+    fn known_landmarks(&self, limb: usize, positions: &[(usize, Vec3)]) -> Vec<(Vec3, Vec3)> {
+        let measured = |name: &str| {
+            positions.iter().find(|(site, _)| self.sites()[*site].name == name).map(|(_, position)| *position)
+        };
+        let mut pairs: Vec<(Vec3, Vec3)> = Vec::new();
+        let mut add = |name: &str, local: Vec3| {
+            if let Some(position) = measured(name)
+                && !pairs.iter().any(|(known, _)| (*known - local).length() < 1e-9)
+            {
+                pairs.push((local, position));
+            }
+        };
+        for site in self.sites().iter().filter(|site| site.limb == limb) {
+            add(&site.name, site.position);
+        }
+        for (index, other) in self.limbs().iter().enumerate() {
+            if let Some((parent, joint)) = &other.parent {
+                if *parent == limb {
+                    add(&joint.name, joint.parent_from_joint.translation);
+                } else if index == limb {
+                    add(&joint.name, joint.limb_from_joint.translation);
+                }
+            }
+        }
+        pairs
+    }
+
+    /// Scale of the whole body: measured over modelled distances between landmarks of the same limb.
+    fn scale_to(&self, positions: &[(usize, Vec3)]) -> f64 {
+        let (mut measured, mut modelled) = (0.0, 0.0);
+        for limb in 0..self.limbs().len() {
+            let pairs = self.known_landmarks(limb, positions);
+            for (index, first) in pairs.iter().enumerate() {
+                for second in &pairs[..index] {
+                    modelled += (first.0 - second.0).length();
+                    measured += (first.1 - second.1).length();
+                }
+            }
+        }
+        if modelled > 0.0 && measured > 0.0 { measured / modelled } else { 1.0 }
+    }
+
+    /// Orientation of the whole body: the root's landmarks where they fix it, else all sites against the rest pose.
+    fn overall_orientation(&self, positions: &[(usize, Vec3)]) -> Result<Pose, TrackError> {
+        let rest = self.rest_pose(Pose::identity());
+        let root: Vec<_> =
+            self.known_landmarks(0, positions).into_iter().map(|(local, p)| (rest[0] * local, p)).collect();
+        let all: Vec<_> = positions.iter().map(|(site, p)| (self.site_position(&rest, *site), *p)).collect();
+        for pairs in [root, all] {
+            if spans_a_plane(pairs.iter().map(|pair| pair.0)) && spans_a_plane(pairs.iter().map(|pair| pair.1)) {
+                let mut moments = Moments::default();
+                pairs.iter().for_each(|(x, p)| moments.add(1.0, *x, *p));
+                if let Some(pose) = moments.absolute_orientation(0.0) {
+                    return Ok(pose);
+                }
+            }
+        }
+        Err(TrackError::Underdetermined(format!(
+            "expected at least three positions that do not lie on a line, found {} position(s)",
+            positions.len()
+        )))
+    }
+
+    fn orient_limb(
+        &self,
+        limb: usize,
+        pairs: &[(Vec3, Vec3)],
+        prior: Pose,
+        anchor: Option<(Vec3, Vec3)>,
+        positions: &[(usize, Vec3)],
+    ) -> Pose {
+        let mut moments = Moments::default();
+        for (local, position) in
+            pairs.iter().copied().chain(anchor.filter(|(local, _)| !pairs.iter().any(|(known, _)| known == local)))
+        {
+            moments.add(1.0, prior * local, position);
+        }
+        let turn = moments.absolute_orientation(0.1).map_or(Quat::IDENTITY, |pose| pose.rotation);
+        let mut rotation = turn * prior.rotation;
+        if let Some((axis, hinge)) = self.hinge_axis(limb, positions) {
+            rotation = twist_towards(rotation, axis, hinge);
+        }
+        let translation = match anchor {
+            Some((local, centre)) => centre - rotation * local,
+            None if moments.weight > 0.0 => {
+                let count = moments.weight;
+                let local = pairs.iter().map(|pair| pair.0).sum::<Vec3>() / count;
+                moments.p / count - rotation * local
+            }
+            None => prior.translation,
+        };
+        Pose::from_parts(translation, rotation.normalize())
+    }
+
+    /// The axis of a hinge at the far end of a limb: in the limb frame, and as the bent child shows it in the world.
+    fn hinge_axis(&self, limb: usize, positions: &[(usize, Vec3)]) -> Option<(Vec3, Vec3)> {
+        let (_, own) = self.limbs()[limb].parent.as_ref()?;
+        let measured =
+            |name: &str| positions.iter().find(|(site, _)| self.sites()[*site].name == name).map(|(_, p)| *p);
+        for (index, child) in self.limbs().iter().enumerate() {
+            let Some((parent, joint)) = &child.parent else { continue };
+            if *parent != limb || joint.kind() != JointKind::Hinge {
+                continue;
+            }
+            let (start, bend) = (measured(&own.name)?, measured(&joint.name)?);
+            let end = self
+                .sites()
+                .iter()
+                .filter(|site| site.limb == index && site.name != joint.name)
+                .find_map(|site| measured(&site.name))?;
+            let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
+            return (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()));
+        }
+        None
+    }
+
+    /// Puts the landmarks of a limb where they were measured and stretches its shape along.
+    fn stretch_limb(&mut self, limb: usize, pairs: &[(Vec3, Vec3)], pose: &Pose) {
+        if pairs.len() < 2 {
+            return;
+        }
+        let local: Vec<(Vec3, Vec3)> = pairs.iter().map(|(x, p)| (*x, pose.inverse_transform_point(*p))).collect();
+        let spread = |axis: usize, which: fn(&(Vec3, Vec3)) -> Vec3| {
+            let values = local.iter().map(|pair| which(pair)[axis]);
+            values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+        };
+        let shape = self.limbs[limb].shape;
+        let ratio = |axis: usize, enough: f64| {
+            let (modelled, measured) = (spread(axis, |pair| pair.0), spread(axis, |pair| pair.1));
+            if modelled > enough && measured > 0.0 { (measured / modelled).clamp(0.5, 2.0) } else { 1.0 }
+        };
+        let stretch = Vec3::new(1.0, ratio(1, shape.b0().max(shape.b1())), ratio(2, 0.3 * shape.length()));
+        let stretched = crate::shape::TaperedEllipticCylinder::new(
+            shape.length() * stretch.z,
+            shape.a0(),
+            shape.b0() * stretch.y,
+            shape.a1(),
+            shape.b1() * stretch.y,
+        );
+        if let Ok(stretched) = stretched {
+            self.limbs[limb].shape = stretched;
+        }
+        self.map_landmarks(limb, |_, position| {
+            local
+                .iter()
+                .find(|(known, _)| (*known - position).length() < 1e-9)
+                .map_or(position * stretch, |(_, measured)| *measured)
+        });
+    }
+
+    /// Moves every limb so that the centres of its joint coincide.
+    fn close_joints(&self, poses: &mut [Pose]) {
+        for (index, limb) in self.limbs().iter().enumerate() {
+            if let Some((parent, joint)) = &limb.parent {
+                let centre = poses[*parent] * joint.parent_from_joint.translation;
+                poses[index].translation = centre - poses[index].rotation * joint.limb_from_joint.translation;
+            }
+        }
+    }
+}
+
+/// Turns about the limb's own z axis so that `local` points towards `world` as closely as it can.
+fn twist_towards(rotation: Quat, local: Vec3, world: Vec3) -> Quat {
+    let wanted = rotation.inverse() * world;
+    let angle = wanted.y.atan2(wanted.x) - local.y.atan2(local.x);
+    rotation * Quat::from_axis_angle(Vec3::Z, angle)
+}
+
+/// True when the points do not lie on one line: the middle of their scatter's eigenvalues is above zero.
+fn spans_a_plane(points: impl Iterator<Item = Vec3> + Clone) -> bool {
+    let count = points.clone().count() as f64;
+    if count < 3.0 {
+        return false;
+    }
+    let mean = points.clone().sum::<Vec3>() / count;
+    let scatter = points.fold(Mat3::ZERO, |sum, point| {
+        let d = point - mean;
+        sum + Mat3::from_cols(d * d.x, d * d.y, d * d.z)
+    });
+    let trace = scatter.x_axis.x + scatter.y_axis.y + scatter.z_axis.z;
+    let square = scatter * scatter;
+    // Sum of the products of pairs of eigenvalues: zero exactly on a line.
+    let pairs = 0.5 * (trace * trace - (square.x_axis.x + square.y_axis.y + square.z_axis.z));
+    pairs > 1e-4 * trace * trace && trace > 1e-8
+}

@@ -1,0 +1,72 @@
+//! Elastic-band joints (K07 section 4).
+
+use crate::geometry::{Pose, Vec3};
+
+/// A joint between a limb and its parent: one ellipse fixed to both of them.
+///
+/// The ellipse lies in the x-y plane of the joint frame. Both semi-axes zero: universal joint, one band. One positive:
+/// hinge about that axis, two bands at its ends. Both positive: elliptic joint, four bands at the ends of the main axes.
+/// Longer axes make the joint stiffer, a larger weight makes it tighter (K07 4.2).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Name, usually that of the site at its centre (`l_elbow`).
+    pub name: String,
+    /// The ellipse on the parent.
+    pub parent_from_joint: Pose,
+    /// The ellipse on the limb itself.
+    pub limb_from_joint: Pose,
+    /// Semi-axes along x and y of the joint frame, metres.
+    pub semi_axes: [f64; 2],
+    /// Strength relative to the other joints of a limb.
+    pub weight: f64,
+}
+
+/// The cases of K07 figure 3.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Three free rotations.
+    Universal,
+    /// One free rotation, about the joint frame's x axis (or y, when only the second semi-axis is positive).
+    Hinge,
+    /// Three restricted rotations.
+    Elliptic,
+}
+
+impl Joint {
+    /// Which case the semi-axes make.
+    pub fn kind(&self) -> JointKind {
+        match self.semi_axes.map(|axis| axis > 0.0) {
+            [false, false] => JointKind::Universal,
+            [true, true] => JointKind::Elliptic,
+            _ => JointKind::Hinge,
+        }
+    }
+
+    /// Ends of the bands in the joint frame; the same point on both limbs when the joint is closed.
+    pub fn band_points(&self) -> impl Iterator<Item = Vec3> + use<> {
+        let [a, b] = self.semi_axes;
+        let (points, count) = match self.kind() {
+            JointKind::Universal => ([Vec3::ZERO; 4], 1),
+            JointKind::Hinge => {
+                let end = Vec3::new(a, b, 0.0);
+                ([end, -end, Vec3::ZERO, Vec3::ZERO], 2)
+            }
+            JointKind::Elliptic => ([Vec3::X * a, Vec3::X * -a, Vec3::Y * b, Vec3::Y * -b], 4),
+        };
+        points.into_iter().take(count)
+    }
+
+    /// Number of bands.
+    pub fn band_count(&self) -> usize {
+        match self.kind() {
+            JointKind::Universal => 1,
+            JointKind::Hinge => 2,
+            JointKind::Elliptic => 4,
+        }
+    }
+
+    /// Pose of the limb in its parent when the bands have length zero and the joint is not turned.
+    pub fn parent_from_limb_at_rest(&self) -> Pose {
+        self.parent_from_joint * self.limb_from_joint.inverse()
+    }
+}

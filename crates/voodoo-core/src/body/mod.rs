@@ -1,0 +1,205 @@
+//! What is tracked: a tree of limbs joined by elastic bands, with named sites. Knows nothing of sensors.
+
+mod edit;
+mod fit;
+mod human;
+mod joint;
+
+pub use human::HumanProportions;
+pub use joint::{Joint, JointKind};
+
+use crate::error::BodyError;
+use crate::geometry::{Pose, Vec3};
+use crate::shape::TaperedEllipticCylinder;
+
+/// One rigid part of a body. Its frame has z along the axis of the shape, from the proximal end to the distal one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limb {
+    /// Name, unique in the body (`l_forearm`).
+    pub name: String,
+    /// Surface.
+    pub shape: TaperedEllipticCylinder,
+    /// Index of the parent and the joint to it; `None` for the root.
+    pub parent: Option<(usize, Joint)>,
+    /// Whether points may match the proximal and the distal cap. By default not where a joint is: the surface there lies
+    /// inside the body and its matches pull wrongly.
+    pub match_caps: [bool; 2],
+}
+
+/// A named feature point fixed to a limb (H-Anim joint and site names).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Site {
+    /// Name, unique in the body (`l_wrist`).
+    pub name: String,
+    /// Index of its limb.
+    pub limb: usize,
+    /// Position in the limb frame, metres.
+    pub position: Vec3,
+}
+
+/// A tree of limbs; a parent always stands before its children.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    name: String,
+    limbs: Vec<Limb>,
+    sites: Vec<Site>,
+}
+
+impl Body {
+    /// A body from its parts, checked.
+    pub fn new(name: impl Into<String>, limbs: Vec<Limb>, sites: Vec<Site>) -> Result<Self, BodyError> {
+        let body = Self { name: name.into(), limbs, sites };
+        body.check()?;
+        Ok(body)
+    }
+
+    /// Name of the body.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The limbs, parents first.
+    pub fn limbs(&self) -> &[Limb] {
+        &self.limbs
+    }
+
+    /// The sites.
+    pub fn sites(&self) -> &[Site] {
+        &self.sites
+    }
+
+    /// Index of a limb.
+    pub fn limb_index(&self, name: &str) -> Result<usize, BodyError> {
+        find("limb", name, self.limbs.iter().map(|limb| limb.name.as_str()))
+    }
+
+    /// Index of a site.
+    pub fn site_index(&self, name: &str) -> Result<usize, BodyError> {
+        find("site", name, self.sites.iter().map(|site| site.name.as_str()))
+    }
+
+    /// True when one of the two limbs is the parent of the other.
+    pub fn adjacent(&self, first: usize, second: usize) -> bool {
+        let joins =
+            |child: usize, parent: usize| self.limbs[child].parent.as_ref().is_some_and(|(index, _)| *index == parent);
+        joins(first, second) || joins(second, first)
+    }
+
+    /// World poses of all limbs with every joint closed and at rest.
+    pub fn rest_pose(&self, world_from_root: Pose) -> Vec<Pose> {
+        let mut poses = Vec::with_capacity(self.limbs.len());
+        for limb in &self.limbs {
+            let pose = match &limb.parent {
+                None => world_from_root,
+                Some((parent, joint)) => poses[*parent] * joint.parent_from_limb_at_rest(),
+            };
+            poses.push(pose);
+        }
+        poses
+    }
+
+    /// Position of a site in the world. A site at the centre of a joint lies midway between the two limbs' ends of it.
+    pub fn site_position(&self, world_from_limb: &[Pose], site: usize) -> Vec3 {
+        let site = &self.sites[site];
+        let position = world_from_limb[site.limb].transform_point(site.position);
+        match &self.limbs[site.limb].parent {
+            Some((parent, joint)) if joint.name == site.name => {
+                0.5 * (position + world_from_limb[*parent].transform_point(joint.parent_from_joint.translation))
+            }
+            _ => position,
+        }
+    }
+
+    fn check(&self) -> Result<(), BodyError> {
+        if self.limbs.is_empty() {
+            return Err(BodyError::Empty);
+        }
+        for (index, limb) in self.limbs.iter().enumerate() {
+            let key = format!("limbs.{}", limb.name);
+            check_name(&key, &limb.name)?;
+            if self.limbs[..index].iter().any(|other| other.name == limb.name) {
+                return Err(BodyError::Duplicate { key, name: limb.name.clone() });
+            }
+            match (&limb.parent, index) {
+                (None, 0) => {}
+                (Some((parent, joint)), 1..) if *parent < index => check_joint(&format!("{key}.joint"), joint)?,
+                (None, _) => {
+                    return Err(BodyError::Value {
+                        key: format!("{key}.parent"),
+                        expected: "a parent (only the first limb is the root)",
+                        found: "none".into(),
+                    });
+                }
+                (Some((parent, _)), _) => {
+                    return Err(BodyError::Value {
+                        key: format!("{key}.parent"),
+                        expected: "a limb that stands before this one",
+                        found: format!("limb {parent}"),
+                    });
+                }
+            }
+        }
+        for (index, site) in self.sites.iter().enumerate() {
+            let key = format!("sites.{}", site.name);
+            check_name(&key, &site.name)?;
+            if self.sites[..index].iter().any(|other| other.name == site.name) {
+                return Err(BodyError::Duplicate { key, name: site.name.clone() });
+            }
+            if site.limb >= self.limbs.len() {
+                return Err(BodyError::Value {
+                    key: format!("{key}.limb"),
+                    expected: "the index of a limb",
+                    found: site.limb.to_string(),
+                });
+            }
+            if !site.position.is_finite() {
+                return Err(BodyError::Value {
+                    key: format!("{key}.position"),
+                    expected: "finite metres",
+                    found: format!("{:?}", site.position),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
+    if name.is_empty() {
+        return Err(BodyError::Value { key: key.into(), expected: "a name", found: "an empty one".into() });
+    }
+    Ok(())
+}
+
+fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
+    let wrong =
+        |field: &str, expected, found: String| Err(BodyError::Value { key: format!("{key}.{field}"), expected, found });
+    if joint.semi_axes.iter().any(|axis| !axis.is_finite() || *axis < 0.0) {
+        return wrong("semi_axes", "two finite lengths, zero or more", format!("{:?}", joint.semi_axes));
+    }
+    if !joint.weight.is_finite() || joint.weight <= 0.0 {
+        return wrong("weight", "a finite weight above zero", joint.weight.to_string());
+    }
+    for (field, pose) in [("parent_from_joint", &joint.parent_from_joint), ("limb_from_joint", &joint.limb_from_joint)]
+    {
+        if !pose.translation.is_finite() || !pose.rotation.is_finite() || (pose.rotation.length() - 1.0).abs() > 1e-6 {
+            return wrong(field, "a finite position and a unit quaternion", format!("{pose:?}"));
+        }
+    }
+    Ok(())
+}
+
+fn find<'a>(
+    what: &'static str,
+    name: &str,
+    mut names: impl Iterator<Item = &'a str> + Clone,
+) -> Result<usize, BodyError> {
+    names.clone().position(|known| known == name).ok_or_else(|| {
+        let mut known = names.next().unwrap_or_default().to_owned();
+        for name in names {
+            known.push_str(", ");
+            known.push_str(name);
+        }
+        BodyError::Unknown { key: what.into(), what, name: name.into(), known }
+    })
+}

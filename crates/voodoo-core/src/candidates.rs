@@ -1,0 +1,176 @@
+//! Step 1: free points inside the enlarged whole-body box, joined by the points known to be on the body (K06 IV-B.1).
+
+use crate::body::Body;
+use crate::frame::{Cloud, DepthImage, Frame, PointSlice, Scope};
+use crate::geometry::{Aabb, Points, Pose, Vec3};
+
+/// Mark of a point that may belong to any limb.
+pub const ANY_LIMB: u16 = u16::MAX;
+
+/// Measured points that may lie on the body, in the working frame: world axes, origin near the body, single precision.
+#[derive(Debug, Default)]
+pub struct Candidates {
+    /// Where they are.
+    pub points: Points,
+    /// What they weigh.
+    pub weight: Vec<f32>,
+    /// The limb they are known to be on, or [`ANY_LIMB`].
+    pub limb: Vec<u16>,
+    /// Which source they come from.
+    pub source: Vec<u16>,
+}
+
+/// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
+struct Gate {
+    low: [f32; 3],
+    high: [f32; 3],
+    up: [f32; 3],
+    floor: f32,
+}
+
+impl Gate {
+    #[inline(always)]
+    fn passes(&self, p: [f32; 3]) -> bool {
+        let inside = |axis: usize| p[axis] >= self.low[axis] && p[axis] <= self.high[axis];
+        inside(0) & inside(1) & inside(2) & (p[0] * self.up[0] + p[1] * self.up[1] + p[2] * self.up[2] >= self.floor)
+    }
+}
+
+/// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
+pub fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
+    let mut total = Aabb::new_invalid();
+    for (limb, pose) in body.limbs().iter().zip(poses) {
+        let bounds = limb.shape.aabb(pose);
+        total.mins = total.mins.min(bounds.mins);
+        total.maxs = total.maxs.max(bounds.maxs);
+    }
+    Aabb::new(total.mins - Vec3::splat(margin), total.maxs + Vec3::splat(margin))
+}
+
+impl Candidates {
+    /// Number of candidates.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// True when there is none.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
+    /// whole-body box in the working frame, `clearance` the height above the ground under which free points are background.
+    pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, clearance: f64) {
+        self.points.clear();
+        self.weight.clear();
+        self.limb.clear();
+        self.source.clear();
+        let (up, floor) = match frame.ground {
+            Some(ground) => (ground.normal, ground.offset + clearance - ground.normal.dot(origin)),
+            None => (Vec3::ZERO, -1.0),
+        };
+        let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
+        let gate = Gate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
+        for image in frame.images {
+            self.gather_image(image, origin, bounds, &gate);
+        }
+        for cloud in frame.clouds {
+            self.gather_cloud(cloud, origin, &gate);
+        }
+    }
+
+    fn push(&mut self, point: [f32; 3], weight: f32, limb: u16, source: u16) {
+        self.points.push(point);
+        self.weight.push(weight);
+        self.limb.push(limb);
+        self.source.push(source);
+    }
+
+    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &Gate) {
+        let working_from_sensor = shifted(&cloud.world_from_sensor, origin);
+        let limb = match cloud.scope {
+            Scope::Limb(limb) => limb as u16,
+            Scope::Free | Scope::Body => ANY_LIMB,
+        };
+        let mut visit = |point: Vec3| {
+            let point = (working_from_sensor * point).to_array().map(|value| value as f32);
+            if cloud.scope != Scope::Free || gate.passes(point) {
+                self.push(point, cloud.weight as f32, limb, cloud.source);
+            }
+        };
+        match cloud.points {
+            PointSlice::F32(points) => points.iter().for_each(|p| visit(Vec3::from_array(p.map(f64::from)))),
+            PointSlice::F64(points) => points.iter().for_each(|p| visit(Vec3::from_array(*p))),
+        }
+    }
+
+    fn gather_image(&mut self, image: &DepthImage, origin: Vec3, bounds: &Aabb, gate: &Gate) {
+        let working_from_sensor = shifted(&image.world_from_sensor, origin);
+        let (columns, rows) = image_window(image, &working_from_sensor, bounds);
+        let m = glam_f32(&working_from_sensor);
+        let scale = image.metres_per_unit as f32;
+        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
+        let (inverse_fx, inverse_fy) = (1.0 / fx, 1.0 / fy);
+        for row in rows {
+            let ray_y = (row as f32 - cy) * inverse_fy;
+            for column in columns.clone() {
+                let index = row * image.width + column;
+                let z = image.pixels.get(index) * scale;
+                if z.is_nan() || z <= 0.0 || z.is_infinite() {
+                    continue;
+                }
+                let [x, y] = match image.rays {
+                    Some(rays) => rays[index],
+                    None => [(column as f32 - cx) * inverse_fx, ray_y],
+                };
+                let point =
+                    [0, 1, 2].map(|axis| m[0][axis] * (x * z) + (m[1][axis] * (y * z) + (m[2][axis] * z + m[3][axis])));
+                if gate.passes(point) {
+                    self.push(point, image.weight as f32, ANY_LIMB, image.source);
+                }
+            }
+        }
+    }
+}
+
+/// The pixels that can show anything inside the box: the bounds of its projected corners, the whole image when a corner
+/// lies behind the camera or the lens distorts.
+pub fn image_window(
+    image: &DepthImage,
+    working_from_sensor: &Pose,
+    bounds: &Aabb,
+) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+    let whole = (0..image.width, 0..image.height);
+    if image.rays.is_some() {
+        return whole;
+    }
+    let [fx, fy, cx, cy] = image.intrinsics;
+    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+    for corner in bounds.vertices() {
+        let corner = working_from_sensor.inverse_transform_point(corner);
+        if corner.z < 0.05 {
+            return whole;
+        }
+        for (axis, pixel) in [fx * corner.x / corner.z + cx, fy * corner.y / corner.z + cy].into_iter().enumerate() {
+            low[axis] = low[axis].min(pixel);
+            high[axis] = high[axis].max(pixel);
+        }
+    }
+    let range = |axis: usize, size: usize| {
+        let start = low[axis].floor().clamp(0.0, size as f64) as usize;
+        let end = (high[axis].ceil() + 1.0).clamp(0.0, size as f64) as usize;
+        start..end.max(start)
+    };
+    (range(0, image.width), range(1, image.height))
+}
+
+/// The transform into the working frame, whose origin is `origin` in the world.
+pub fn shifted(world_from_sensor: &Pose, origin: Vec3) -> Pose {
+    Pose::from_parts(world_from_sensor.translation - origin, world_from_sensor.rotation)
+}
+
+/// Columns of the rotation, then the translation.
+fn glam_f32(pose: &Pose) -> [[f32; 3]; 4] {
+    [pose.rotation * Vec3::X, pose.rotation * Vec3::Y, pose.rotation * Vec3::Z, pose.translation]
+        .map(|column| column.to_array().map(|value| value as f32))
+}

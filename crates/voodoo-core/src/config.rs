@@ -1,0 +1,235 @@
+//! Every parameter of the tracker, defined once: name, type, default, range, unit and meaning.
+//!
+//! The Python package builds its validated `Config` class and the commented TOML from [`Config::fields`].
+
+use crate::error::ConfigError;
+
+/// A value of a configuration entry.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A real number.
+    Real(f64),
+    /// A whole number.
+    Whole(usize),
+    /// A switch.
+    Switch(bool),
+    /// One of several words.
+    Word(&'static str),
+}
+
+/// What a configuration entry is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    /// Its key.
+    pub name: &'static str,
+    /// Its meaning, in one or a few sentences.
+    pub doc: String,
+    /// Its unit; empty when it has none.
+    pub unit: &'static str,
+    /// Its default.
+    pub default: Value,
+    /// Least and greatest value of a number.
+    pub range: Option<(f64, f64)>,
+    /// The words to choose from.
+    pub words: &'static [&'static str],
+}
+
+/// A type that a configuration entry can have.
+trait Entry: Sized + Clone {
+    const WORDS: &'static [&'static str] = &[];
+    fn value(&self) -> Value;
+    fn parse(value: &RawValue) -> Option<Self>;
+    fn number(&self) -> Option<f64> {
+        None
+    }
+    fn expected(range: Option<(f64, f64)>) -> String;
+}
+
+/// A value as it comes from outside.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawValue {
+    /// A number.
+    Number(f64),
+    /// A switch.
+    Switch(bool),
+    /// A word.
+    Word(String),
+}
+
+impl Entry for f64 {
+    fn value(&self) -> Value {
+        Value::Real(*self)
+    }
+    fn parse(value: &RawValue) -> Option<Self> {
+        match value {
+            RawValue::Number(number) => Some(*number),
+            _ => None,
+        }
+    }
+    fn number(&self) -> Option<f64> {
+        Some(*self)
+    }
+    fn expected(range: Option<(f64, f64)>) -> String {
+        range.map_or("a number".into(), |(low, high)| format!("a number from {low} to {high}"))
+    }
+}
+
+impl Entry for usize {
+    fn value(&self) -> Value {
+        Value::Whole(*self)
+    }
+    fn parse(value: &RawValue) -> Option<Self> {
+        match value {
+            RawValue::Number(number) if *number >= 0.0 && number.fract() == 0.0 && *number < 1e9 => {
+                Some(*number as usize)
+            }
+            _ => None,
+        }
+    }
+    fn number(&self) -> Option<f64> {
+        Some(*self as f64)
+    }
+    fn expected(range: Option<(f64, f64)>) -> String {
+        range.map_or("a whole number".into(), |(low, high)| format!("a whole number from {low} to {high}"))
+    }
+}
+
+impl Entry for bool {
+    fn value(&self) -> Value {
+        Value::Switch(*self)
+    }
+    fn parse(value: &RawValue) -> Option<Self> {
+        match value {
+            RawValue::Switch(switch) => Some(*switch),
+            _ => None,
+        }
+    }
+    fn expected(_: Option<(f64, f64)>) -> String {
+        "true or false".into()
+    }
+}
+
+macro_rules! words {
+    ($(#[$meta:meta])* $name:ident { $($(#[doc = $doc:literal])* $variant:ident = $word:literal),+ $(,)? }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name { $($(#[doc = $doc])* $variant),+ }
+        impl Entry for $name {
+            const WORDS: &'static [&'static str] = &[$($word),+];
+            fn value(&self) -> Value {
+                Value::Word(match self { $(Self::$variant => $word),+ })
+            }
+            fn parse(value: &RawValue) -> Option<Self> {
+                match value {
+                    $(RawValue::Word(word) if word == $word => Some(Self::$variant),)+
+                    _ => None,
+                }
+            }
+            fn expected(_: Option<(f64, f64)>) -> String {
+                format!("one of {}", Self::WORDS.join(", "))
+            }
+        }
+    };
+}
+
+macro_rules! config {
+    ($($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:expr, $unit:literal $(, $low:literal ..= $high:literal)?;)+) => {
+        /// The parameters of the tracker. Defaults are the measured ones.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Config { $($(#[doc = $doc])+ pub $name: $kind),+ }
+
+        impl Default for Config {
+            fn default() -> Self {
+                Self { $($name: $default),+ }
+            }
+        }
+
+        impl Config {
+            /// All entries in the order of their definition, with the values of `self` as defaults.
+            pub fn fields(&self) -> Vec<Field> {
+                vec![$(Field {
+                    name: stringify!($name),
+                    doc: [$($doc),+].concat().trim().to_owned(),
+                    unit: $unit,
+                    default: self.$name.value(),
+                    range: config!(@range $($low $high)?),
+                    words: <$kind as Entry>::WORDS,
+                }),+]
+            }
+
+            /// Sets one entry, checked for type and range.
+            pub fn set(&mut self, key: &str, value: &RawValue) -> Result<(), ConfigError> {
+                match key {
+                    $(stringify!($name) => {
+                        let range: Option<(f64, f64)> = config!(@range $($low $high)?);
+                        let parsed = <$kind as Entry>::parse(value).filter(|entry| {
+                            match (entry.number(), range) {
+                                (Some(number), Some((low, high))) => (low..=high).contains(&number),
+                                (Some(number), None) => number.is_finite(),
+                                _ => true,
+                            }
+                        });
+                        self.$name = parsed.ok_or_else(|| ConfigError::Value {
+                            key: stringify!($name),
+                            expected: <$kind as Entry>::expected(range),
+                            found: format!("{value:?}"),
+                        })?;
+                        Ok(())
+                    })+
+                    _ => Err(ConfigError::UnknownKey(key.to_owned())),
+                }
+            }
+        }
+    };
+    (@range $low:literal $high:literal) => { Some(($low as f64, $high as f64)) };
+    (@range) => { None };
+}
+
+words! {
+    /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
+    Overlap {
+        /// It goes to every one of them.
+        Shared = "shared",
+        /// It goes to the closest one (K07 3.2).
+        Exclusive = "exclusive",
+        /// It goes to the closest one and to those of the others that are joined to it.
+        Adjacent = "adjacent",
+    }
+}
+
+words! {
+    /// How the pose follows from the correspondences.
+    SolverKind {
+        /// Each limb alone, by weighted absolute orientation (K06, K07).
+        Limbwise = "limbwise",
+    }
+}
+
+config! {
+    /// How the pose is found from the correspondences.
+    solver: SolverKind = SolverKind::Limbwise, "";
+    /// Greatest number of ICP steps in a frame (K07 section 7: 6 is a good compromise).
+    max_steps: usize = 6, "", 1 ..= 100;
+    /// The steps end when the mean squared distance improves by less than this (K06 III-B step 6).
+    min_improvement: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
+    /// Enlargement of the box around the whole body; free points outside are background (K06 IV-B.1).
+    body_box_margin: f64 = 0.20, "m", 0.0 ..= 10.0;
+    /// Enlargement of the box of each limb: how far a limb may move between two frames (K06 IV-B.2).
+    limb_box_margin: f64 = 0.10, "m", 0.0 ..= 10.0;
+    /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
+    overlap: Overlap = Overlap::Exclusive, "";
+    /// Every n-th point of a limb is used (K06 IV-B.3).
+    sampling_factor: usize = 1, "", 1 ..= 1000;
+    /// A limb keeps at least this many of its points when sampled (K06 IV-B.3).
+    min_limb_points: usize = 50, "", 0 ..= 1000000;
+    /// A limb keeps at most this many points (K06 IV-B.3).
+    max_limb_points: usize = 1000, "", 1 ..= 1000000;
+    /// A point farther than this from its limb's surface is not matched (K06 IV-B.4).
+    max_distance: f64 = 0.15, "m", 0.001 ..= 10.0;
+    /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7).
+    band_ratio: f64 = 0.5, "", 0.0 ..= 100.0;
+    /// Free points lower than this above the ground plane are background, where the frame has a ground plane.
+    ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;
+    /// Threads for one step. The result is the same, bit by bit, for any number.
+    threads: usize = 1, "", 1 ..= 256;
+}

@@ -1,0 +1,106 @@
+//! The one currency between measurements and solvers: weighted pairs of a body point and a target.
+//!
+//! Everything is in the working frame: world axes, origin near the body.
+
+use crate::geometry::{Mat3, Points, Vec3};
+use crate::shape::SurfaceBatch;
+
+/// Surface matches of one limb: measured points and their closest points. Rejected pairs stay with weight zero.
+#[derive(Debug, Default)]
+pub struct LimbMatches {
+    /// Index of each point among the candidates.
+    pub candidate: Vec<u32>,
+    /// Measured points.
+    pub measured: Points,
+    /// Weights.
+    pub weight: Vec<f32>,
+    /// Closest points, normals, signed distances.
+    pub surface: SurfaceBatch,
+}
+
+/// A site with a target: a measured position, or the closest point of a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SitePair {
+    /// The limb that carries the site.
+    pub limb: usize,
+    /// The site.
+    pub x: Vec3,
+    /// The target.
+    pub p: Vec3,
+    /// Scalar weight, as the papers use it.
+    pub weight: f64,
+    /// Weight times the identity for a position, times `I - d d^T` for a ray along `d` (method: every datum has an information).
+    pub information: Mat3,
+    /// Number of the source.
+    pub source: u16,
+}
+
+/// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Band {
+    /// Parent limb.
+    pub parent: usize,
+    /// Child limb.
+    pub child: usize,
+    /// End on the parent.
+    pub on_parent: Vec3,
+    /// End on the child.
+    pub on_child: Vec3,
+    /// Artificial weight towards the parent's own measurements.
+    pub parent_weight: f64,
+    /// Artificial weight towards the child's own measurements.
+    pub child_weight: f64,
+}
+
+/// All correspondences of one ICP step.
+#[derive(Debug, Default)]
+pub struct Correspondences {
+    /// Surface matches, limb by limb.
+    pub limbs: Vec<LimbMatches>,
+    /// Sites with positions and rays.
+    pub sites: Vec<SitePair>,
+    /// Elastic bands.
+    pub bands: Vec<Band>,
+}
+
+impl LimbMatches {
+    /// Sum of the weights.
+    pub fn total_weight(&self) -> f64 {
+        self.weight.iter().map(|weight| f64::from(*weight)).sum()
+    }
+
+    /// Number of accepted pairs and weighted sum of their squared distances.
+    pub fn accepted(&self) -> (usize, f64) {
+        let mut count = 0;
+        let mut sum = 0.0;
+        for (weight, distance) in self.weight.iter().zip(&self.surface.signed_distance) {
+            if *weight > 0.0 {
+                count += 1;
+                sum += f64::from(*weight) * f64::from(*distance) * f64::from(*distance);
+            }
+        }
+        (count, sum)
+    }
+}
+
+impl Correspondences {
+    /// Measured weight of a limb: its points and its sites.
+    pub fn measured_weight(&self, limb: usize) -> f64 {
+        let sites: f64 = self.sites.iter().filter(|pair| pair.limb == limb).map(|pair| pair.weight).sum();
+        self.limbs[limb].total_weight() + sites
+    }
+
+    /// Weighted mean of the squared distances of all measured pairs (K06 III-B step 2), `None` without any.
+    pub fn mean_squared_distance(&self) -> Option<f64> {
+        let (mut weight, mut sum) = (0.0, 0.0);
+        for limb in &self.limbs {
+            weight += limb.total_weight();
+            sum += limb.accepted().1;
+        }
+        for pair in &self.sites {
+            weight += pair.weight;
+            sum += pair.weight * (pair.x - pair.p).length_squared();
+        }
+        (weight > 0.0).then(|| sum / weight)
+    }
+}

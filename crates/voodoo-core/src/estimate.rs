@@ -1,0 +1,53 @@
+//! What a step found.
+
+use crate::geometry::{Pose, Vec3};
+
+/// How much a pose can be relied on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Status {
+    /// Measurements support the pose.
+    Tracking,
+    /// Some of the body is carried by its joints only.
+    Degraded,
+    /// Nothing measured supports the pose.
+    #[default]
+    Lost,
+}
+
+/// What one source gave to a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SourceReport {
+    /// Measurements of the source that were candidates.
+    pub count: usize,
+    /// Those that matched the body.
+    pub inliers: usize,
+    /// Sum of the weights of the matched ones.
+    pub weight: f64,
+    /// Root of the weighted mean of their squared distances, metres; NaN without any.
+    pub residual: f64,
+}
+
+/// Pose and quality of one frame. World frame, metres, seconds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Time of the frame.
+    pub stamp: f64,
+    /// How much it can be relied on.
+    pub status: Status,
+    /// Pose of every limb.
+    pub world_from_limb: Vec<Pose>,
+    /// Position of every site.
+    pub sites: Vec<Vec3>,
+    /// Weighted mean of the squared distances of all measurements to the final pose; NaN without any.
+    pub mean_squared_distance: f64,
+    /// ICP steps used.
+    pub steps: usize,
+    /// Matched points of every limb.
+    pub limb_points: Vec<usize>,
+    /// Root of the mean squared distance of every limb; NaN without points.
+    pub limb_residual: Vec<f64>,
+    /// Distance between the two centres of the joint of every limb to its parent; 0 for the root.
+    pub joint_gaps: Vec<f64>,
+    /// What each source gave.
+    pub sources: Vec<SourceReport>,
+}

@@ -1,0 +1,67 @@
+//! The published solver: weighted absolute orientation, each limb alone (K06 IV-B.7, K07 3.2).
+
+use super::Solver;
+use crate::body::Body;
+use crate::correspondence::{Correspondences, LimbMatches};
+use crate::geometry::{Mat3, Pose, Vec3};
+use crate::rigid::Moments;
+
+/// Lever of the wish not to turn where the pairs fix no rotation, metres: the girth of a limb.
+const STAY: f64 = 0.05;
+
+/// Each limb moves to the optimum of its own pairs; information crosses one joint a step through the bands.
+#[derive(Debug, Default)]
+pub struct Limbwise;
+
+impl Solver for Limbwise {
+    fn solve(&mut self, _body: &Body, correspondences: &Correspondences, poses: &mut [Pose]) {
+        for (limb, pose) in poses.iter_mut().enumerate() {
+            // Moments about the limb's own position keep the sums well conditioned.
+            let centre = pose.translation;
+            let mut moments = surface_moments(&correspondences.limbs[limb], centre);
+            for pair in correspondences.sites.iter().filter(|pair| pair.limb == limb) {
+                moments.add(pair.weight, pair.x - centre, pair.p - centre);
+            }
+            for band in &correspondences.bands {
+                // The same band twice, once for each limb it joins: the partner's end is the datum (K07 4.3).
+                if band.child == limb {
+                    moments.add(band.child_weight, band.on_child - centre, band.on_parent - centre);
+                }
+                if band.parent == limb {
+                    moments.add(band.parent_weight, band.on_parent - centre, band.on_child - centre);
+                }
+            }
+            if let Some(motion) = moments.absolute_orientation(STAY) {
+                let rotation = (motion.rotation * pose.rotation).normalize();
+                // x - centre = 0 at the limb's own position, so its image is the motion's translation.
+                *pose = Pose::from_parts(centre + motion.translation, rotation);
+            }
+        }
+    }
+}
+
+/// Moments of the surface matches of one limb about `centre`, four lanes wide so that they vectorise.
+fn surface_moments(matches: &LimbMatches, centre: Vec3) -> Moments {
+    const LANES: usize = 4;
+    let c = centre.to_array().map(|value| value as f32);
+    let (x, p) = (&matches.surface.points, &matches.measured);
+    let count = matches.weight.len();
+    // w, w x, w p, w p x^T
+    let mut sums = [[0.0_f64; LANES]; 16];
+    for index in 0..count {
+        let lane = index % LANES;
+        let w = f64::from(matches.weight[index]);
+        let xs = [x.x[index] - c[0], x.y[index] - c[1], x.z[index] - c[2]].map(f64::from);
+        let ps = [p.x[index] - c[0], p.y[index] - c[1], p.z[index] - c[2]].map(f64::from);
+        sums[0][lane] += w;
+        for axis in 0..3 {
+            sums[1 + axis][lane] += w * xs[axis];
+            sums[4 + axis][lane] += w * ps[axis];
+            for other in 0..3 {
+                sums[7 + 3 * axis + other][lane] += w * xs[axis] * ps[other];
+            }
+        }
+    }
+    let [w, x0, x1, x2, p0, p1, p2, products @ ..] = sums.map(|lanes| lanes.iter().sum::<f64>());
+    Moments { weight: w, x: Vec3::new(x0, x1, x2), p: Vec3::new(p0, p1, p2), px: Mat3::from_cols_array(&products) }
+}

@@ -1,0 +1,265 @@
+//! The tracker: `step` names the method.
+
+use rayon::prelude::*;
+
+use crate::associate::Assignment;
+use crate::body::Body;
+use crate::candidates::{Candidates, body_box, shifted};
+use crate::config::Config;
+use crate::correspondence::{Correspondences, LimbMatches};
+use crate::error::{BodyError, TrackError};
+use crate::estimate::{Estimate, Status};
+use crate::frame::{Frame, PointSlice};
+use crate::geometry::{Points, Pose, Vec3};
+use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
+use crate::solver::{Solver, solver};
+
+/// Follows one body through frames.
+#[derive(Debug)]
+pub struct Tracker {
+    body: Body,
+    config: Config,
+    solver: Box<dyn Solver>,
+    threads: Option<rayon::ThreadPool>,
+    stamp: Option<f64>,
+    started: bool,
+    /// Current poses in the working frame, whose origin lies at `origin` in the world.
+    poses: Vec<Pose>,
+    origin: Vec3,
+    candidates: Candidates,
+    assignment: Assignment,
+    correspondences: Correspondences,
+    measured: Vec<f64>,
+    estimate: Estimate,
+}
+
+impl Tracker {
+    /// A tracker of `body`. It has no pose until [`Tracker::reset`].
+    pub fn new(body: Body, config: Config) -> Result<Self, TrackError> {
+        let threads = match config.threads {
+            1 => None,
+            count => Some(rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(|error| {
+                TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
+            })?),
+        };
+        Ok(Self {
+            solver: solver(config.solver),
+            body,
+            config,
+            threads,
+            stamp: None,
+            started: false,
+            poses: Vec::new(),
+            origin: Vec3::ZERO,
+            candidates: Candidates::default(),
+            assignment: Assignment::default(),
+            correspondences: Correspondences::default(),
+            measured: Vec::new(),
+            estimate: Estimate::default(),
+        })
+    }
+
+    /// The body in its current sizes.
+    pub fn body(&self) -> &Body {
+        &self.body
+    }
+
+    /// The parameters.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The last estimate.
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position).
+    /// Time may start anew afterwards. The tracker is unchanged on error.
+    pub fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
+        if let Some((site, _)) = positions.iter().find(|(site, _)| *site >= self.body.sites().len()) {
+            return Err(TrackError::measurement("joints", "the index of a site", site.to_string()));
+        }
+        let (body, poses) = self.body.fit(positions, fit_sizes)?;
+        self.restart(body, poses);
+        Ok(&self.estimate)
+    }
+
+    /// Sets the pose of every limb directly.
+    pub fn reset_pose(&mut self, world_from_limb: &[Pose]) -> Result<&Estimate, TrackError> {
+        let count = self.body.limbs().len();
+        if world_from_limb.len() != count || !world_from_limb.iter().all(Pose::is_finite) {
+            return Err(TrackError::measurement(
+                "world_from_limb",
+                "one finite pose a limb",
+                format!("{} pose(s) for {count} limbs", world_from_limb.len()),
+            ));
+        }
+        self.restart(self.body.clone(), world_from_limb.to_vec());
+        Ok(&self.estimate)
+    }
+
+    fn restart(&mut self, body: Body, world_from_limb: Vec<Pose>) {
+        self.body = body;
+        self.poses = world_from_limb;
+        self.origin = Vec3::ZERO;
+        self.stamp = None;
+        self.started = true;
+        self.correspondences.limbs.clear();
+        self.correspondences.sites.clear();
+        self.candidates = Candidates::default();
+        self.report(f64::NAN, 0);
+        // The caller vouches for a pose that was set.
+        self.estimate.status = Status::Tracking;
+    }
+
+    /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
+    pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
+        if !self.started {
+            return Err(TrackError::NotInitialised);
+        }
+        frame.check(&self.body, self.stamp)?;
+        self.move_origin();
+        // 1 Prefilter the free points by the enlarged box of the whole body.
+        let bounds = body_box(&self.body, &self.poses, self.config.body_box_margin);
+        self.candidates.gather(frame, self.origin, &bounds, self.config.ground_clearance);
+        let mut steps = 0;
+        let mut previous = f64::INFINITY;
+        while steps < self.config.max_steps {
+            // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
+            self.match_points();
+            // 4 Point-to-point relations, 5 closest points on rays.
+            self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+            let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+            if previous - distance < self.config.min_improvement && steps > 0 {
+                break;
+            }
+            previous = distance;
+            // 6 Elastic bands on both limbs.
+            self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
+            // 7 Fit the model.
+            self.solver.solve(&self.body, &self.correspondences, &mut self.poses);
+            steps += 1;
+        }
+        self.match_points();
+        self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+        self.stamp = Some(frame.stamp);
+        self.report(frame.stamp, steps);
+        Ok(&self.estimate)
+    }
+
+    /// Signed distance of world points to the surface of the posed body, metres, negative inside.
+    pub fn distance(&self, points: PointSlice) -> Result<Vec<f32>, TrackError> {
+        if !self.started {
+            return Err(TrackError::NotInitialised);
+        }
+        let mut queries = Points::default();
+        for index in 0..points.len() {
+            let point = points.get(index);
+            if !point.is_finite() {
+                return Err(TrackError::measurement("points", "finite metres", format!("{point:?} in row {index}")));
+            }
+            queries.push((point - self.origin).to_array().map(|value| value as f32));
+        }
+        let mut least = vec![f32::INFINITY; points.len()];
+        let mut surface = SurfaceBatch::default();
+        for (limb, pose) in self.body.limbs().iter().zip(&self.poses) {
+            limb.shape.closest_points(pose, &queries, &mut surface);
+            for (least, distance) in least.iter_mut().zip(&surface.signed_distance) {
+                *least = least.min(*distance);
+            }
+        }
+        Ok(least)
+    }
+
+    /// Keeps the working frame near the body, so that single precision is enough for points.
+    fn move_origin(&mut self) {
+        let shift = self.poses[0].translation;
+        self.origin += shift;
+        for pose in &mut self.poses {
+            *pose = shifted(pose, shift);
+        }
+    }
+
+    fn match_points(&mut self) {
+        let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
+        assignment.assign(body, poses, candidates, config);
+        correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
+        let assignment = &*assignment;
+        let work = |(index, matches): (usize, &mut LimbMatches)| {
+            assignment.match_limb(index, &body.limbs()[index], &poses[index], candidates, config, matches);
+        };
+        match threads {
+            // Every limb is worked on by one thread in a fixed order: the result does not depend on their number.
+            Some(pool) => pool.install(|| correspondences.limbs.par_iter_mut().enumerate().for_each(work)),
+            None => correspondences.limbs.iter_mut().enumerate().for_each(work),
+        }
+    }
+}
+
+/// Changes of the body between frames that keep the track (K06 IV: "changes in the model itself").
+impl Tracker {
+    /// Scales the whole body about its root.
+    pub fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
+        let body = self.body.scaled(factor)?;
+        self.adopt(body);
+        Ok(())
+    }
+
+    /// Changes the dimensions of one limb.
+    pub fn set_shape(&mut self, limb: &str, shape: TaperedEllipticCylinder) -> Result<(), BodyError> {
+        let body = self.body.with_shape(limb, shape)?;
+        self.adopt(body);
+        Ok(())
+    }
+
+    /// Adds a limb (a held box); it starts with its joint closed and at rest.
+    pub fn add_limb(
+        &mut self,
+        name: &str,
+        parent: &str,
+        shape: TaperedEllipticCylinder,
+        joint: crate::body::Joint,
+        sites: Vec<(String, Vec3)>,
+    ) -> Result<(), BodyError> {
+        let body = self.body.with_limb(name, parent, shape, joint, sites)?;
+        if self.started
+            && let Some((parent, joint)) = body.limbs().last().and_then(|limb| limb.parent.as_ref())
+        {
+            self.poses.push(self.poses[*parent] * joint.parent_from_limb_at_rest());
+        }
+        self.adopt(body);
+        Ok(())
+    }
+
+    /// Removes a limb with all that hangs on it.
+    pub fn remove_limb(&mut self, name: &str) -> Result<(), BodyError> {
+        let (body, kept) = self.body.without_limb(name)?;
+        if self.started {
+            self.poses = kept.iter().map(|index| self.poses[*index]).collect();
+        }
+        self.adopt(body);
+        Ok(())
+    }
+
+    /// Takes a changed body and closes its joints from the root outwards, orientations kept.
+    fn adopt(&mut self, body: Body) {
+        self.body = body;
+        if !self.started {
+            return;
+        }
+        for (index, limb) in self.body.limbs().iter().enumerate() {
+            if let Some((parent, joint)) = &limb.parent {
+                let centre = self.poses[*parent] * joint.parent_from_joint.translation;
+                self.poses[index].translation = centre - self.poses[index].rotation * joint.limb_from_joint.translation;
+            }
+        }
+        self.correspondences.limbs.clear();
+        self.correspondences.sites.clear();
+        let status = self.estimate.status;
+        self.report(self.stamp.unwrap_or(f64::NAN), 0);
+        self.estimate.status = status;
+    }
+}
+
+mod report;

@@ -1,0 +1,85 @@
+//! Filling the estimate from the tracker's state, without allocating once it is warm.
+
+use super::Tracker;
+use crate::candidates::shifted;
+use crate::estimate::{SourceReport, Status};
+
+/// Share of the limbs that may be without points before the pose counts as degraded.
+const SUPPORTED: f64 = 0.5;
+
+impl Tracker {
+    pub(super) fn report(&mut self, stamp: f64, steps: usize) {
+        let Self { body, poses, origin, correspondences, candidates, estimate, .. } = self;
+        estimate.stamp = stamp;
+        estimate.steps = steps;
+        estimate.mean_squared_distance = correspondences.mean_squared_distance().unwrap_or(f64::NAN);
+        estimate.world_from_limb.clear();
+        estimate.world_from_limb.extend(poses.iter().map(|pose| shifted(pose, -*origin)));
+        estimate.sites.clear();
+        estimate.sites.extend((0..body.sites().len()).map(|site| body.site_position(&estimate.world_from_limb, site)));
+        estimate.limb_points.clear();
+        estimate.limb_residual.clear();
+        estimate.joint_gaps.clear();
+        for (index, limb) in body.limbs().iter().enumerate() {
+            let matches = correspondences.limbs.get(index);
+            let (count, sum) = matches.map_or((0, 0.0), |matches| matches.accepted());
+            let weight = matches.map_or(0.0, |matches| matches.total_weight());
+            estimate.limb_points.push(count);
+            estimate.limb_residual.push((sum / weight).sqrt());
+            estimate.joint_gaps.push(limb.parent.as_ref().map_or(0.0, |(parent, joint)| {
+                let on_parent = poses[*parent] * joint.parent_from_joint.translation;
+                (on_parent - poses[index] * joint.limb_from_joint.translation).length()
+            }));
+        }
+        let measured =
+            |limb: &usize| *limb < correspondences.limbs.len() && correspondences.measured_weight(*limb) > 0.0;
+        let supported = (0..poses.len()).filter(measured).count();
+        estimate.status = match supported as f64 / poses.len() as f64 {
+            0.0 => Status::Lost,
+            share if share < SUPPORTED => Status::Degraded,
+            _ => Status::Tracking,
+        };
+        let sources = &mut estimate.sources;
+        sources.clear();
+        for source in &candidates.source {
+            entry(sources, *source).count += 1;
+        }
+        for matches in &correspondences.limbs {
+            for ((candidate, weight), distance) in
+                matches.candidate.iter().zip(&matches.weight).zip(&matches.surface.signed_distance)
+            {
+                if *weight > 0.0 {
+                    entry(sources, candidates.source[*candidate as usize])
+                        .add(f64::from(*weight), f64::from(distance * distance));
+                }
+            }
+        }
+        for pair in &correspondences.sites {
+            let report = entry(sources, pair.source);
+            report.count += 1;
+            report.add(pair.weight, (pair.x - pair.p).length_squared());
+        }
+        sources.iter_mut().for_each(SourceReport::finish);
+    }
+}
+
+fn entry(sources: &mut Vec<SourceReport>, source: u16) -> &mut SourceReport {
+    let index = usize::from(source);
+    if sources.len() <= index {
+        sources.resize(index + 1, SourceReport::default());
+    }
+    &mut sources[index]
+}
+
+impl SourceReport {
+    /// Counts one matched measurement; `residual` holds the weighted sum until `finish`.
+    fn add(&mut self, weight: f64, square: f64) {
+        self.inliers += 1;
+        self.weight += weight;
+        self.residual += weight * square;
+    }
+
+    fn finish(&mut self) {
+        self.residual = (self.residual / self.weight).sqrt();
+    }
+}

@@ -1,0 +1,121 @@
+//! NumPy arrays in and out.
+
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use voodoo_core::frame::PointSlice;
+use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
+
+use crate::errors::{exception, wrong_argument};
+
+/// Points as they came: single or double precision, contiguous.
+pub enum PointArray {
+    F32(Py<PyArray2<f32>>),
+    F64(Py<PyArray2<f64>>),
+}
+
+/// A borrow of a [`PointArray`].
+pub enum PointView<'py> {
+    F32(PyReadonlyArray2<'py, f32>),
+    F64(PyReadonlyArray2<'py, f64>),
+}
+
+impl PointArray {
+    /// Takes an `(N, 3)` array of float32 or float64; copies only what is not contiguous.
+    pub fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = value.py();
+        let wrong = || {
+            let found = match value.cast::<PyUntypedArray>() {
+                Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
+                Err(_) => value.get_type().to_string(),
+            };
+            exception(
+                py,
+                "MeasurementError",
+                format!("{name}: expected an array of shape (N, 3) and dtype float32 or float64, found {found}"),
+            )
+        };
+        let array = value.cast::<PyUntypedArray>().map_err(|_| wrong())?;
+        if array.ndim() != 2 || array.shape()[1] != 3 {
+            return Err(wrong());
+        }
+        let contiguous = contiguous(value)?;
+        if let Ok(array) = contiguous.cast::<PyArray2<f32>>() {
+            Ok(Self::F32(array.clone().unbind()))
+        } else if let Ok(array) = contiguous.cast::<PyArray2<f64>>() {
+            Ok(Self::F64(array.clone().unbind()))
+        } else {
+            Err(wrong())
+        }
+    }
+
+    pub fn view<'py>(&self, py: Python<'py>) -> PointView<'py> {
+        match self {
+            Self::F32(array) => PointView::F32(array.bind(py).readonly()),
+            Self::F64(array) => PointView::F64(array.bind(py).readonly()),
+        }
+    }
+}
+
+impl PointView<'_> {
+    pub fn slice(&self) -> PyResult<PointSlice<'_>> {
+        Ok(match self {
+            Self::F32(view) => PointSlice::F32(view.as_slice()?.as_chunks().0),
+            Self::F64(view) => PointSlice::F64(view.as_slice()?.as_chunks().0),
+        })
+    }
+}
+
+/// The same array, C-contiguous and aligned.
+pub fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let array = value.cast::<PyUntypedArray>()?;
+    if array.is_c_contiguous() {
+        return Ok(value.clone());
+    }
+    value.py().import("numpy")?.call_method1("ascontiguousarray", (value,))
+}
+
+/// A vector from anything with three numbers.
+pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
+    value
+        .extract::<[f64; 3]>()
+        .map(Vec3::from_array)
+        .map_err(|_| wrong_argument(value.py(), name, "three numbers", value))
+}
+
+/// A pose from a rigid 4x4 matrix; the identity without one.
+pub fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
+    let Some(value) = value else { return Ok(Pose::identity()) };
+    let wrong = || wrong_argument(value.py(), name, "a rigid 4x4 transform", value);
+    let rows: [[f64; 4]; 4] = value.extract().map_err(|_| wrong())?;
+    let rotation = Mat3::from_cols_array_2d(&[
+        [rows[0][0], rows[0][1], rows[0][2]],
+        [rows[1][0], rows[1][1], rows[1][2]],
+        [rows[2][0], rows[2][1], rows[2][2]],
+    ])
+    .transpose();
+    let error = (rotation * rotation.transpose() - Mat3::IDENTITY)
+        .to_cols_array()
+        .iter()
+        .fold(0.0_f64, |worst, entry| worst.max(entry.abs()));
+    let translation = Vec3::new(rows[0][3], rows[1][3], rows[2][3]);
+    // A NaN fails every comparison, so each is written to be true for good values only.
+    if !(error < 1e-4 && rotation.determinant() > 0.0 && translation.is_finite() && rows[3] == [0.0, 0.0, 0.0, 1.0]) {
+        return Err(wrong());
+    }
+    Ok(Pose::from_parts(translation, Quat::from_mat3(&rotation).normalize()))
+}
+
+/// The rows of a pose's 4x4 matrix.
+pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
+    let rows = Mat3::from_quat(pose.rotation).transpose().to_cols_array_2d();
+    let t = pose.translation;
+    let row = |index: usize, shift: f64| [rows[index][0], rows[index][1], rows[index][2], shift];
+    [row(0, t.x), row(1, t.y), row(2, t.z), [0.0, 0.0, 0.0, 1.0]]
+}
+
+/// A read-only array of a given shape.
+pub fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let array = PyArray1::from_vec(py, values).reshape(shape)?;
+    array.call_method1("setflags", (false,))?;
+    Ok(array)
+}

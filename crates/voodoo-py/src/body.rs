@@ -1,0 +1,118 @@
+//! `Body`: made by `voodoo.body` from validated parts.
+
+use pyo3::prelude::*;
+use voodoo_core::Body;
+use voodoo_core::body::{Joint, Limb, Site};
+use voodoo_core::geometry::{Pose, Quat, Vec3};
+
+use crate::errors::{IntoPy, exception};
+use crate::shape::PyShape;
+
+/// Position and rotation vector (radians) of a joint's ellipse.
+type Frame = ([f64; 3], [f64; 3]);
+/// name, ellipse on the parent, ellipse on the limb, semi-axes, weight
+pub type JointParts = (String, Frame, Frame, [f64; 2], f64);
+/// name, parent, shape, joint, match_caps
+type LimbParts = (String, Option<String>, PyShape, Option<JointParts>, [bool; 2]);
+/// name, limb, position
+type SiteParts = (String, String, [f64; 3]);
+
+#[pyclass(name = "Body", module = "voodoo._core", frozen, eq, from_py_object)]
+#[derive(Clone, PartialEq)]
+pub struct PyBody(pub Body);
+
+fn pose((position, rotation): Frame) -> Pose {
+    Pose::from_parts(Vec3::from_array(position), Quat::from_scaled_axis(Vec3::from_array(rotation)))
+}
+
+fn frame(pose: &Pose) -> Frame {
+    (pose.translation.to_array(), pose.rotation.to_scaled_axis().to_array())
+}
+
+pub fn joint((name, on_parent, on_limb, semi_axes, weight): JointParts) -> Joint {
+    Joint { name, parent_from_joint: pose(on_parent), limb_from_joint: pose(on_limb), semi_axes, weight }
+}
+
+#[pymethods]
+impl PyBody {
+    #[new]
+    fn new(py: Python<'_>, name: String, limbs: Vec<LimbParts>, sites: Vec<SiteParts>) -> PyResult<Self> {
+        let names: Vec<String> = limbs.iter().map(|limb| limb.0.clone()).collect();
+        let index = |key: String, name: &str| {
+            names.iter().position(|known| known == name).ok_or_else(|| {
+                exception(py, "BodyError", format!("{key}: expected one of {}, found {name:?}", names.join(", ")))
+            })
+        };
+        let limbs = limbs
+            .into_iter()
+            .map(|(name, parent, shape, parts, match_caps)| {
+                let parent = match (parent, parts) {
+                    (Some(parent), Some(parts)) => {
+                        Some((index(format!("limbs.{name}.parent"), &parent)?, joint(parts)))
+                    }
+                    (None, None) => None,
+                    _ => {
+                        return Err(exception(
+                            py,
+                            "BodyError",
+                            format!("limbs.{name}: expected both a parent and a joint, or neither for the root"),
+                        ));
+                    }
+                };
+                Ok(Limb { name, shape: shape.0, parent, match_caps })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        let sites = sites
+            .into_iter()
+            .map(|(name, limb, position)| {
+                Ok(Site {
+                    limb: index(format!("sites.{name}.limb"), &limb)?,
+                    name,
+                    position: Vec3::from_array(position),
+                })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        Body::new(name, limbs, sites).map(Self).map_err(|error| error.into_py(py))
+    }
+
+    #[staticmethod]
+    fn human(py: Python<'_>, stature: f64) -> PyResult<Self> {
+        Body::human(stature).map(Self).map_err(|error| error.into_py(py))
+    }
+
+    fn scaled(&self, py: Python<'_>, factor: f64) -> PyResult<Self> {
+        self.0.scaled(factor).map(Self).map_err(|error| error.into_py(py))
+    }
+
+    /// The parts that `new` takes.
+    fn parts(&self) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
+        let limbs = self.0.limbs();
+        let limb_parts = limbs
+            .iter()
+            .map(|limb| {
+                let (parent, joint) = limb
+                    .parent
+                    .as_ref()
+                    .map(|(parent, joint)| {
+                        let parts = (
+                            joint.name.clone(),
+                            frame(&joint.parent_from_joint),
+                            frame(&joint.limb_from_joint),
+                            joint.semi_axes,
+                            joint.weight,
+                        );
+                        (limbs[*parent].name.clone(), parts)
+                    })
+                    .unzip();
+                (limb.name.clone(), parent, PyShape(limb.shape), joint, limb.match_caps)
+            })
+            .collect();
+        let sites = self
+            .0
+            .sites()
+            .iter()
+            .map(|site| (site.name.clone(), limbs[site.limb].name.clone(), site.position.to_array()))
+            .collect();
+        (self.0.name().to_owned(), limb_parts, sites)
+    }
+}

@@ -1,0 +1,52 @@
+//! The table of configuration entries, and a core configuration from plain values.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use voodoo_core::Config;
+use voodoo_core::config::{RawValue, Value};
+
+use crate::errors::{IntoPy, exception};
+
+/// One row an entry: name, documentation, unit, default, (least, greatest) or None, words to choose from.
+type Row<'py> = (&'static str, String, &'static str, Bound<'py, PyAny>, Option<(f64, f64)>, Vec<&'static str>);
+
+#[pyfunction]
+pub fn config_fields(py: Python<'_>) -> PyResult<Vec<Row<'_>>> {
+    Config::default()
+        .fields()
+        .into_iter()
+        .map(|field| {
+            let default = match field.default {
+                Value::Real(number) => number.into_pyobject(py)?.into_any(),
+                Value::Whole(number) => number.into_pyobject(py)?.into_any(),
+                Value::Switch(switch) => switch.into_pyobject(py)?.to_owned().into_any(),
+                Value::Word(word) => word.into_pyobject(py)?.into_any(),
+            };
+            Ok((field.name, field.doc, field.unit, default, field.range, field.words.to_vec()))
+        })
+        .collect()
+}
+
+/// A configuration from the values of a dictionary.
+pub fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
+    let py = values.py();
+    let mut config = Config::default();
+    for (key, value) in values.iter() {
+        let key: String = key.extract()?;
+        let raw = if let Ok(switch) = value.extract::<bool>() {
+            RawValue::Switch(switch)
+        } else if let Ok(number) = value.extract::<f64>() {
+            RawValue::Number(number)
+        } else if let Ok(word) = value.extract::<String>() {
+            RawValue::Word(word)
+        } else {
+            return Err(exception(
+                py,
+                "ConfigError",
+                format!("{key}: expected a number, a switch or a word, found {value}"),
+            ));
+        };
+        config.set(&key, &raw).map_err(|error| error.into_py(py))?;
+    }
+    Ok(config)
+}

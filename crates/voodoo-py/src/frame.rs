@@ -1,0 +1,308 @@
+//! `Frame`: holds references to the caller's arrays until the step reads them.
+
+use numpy::{
+    PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use voodoo_core::Body;
+use voodoo_core::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::geometry::{Pose, Vec3};
+
+use crate::arrays::{PointArray, PointView, contiguous, pose, vector};
+use crate::errors::{IntoPy, exception};
+
+struct CloudData {
+    points: PointArray,
+    world_from_sensor: Pose,
+    weight: f64,
+    limb: Option<String>,
+    on_body: bool,
+    source: u16,
+}
+
+enum DepthArray {
+    U16(Py<PyArray2<u16>>),
+    F32(Py<PyArray2<f32>>),
+}
+
+enum DepthView<'py> {
+    U16(PyReadonlyArray2<'py, u16>),
+    F32(PyReadonlyArray2<'py, f32>),
+}
+
+struct ImageData {
+    pixels: DepthArray,
+    size: [usize; 2],
+    metres_per_unit: f64,
+    intrinsics: [f64; 4],
+    rays: Option<Py<PyArray3<f32>>>,
+    world_from_sensor: Pose,
+    weight: f64,
+    source: u16,
+}
+
+struct SiteData {
+    site: String,
+    position: Vec3,
+    direction: Option<Vec3>,
+    weight: f64,
+    source: u16,
+}
+
+#[pyclass(name = "Frame", module = "voodoo")]
+pub struct PyFrame {
+    #[pyo3(get)]
+    pub stamp: f64,
+    clouds: Vec<CloudData>,
+    images: Vec<ImageData>,
+    sites: Vec<SiteData>,
+    ground: Option<Ground>,
+    pub sources: Vec<String>,
+}
+
+/// Everything a step borrows: the views keep the arrays alive and readable.
+pub struct Borrowed<'py> {
+    clouds: Vec<(PointView<'py>, Pose, f64, Scope, u16)>,
+    images: Vec<ImageView<'py>>,
+    pub positions: Vec<PositionRelation>,
+    pub rays: Vec<RayRelation>,
+    pub ground: Option<Ground>,
+}
+
+/// Pixels, rays, and the image with everything that is no array.
+type ImageView<'py> = (DepthView<'py>, Option<PyReadonlyArray3<'py, f32>>, DepthImage<'static>);
+
+impl Borrowed<'_> {
+    pub fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
+        self.clouds
+            .iter()
+            .map(|(view, world_from_sensor, weight, scope, source)| {
+                Ok(Cloud {
+                    points: view.slice()?,
+                    world_from_sensor: *world_from_sensor,
+                    weight: *weight,
+                    scope: *scope,
+                    source: *source,
+                })
+            })
+            .collect()
+    }
+
+    pub fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
+        self.images
+            .iter()
+            .map(|(pixels, rays, image)| {
+                let pixels = match pixels {
+                    DepthView::U16(view) => DepthPixels::U16(view.as_slice()?),
+                    DepthView::F32(view) => DepthPixels::F32(view.as_slice()?),
+                };
+                let rays = match rays {
+                    Some(view) => Some(view.as_slice()?.as_chunks().0),
+                    None => None,
+                };
+                Ok(DepthImage { pixels, rays, ..*image })
+            })
+            .collect()
+    }
+}
+
+impl PyFrame {
+    fn source(&mut self, name: &str) -> u16 {
+        let index = self.sources.iter().position(|known| known == name).unwrap_or_else(|| {
+            self.sources.push(name.to_owned());
+            self.sources.len() - 1
+        });
+        index as u16
+    }
+
+    /// Borrows the arrays and looks the names up in `body`.
+    pub fn borrow_for<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
+        let clouds = self
+            .clouds
+            .iter()
+            .map(|cloud| {
+                let scope = match &cloud.limb {
+                    Some(name) => Scope::Limb(body.limb_index(name).map_err(|error| error.into_py(py))?),
+                    None if cloud.on_body => Scope::Body,
+                    None => Scope::Free,
+                };
+                Ok((cloud.points.view(py), cloud.world_from_sensor, cloud.weight, scope, cloud.source))
+            })
+            .collect::<PyResult<_>>()?;
+        let images = self
+            .images
+            .iter()
+            .map(|image| {
+                let pixels = match &image.pixels {
+                    DepthArray::U16(array) => DepthView::U16(array.bind(py).readonly()),
+                    DepthArray::F32(array) => DepthView::F32(array.bind(py).readonly()),
+                };
+                let rays = image.rays.as_ref().map(|rays| rays.bind(py).readonly());
+                let [height, width] = image.size;
+                let plain = DepthImage {
+                    pixels: DepthPixels::U16(&[]),
+                    width,
+                    height,
+                    metres_per_unit: image.metres_per_unit,
+                    intrinsics: image.intrinsics,
+                    rays: None,
+                    world_from_sensor: image.world_from_sensor,
+                    weight: image.weight,
+                    source: image.source,
+                };
+                (pixels, rays, plain)
+            })
+            .collect();
+        let (mut positions, mut rays) = (Vec::new(), Vec::new());
+        for data in &self.sites {
+            let site = body.site_index(&data.site).map_err(|error| error.into_py(py))?;
+            match data.direction {
+                None => positions.push(PositionRelation {
+                    site,
+                    position: data.position,
+                    weight: data.weight,
+                    source: data.source,
+                }),
+                Some(direction) => rays.push(RayRelation {
+                    site,
+                    origin: data.position,
+                    direction,
+                    weight: data.weight,
+                    source: data.source,
+                }),
+            }
+        }
+        Ok(Borrowed { clouds, images, positions, rays, ground: self.ground })
+    }
+}
+
+#[pymethods]
+impl PyFrame {
+    #[new]
+    #[pyo3(signature = (stamp))]
+    fn new(stamp: f64) -> Self {
+        Self { stamp, clouds: Vec::new(), images: Vec::new(), sites: Vec::new(), ground: None, sources: Vec::new() }
+    }
+
+    #[pyo3(signature = (points, *, world_from_sensor=None, weight=1.0, limb=None, on_body=false, source="points"))]
+    fn add_points(
+        &mut self,
+        points: &Bound<'_, PyAny>,
+        world_from_sensor: Option<&Bound<'_, PyAny>>,
+        weight: f64,
+        limb: Option<String>,
+        on_body: bool,
+        source: &str,
+    ) -> PyResult<()> {
+        let data = CloudData {
+            points: PointArray::new("points", points)?,
+            world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
+            weight,
+            limb,
+            on_body,
+            source: self.source(source),
+        };
+        self.clouds.push(data);
+        Ok(())
+    }
+
+    #[pyo3(signature = (image, *, camera, metres_per_unit=0.001, world_from_sensor=None, weight=1.0, source="depth"))]
+    fn add_depth(
+        &mut self,
+        image: &Bound<'_, PyAny>,
+        camera: &Bound<'_, PyAny>,
+        metres_per_unit: f64,
+        world_from_sensor: Option<&Bound<'_, PyAny>>,
+        weight: f64,
+        source: &str,
+    ) -> PyResult<()> {
+        let number = |name: &str| camera.getattr(name)?.extract::<f64>();
+        let intrinsics = [number("fx")?, number("fy")?, number("cx")?, number("cy")?];
+        let rays = match camera.getattr("distorted")?.extract::<bool>()? {
+            true => Some(camera.call_method0("rays")?.cast::<PyArray3<f32>>()?.clone()),
+            false => None,
+        };
+        let py = image.py();
+        let wrong = || {
+            let found = match image.cast::<PyUntypedArray>() {
+                Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
+                Err(_) => image.get_type().to_string(),
+            };
+            exception(
+                py,
+                "MeasurementError",
+                format!("image: expected an array of shape (height, width) and dtype uint16 or float32, found {found}"),
+            )
+        };
+        let array = contiguous(image).map_err(|_| wrong())?;
+        let (pixels, size) = if let Ok(array) = array.cast::<PyArray2<u16>>() {
+            (DepthArray::U16(array.clone().unbind()), array.dims())
+        } else if let Ok(array) = array.cast::<PyArray2<f32>>() {
+            (DepthArray::F32(array.clone().unbind()), array.dims())
+        } else {
+            return Err(wrong());
+        };
+        let data = ImageData {
+            pixels,
+            size: [size[0], size[1]],
+            metres_per_unit,
+            intrinsics,
+            rays: rays.map(Bound::unbind),
+            world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
+            weight,
+            source: self.source(source),
+        };
+        self.images.push(data);
+        Ok(())
+    }
+
+    #[pyo3(signature = (site, position, *, weight=1.0, source="positions"))]
+    fn add_position(&mut self, site: String, position: &Bound<'_, PyAny>, weight: f64, source: &str) -> PyResult<()> {
+        let data = SiteData {
+            site,
+            position: vector("position", position)?,
+            direction: None,
+            weight,
+            source: self.source(source),
+        };
+        self.sites.push(data);
+        Ok(())
+    }
+
+    #[pyo3(signature = (site, *, origin, direction, weight=1.0, source="rays"))]
+    fn add_ray(
+        &mut self,
+        site: String,
+        origin: &Bound<'_, PyAny>,
+        direction: &Bound<'_, PyAny>,
+        weight: f64,
+        source: &str,
+    ) -> PyResult<()> {
+        let data = SiteData {
+            site,
+            position: vector("origin", origin)?,
+            direction: Some(vector("direction", direction)?),
+            weight,
+            source: self.source(source),
+        };
+        self.sites.push(data);
+        Ok(())
+    }
+
+    #[pyo3(signature = (*, normal, offset=0.0))]
+    fn set_ground(&mut self, normal: &Bound<'_, PyAny>, offset: f64) -> PyResult<()> {
+        self.ground = Some(Ground { normal: vector("normal", normal)?, offset });
+        Ok(())
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Frame(stamp={}, clouds={}, depth_images={}, sites={}, sources={:?})",
+            self.stamp,
+            self.clouds.len(),
+            self.images.len(),
+            self.sites.len(),
+            self.sources
+        )
+    }
+}

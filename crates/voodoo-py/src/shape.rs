@@ -1,0 +1,139 @@
+//! `TaperedEllipticCylinder`.
+
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::prelude::*;
+use voodoo_core::geometry::{Points, Pose};
+use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};
+
+use crate::arrays::{PointArray, vector};
+use crate::errors::IntoPy;
+
+#[pyclass(name = "TaperedEllipticCylinder", module = "voodoo", frozen, eq, from_py_object)]
+#[derive(Clone, PartialEq)]
+pub struct PyShape(pub TaperedEllipticCylinder);
+
+#[pyclass(name = "ClosestPoints", module = "voodoo", frozen, get_all)]
+pub struct PyClosestPoints {
+    points: Py<PyAny>,
+    normals: Py<PyAny>,
+    signed_distance: Py<PyAny>,
+    region: Py<PyAny>,
+}
+
+#[pymethods]
+impl PyShape {
+    #[new]
+    #[pyo3(signature = (length, a0, b0, a1, b1))]
+    fn new(py: Python<'_>, length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> PyResult<Self> {
+        TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(|error| error.into_py(py))
+    }
+
+    #[getter]
+    fn length(&self) -> f64 {
+        self.0.length()
+    }
+
+    #[getter]
+    fn a0(&self) -> f64 {
+        self.0.a0()
+    }
+
+    #[getter]
+    fn b0(&self) -> f64 {
+        self.0.b0()
+    }
+
+    #[getter]
+    fn a1(&self) -> f64 {
+        self.0.a1()
+    }
+
+    #[getter]
+    fn b1(&self) -> f64 {
+        self.0.b1()
+    }
+
+    /// Exact, one point, double precision.
+    fn closest_point<'py>(
+        &self,
+        py: Python<'py>,
+        point: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
+        let query = vector("point", point)?;
+        if !query.is_finite() {
+            return Err(crate::errors::wrong_argument(py, "point", "finite metres", point));
+        }
+        let found = self.0.closest_point(query);
+        let array = |v: [f64; 3]| PyArray1::from_slice(py, &v);
+        Ok((array(found.point.to_array()), array(found.normal.to_array()), found.signed_distance))
+    }
+
+    /// The batch kernel of the tracker.
+    fn closest_points(&self, py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<PyClosestPoints> {
+        let array = PointArray::new("points", points)?;
+        let view = array.view(py);
+        let slice = view.slice()?;
+        let (batch, bad) = py.detach(|| {
+            let mut queries = Points::default();
+            let mut bad = None;
+            for index in 0..slice.len() {
+                let point = slice.get(index);
+                if !point.is_finite() {
+                    bad = Some(index);
+                }
+                queries.push(point.to_array().map(|value| value as f32));
+            }
+            let mut batch = SurfaceBatch::default();
+            if bad.is_none() {
+                self.0.closest_points(&Pose::identity(), &queries, &mut batch);
+            }
+            (batch, bad)
+        });
+        if let Some(row) = bad {
+            let found = format!("points: expected finite metres, found {:?} in row {row}", slice.get(row));
+            return Err(crate::errors::exception(py, "MeasurementError", found));
+        }
+        let interleave = |points: &Points| -> PyResult<Py<PyAny>> {
+            let mut values = Vec::with_capacity(3 * points.len());
+            for ((x, y), z) in points.x.iter().zip(&points.y).zip(&points.z) {
+                values.extend([*x, *y, *z]);
+            }
+            Ok(PyArray1::from_vec(py, values).reshape([points.len(), 3])?.into_any().unbind())
+        };
+        Ok(PyClosestPoints {
+            points: interleave(&batch.points)?,
+            normals: interleave(&batch.normals)?,
+            signed_distance: PyArray1::from_vec(py, batch.signed_distance).into_any().unbind(),
+            region: PyArray1::from_vec(py, batch.region).into_any().unbind(),
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        let s = &self.0;
+        format!(
+            "TaperedEllipticCylinder(length={}, a0={}, b0={}, a1={}, b1={})",
+            s.length(),
+            s.a0(),
+            s.b0(),
+            s.a1(),
+            s.b1()
+        )
+    }
+
+    /// Names of the values of `ClosestPoints.region`.
+    #[classattr]
+    #[pyo3(name = "REGIONS")]
+    fn regions() -> [&'static str; 5] {
+        let mut names = [""; 5];
+        for (region, name) in [
+            (Region::Side, "side"),
+            (Region::ProximalCap, "proximal_cap"),
+            (Region::DistalCap, "distal_cap"),
+            (Region::ProximalRim, "proximal_rim"),
+            (Region::DistalRim, "distal_rim"),
+        ] {
+            names[region as usize] = name;
+        }
+        names
+    }
+}

@@ -1,0 +1,149 @@
+//! `Tracker`.
+
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use voodoo_core::geometry::{Pose, Vec3};
+use voodoo_core::{Frame, Tracker};
+
+use crate::arrays::{PointArray, pose, vector};
+use crate::body::{JointParts, PyBody, joint};
+use crate::config::config;
+use crate::errors::IntoPy;
+use crate::estimate::{Names, PyEstimate};
+use crate::frame::PyFrame;
+use crate::shape::PyShape;
+
+#[pyclass(name = "Tracker", module = "voodoo._core", subclass)]
+pub struct PyTracker {
+    tracker: Tracker,
+    names: Arc<Names>,
+    sources: Vec<String>,
+}
+
+impl PyTracker {
+    fn snapshot(&self) -> PyEstimate {
+        PyEstimate {
+            estimate: self.tracker.estimate().clone(),
+            names: self.names.clone(),
+            sources: self.sources.clone(),
+        }
+    }
+
+    fn body_changed(&mut self) {
+        self.names = Arc::new(Names::of(self.tracker.body()));
+    }
+}
+
+#[pymethods]
+impl PyTracker {
+    #[new]
+    fn new(body: &PyBody, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
+        let names = Arc::new(Names::of(tracker.body()));
+        Ok(Self { tracker, names, sources: Vec::new() })
+    }
+
+    fn _body(&self) -> PyBody {
+        PyBody(self.tracker.body().clone())
+    }
+
+    #[getter]
+    fn estimate(&self) -> PyEstimate {
+        self.snapshot()
+    }
+
+    #[pyo3(signature = (joints, *, fit_sizes=true))]
+    fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
+        let py = joints.py();
+        let positions = joints
+            .iter()
+            .map(|(name, position)| {
+                let name: String = name.extract()?;
+                let site = self.tracker.body().site_index(&name).map_err(|error| error.into_py(py))?;
+                Ok((site, vector(&format!("joints[{name}]"), &position)?))
+            })
+            .collect::<PyResult<Vec<(usize, Vec3)>>>()?;
+        self.tracker.reset(&positions, fit_sizes).map_err(|error| error.into_py(py))?;
+        self.body_changed();
+        self.sources.clear();
+        Ok(self.snapshot())
+    }
+
+    fn _reset_pose(&mut self, py: Python<'_>, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
+        let poses = world_from_limb
+            .iter()
+            .map(|value| pose("world_from_limb", Some(value)))
+            .collect::<PyResult<Vec<Pose>>>()?;
+        self.tracker.reset_pose(&poses).map_err(|error| error.into_py(py))?;
+        self.sources.clear();
+        Ok(self.snapshot())
+    }
+
+    /// One frame; releases the GIL.
+    fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
+        let borrowed = frame.borrow_for(py, self.tracker.body())?;
+        let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
+        let input = Frame {
+            stamp: frame.stamp,
+            clouds: &clouds,
+            images: &images,
+            positions: &borrowed.positions,
+            rays: &borrowed.rays,
+            ground: borrowed.ground,
+        };
+        let tracker = &mut self.tracker;
+        py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
+        self.sources.clone_from(&frame.sources);
+        Ok(self.snapshot())
+    }
+
+    /// Signed distance of world points `(N, 3)` to the posed body, metres, negative inside.
+    fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let array = PointArray::new("points", points)?;
+        let view = array.view(py);
+        let slice = view.slice()?;
+        let distances = py.detach(|| self.tracker.distance(slice)).map_err(|error| error.into_py(py))?;
+        Ok(PyArray1::from_vec(py, distances))
+    }
+
+    fn scale(&mut self, py: Python<'_>, factor: f64) -> PyResult<()> {
+        self.tracker.scale(factor).map_err(|error| error.into_py(py))
+    }
+
+    fn set_shape(&mut self, py: Python<'_>, limb: &str, shape: &PyShape) -> PyResult<()> {
+        self.tracker.set_shape(limb, shape.0).map_err(|error| error.into_py(py))
+    }
+
+    fn _add_limb(
+        &mut self,
+        py: Python<'_>,
+        name: &str,
+        parent: &str,
+        shape: &PyShape,
+        parts: JointParts,
+        sites: Vec<(String, [f64; 3])>,
+    ) -> PyResult<()> {
+        let sites = sites.into_iter().map(|(name, position)| (name, Vec3::from_array(position))).collect();
+        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(|error| error.into_py(py))?;
+        self.body_changed();
+        Ok(())
+    }
+
+    fn remove_limb(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.tracker.remove_limb(name).map_err(|error| error.into_py(py))?;
+        self.body_changed();
+        Ok(())
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Tracker(body={:?}, limbs={}, last={})",
+            self.tracker.body().name(),
+            self.names.limbs.len(),
+            self.snapshot().__repr__()
+        )
+    }
+}
