@@ -1,0 +1,203 @@
+"""The camera model: pixels from points and rays from pixels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, get_args
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import CameraError
+
+CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant"]
+"""Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
+(and optionally thin prism and tilt, in OpenCV's order), and Kannala-Brandt (k1 k2 k3 k4 on the angle)."""
+
+_COEFFICIENTS: dict[str, tuple[int, ...]] = {
+    "plumb_bob": (0, 4, 5),
+    "rational_polynomial": (0, 8, 12, 14),
+    "equidistant": (0, 4),
+}
+_ALIASES = {"": "plumb_bob", "none": "plumb_bob", "fisheye": "equidistant", "kannala_brandt4": "equidistant"}
+_ROUND_TRIP_PX = 0.1
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A calibrated camera in its optical frame: x right, y down, z forward.
+
+    Integer pixel coordinates are pixel centres; (0, 0) is the centre of the top-left pixel. Without distortion
+    u = fx x/z + cx and v = fy y/z + cy.
+
+    Args:
+        width, height: image size [px].
+        fx, fy: focal lengths [px].
+        cx, cy: principal point [px].
+        distortion: coefficients in OpenCV's order; () means none.
+        model: how `distortion` is meant, see CameraModel.
+
+    Raises:
+        CameraError: a number is out of range or the count of coefficients does not fit the model.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, ...] = ()
+    model: CameraModel = "plumb_bob"
+
+    def __post_init__(self) -> None:
+        """Check every field and store plain ints and floats, so that equal cameras compare equal."""
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise CameraError(f"camera {name}: expected a whole number of pixels >= 1, found {value!r}")
+            object.__setattr__(self, name, int(value))
+        for name in ("fx", "fy", "cx", "cy"):
+            value = _number(f"camera {name}", getattr(self, name))
+            if name in ("fx", "fy") and value <= 0.0:
+                raise CameraError(f"camera {name}: expected a focal length > 0 px, found {value!r}")
+            object.__setattr__(self, name, value)
+        if self.model not in get_args(CameraModel):
+            raise CameraError(f"camera model: expected one of {', '.join(get_args(CameraModel))}, found {self.model!r}")
+        coefficients = tuple(_number("camera distortion", value) for value in self.distortion)
+        if len(coefficients) not in _COEFFICIENTS[self.model]:
+            counts = " or ".join(map(str, _COEFFICIENTS[self.model]))
+            raise CameraError(
+                f"camera distortion: {self.model} takes {counts} coefficients, found {len(coefficients)}: {coefficients}"
+            )
+        # For both polynomial models zeros mean "no lens distortion"; for the equidistant one they mean a pure
+        # equidistant lens, which is not a pinhole, so they have to stay.
+        if self.model != "equidistant" and not any(coefficients):
+            coefficients = ()
+        object.__setattr__(self, "distortion", coefficients)
+
+    @classmethod
+    def from_camera_info(
+        cls,
+        *,
+        width: int,
+        height: int,
+        k: Sequence[float] | npt.NDArray[np.float64],
+        d: Sequence[float] | npt.NDArray[np.float64] = (),
+        model: str = "plumb_bob",
+        p: Sequence[float] | npt.NDArray[np.float64] | None = None,
+        rectified: bool = False,
+    ) -> Camera:
+        """Build a camera from the fields of a sensor_msgs/CameraInfo message.
+
+        Args:
+            width, height: image size [px].
+            k: 3x3 intrinsics, row by row (9 numbers).
+            d: distortion coefficients.
+            model: `distortion_model`; "" and "none" mean no distortion, "fisheye" means equidistant.
+            p: 3x4 projection matrix, row by row (12 numbers), of the rectified image.
+            rectified: the image is a rectified one: use `p` (when it is set) and no distortion.
+
+        Raises:
+            CameraError: wrong counts, an uncalibrated camera (fx = 0), or an unknown model.
+        """
+        k = [float(value) for value in k]
+        if len(k) != 9:
+            raise CameraError(f"camera k: expected 9 numbers, found {len(k)}")
+        if rectified and p is not None:
+            projection = [float(value) for value in p]
+            if len(projection) != 12:
+                raise CameraError(f"camera p: expected 12 numbers, found {len(projection)}")
+            if projection[0] > 0.0:  # an all-zero P means "not filled in"
+                return cls(width, height, projection[0], projection[5], projection[2], projection[6])
+        name = _ALIASES.get(model, model)
+        coefficients = () if model in ("", "none") and not any(d) else tuple(float(value) for value in d)
+        return cls(width, height, k[0], k[4], k[2], k[5], coefficients, name)  # type: ignore[arg-type]
+
+    @property
+    def matrix(self) -> npt.NDArray[np.float64]:
+        """The 3x3 intrinsic matrix."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    def project(self, points_cam: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Pixels of points.
+
+        Args:
+            points_cam: (N, 3) [m] in the optical frame.
+
+        Returns:
+            (N, 2) pixel coordinates (u, v), not clipped to the image; NaN for points at or behind z = 0.
+
+        Raises:
+            CameraError: the shape is not (N, 3).
+        """
+        points = np.asarray(points_cam, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise CameraError(f"points: expected shape (N, 3), found {points.shape}")
+        pixels = np.full((len(points), 2), np.nan)
+        front = np.isfinite(points).all(axis=1) & (points[:, 2] > 0.0)
+        if front.any():
+            pixels[front] = self._distorted(points[front, :2] / points[front, 2:])
+        return pixels
+
+    def rays(self) -> npt.NDArray[np.float32]:
+        """Normalized image coordinates x/z, y/z of every pixel centre, lens distortion removed.
+
+        Returns:
+            (height, width, 2) float32, read-only and cached; depth (along z) times (x, y, 1) is the point. NaN where
+            the lens model cannot be inverted (it does not come back to the pixel within 0.1 px), as happens in the
+            corners of strongly distorted images.
+        """
+        return _rays(self)
+
+    def _distorted(self, xy: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Pixels (N, 2) of normalized coordinates (N, 2)."""
+        if self.model != "equidistant" and not self.distortion:
+            return xy * (self.fx, self.fy) + (self.cx, self.cy)
+        points = np.column_stack([xy, np.ones(len(xy))])[:, None, :]
+        zero = np.zeros(3)
+        if self.model == "equidistant":
+            pixels, _ = cv2.fisheye.projectPoints(points, zero, zero, self.matrix, self._coefficients())
+        else:
+            pixels, _ = cv2.projectPoints(points, zero, zero, self.matrix, self._coefficients())
+        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+
+    def _coefficients(self) -> npt.NDArray[np.float64]:
+        return np.array(self.distortion or (0.0,) * 4)
+
+
+@lru_cache(maxsize=16)
+def _rays(camera: Camera) -> npt.NDArray[np.float32]:
+    u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
+    pixels = np.stack([u, v], axis=-1).reshape(-1, 2)
+    if camera.model != "equidistant" and not camera.distortion:
+        xy = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    else:
+        # The default of five fixed-point iterations leaves whole pixels of error on wide lenses.
+        until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
+        source = pixels[:, None, :]
+        if camera.model == "equidistant":
+            found = cv2.fisheye.undistortPoints(source, camera.matrix, camera._coefficients(), criteria=until)
+        else:
+            found = cv2.undistortPoints(source, camera.matrix, camera._coefficients(), criteria=until)
+        xy = np.array(found, dtype=np.float64).reshape(-1, 2)
+        with np.errstate(all="ignore"):
+            error = np.abs(camera._distorted(xy) - pixels).max(axis=1)
+        xy[~(error < _ROUND_TRIP_PX)] = np.nan
+    rays = xy.reshape(camera.height, camera.width, 2).astype(np.float32)
+    rays.setflags(write=False)
+    return rays
+
+
+def _number(name: str, value: object) -> float:
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise CameraError(f"{name}: expected a number, found {value!r}") from None
+    if not math.isfinite(number):
+        raise CameraError(f"{name}: expected a finite number, found {number!r}")
+    return number

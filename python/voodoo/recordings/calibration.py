@@ -1,0 +1,117 @@
+"""calibration.toml: the camera of a folder of images."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from voodoo.camera import Camera
+from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.recordings.measurements import FloatArray
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
+_OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """One camera: model, frame name and pose (4, 4) in the root frame."""
+
+    camera: Camera
+    sensor_frame: str
+    root_from_sensor: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FolderCalibration:
+    """Cameras of a folder; `depth_factor` is units per metre of the depth images."""
+
+    root_frame: str
+    depth_factor: float
+    depth: Calibration
+    color: Calibration | None
+
+
+def read_calibration(path: Path) -> FolderCalibration:
+    """Read a calibration.toml; its form is described at FolderRecording.
+
+    Raises:
+        RecordingError: missing, not TOML, or a key is missing, unknown or out of range.
+    """
+    if not path.is_file():
+        raise RecordingError(f"{path}: expected a calibration file beside the images, found none")
+    with reading(path, "a TOML file"):
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    tables = {"depth", "color"}
+    _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))
+    depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))
+    factor = content.get("depth_factor", 5000.0)
+    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0.0 < factor < 1e9:
+        raise RecordingError(f"{path}: depth_factor: expected units per metre > 0, found {factor!r}")
+    color = None
+    if "color" in content:
+        table = content["color"]
+        if not isinstance(table, dict):
+            raise RecordingError(f"{path}: color: expected a table, found {table!r}")
+        _check_keys(table, {*_CAMERA_KEYS, *_OPTIONAL_KEYS}, f"{path}, [color]")
+        color = _camera(table, "color", f"{path}, [color]")
+    root_frame = content.get("root_frame", depth.sensor_frame)
+    if not isinstance(root_frame, str):
+        raise RecordingError(f"{path}: root_frame: expected a name, found {root_frame!r}")
+    return FolderCalibration(root_frame, float(factor), depth, color)
+
+
+def _check_keys(table: dict[str, Any], known: set[str], where: str) -> None:
+    unknown = sorted(set(table) - known)
+    missing = [key for key in _CAMERA_KEYS if key not in table]
+    if unknown or missing:
+        raise RecordingError(
+            f"{where}: expected the keys {', '.join(_CAMERA_KEYS)} and optionally "
+            f"{', '.join(sorted(known - set(_CAMERA_KEYS)))}; found missing {missing}, unknown {unknown}"
+        )
+
+
+def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
+    distortion = table.get("distortion", [])
+    if not isinstance(distortion, list):
+        raise RecordingError(f"{where}: distortion: expected a list of numbers, found {distortion!r}")
+    try:
+        camera = Camera(
+            **{key: table[key] for key in _CAMERA_KEYS},
+            distortion=tuple(distortion),
+            model=table.get("model", "plumb_bob"),
+        )
+    except CameraError as error:
+        raise RecordingError(f"{where}: {error}") from error
+    frame = table.get("sensor_frame", f"camera_{kind}_optical_frame")
+    if not isinstance(frame, str):
+        raise RecordingError(f"{where}: sensor_frame: expected a name, found {frame!r}")
+    return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where))
+
+
+def _pose(rows: Any, where: str) -> FloatArray:
+    if rows is None:
+        return np.eye(4)
+    try:
+        pose = np.array(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        pose = np.empty(0)
+    rigid = (
+        pose.shape == (4, 4)
+        and np.isfinite(pose).all()
+        and np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-3)
+        and np.linalg.det(pose[:3, :3]) > 0.0
+        and np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0))
+    )
+    if not rigid:
+        raise RecordingError(f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {rows!r}")
+    return pose

@@ -1,0 +1,167 @@
+"""Folders of 16-bit depth PNGs in the layout of the TUM RGB-D benchmark."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from voodoo.errors import RecordingError, reading
+from voodoo.recordings.calibration import Calibration, read_calibration
+from voodoo.recordings.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
+from voodoo.recordings.pictures import decode_color, decode_depth_png
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate
+
+_PICTURES = (".png", ".jpg", ".jpeg")
+
+
+class FolderRecording(Recording):
+    """A folder of images::
+
+        depth/1305031102.160407.png   16-bit PNGs named by their stamp in seconds
+        depth.txt                     optional: lines "stamp depth/name.png", # starts a comment; then names are free
+        rgb/, rgb.txt                 optional: the same for colour (PNG or JPEG)
+        calibration.toml              the camera
+
+    There is one frame for each depth image, holding the colour images since the previous one. A groundtruth.txt (the
+    camera's path, in that benchmark) is not used. calibration.toml::
+
+        width = 640
+        height = 480
+        fx = 525.0                     # pixels; integer pixel coordinates are pixel centres
+        fy = 525.0
+        cx = 319.5
+        cy = 239.5
+        # all that follows is optional
+        distortion = []                # OpenCV order
+        model = "plumb_bob"            # or rational_polynomial, equidistant
+        depth_factor = 5000.0          # units per metre
+        sensor_frame = "camera_depth_optical_frame"
+        root_frame = "base_link"       # default: sensor_frame
+        root_from_sensor = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]]   # default: identity
+        [color]                        # needed for rgb/ to be read; same keys but depth_factor and root_frame
+        width = 640
+        ...
+
+    Args:
+        path: the folder.
+        calibration: another calibration file.
+
+    Raises:
+        RecordingError: no images, no calibration, names that are no stamps, or stamps that do not rise.
+    """
+
+    def __init__(self, path: Path, *, calibration: str | Path | None = None) -> None:
+        if not path.is_dir():
+            raise RecordingError(f"{path}: expected a folder with depth/ and calibration.toml, found no folder")
+        self.path = path
+        self.name = path.resolve().name
+        self._calibration = read_calibration(path / "calibration.toml" if calibration is None else Path(calibration))
+        self.root_frame = self._calibration.root_frame
+        self.start, self.reference = None, None
+        self._depth = _listing(path, "depth", (".png",))
+        self._color: list[tuple[float, Path]] = []
+        self._unused: tuple[tuple[str, str], ...] = ()
+        if not self._depth:
+            raise RecordingError(f"{path}: expected depth images in depth/ or listed in depth.txt, found none")
+        if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
+            if self._calibration.color is None:
+                self._unused = (("rgb", "no [color] table in the calibration file"),)
+            else:
+                self._color = _listing(path, "rgb", _PICTURES)
+
+    def __len__(self) -> int:
+        """Number of depth images."""
+        return len(self._depth)
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Read the images; see Recording."""
+        depth, color = self._calibration.depth, self._calibration.color
+        colors = iter(self._color)
+        upcoming = next(colors, None)
+        for stamp, file in self._depth:
+            measurements: list[Measurement] = []
+            while color is not None and upcoming is not None and upcoming[0] <= stamp:
+                measurements.append(_color_image(*upcoming, color))
+                upcoming = next(colors, None)
+            image = decode_depth_png(_read(file), file)
+            size = (image.shape[1], image.shape[0])
+            if size != (depth.camera.width, depth.camera.height):
+                raise RecordingError(
+                    f"{file}: expected {depth.camera.width}x{depth.camera.height} px as calibrated, "
+                    f"found {size[0]}x{size[1]}"
+                )
+            scale = 1.0 / self._calibration.depth_factor
+            measurements.append(DepthImage("depth", stamp, image, scale, depth.camera, depth.root_from_sensor))
+            yield RecordedFrame(stamp, tuple(measurements))
+
+    def info(self) -> RecordingInfo:
+        """Summarize from names and calibration."""
+        sensors = [_sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)]
+        if self._color and self._calibration.color is not None:
+            sensors.append(_sensor("color", "pictures", self._color, self._calibration.color))
+        first, last = self._depth[0][0], self._depth[-1][0]
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader="folder",
+            frames=len(self),
+            start_stamp=first,
+            duration=last - first,
+            rate_hz=mean_rate(len(self), last - first),
+            root_frame=self.root_frame,
+            sensors=tuple(sensors),
+            unused=self._unused,
+        )
+
+
+def _listing(path: Path, name: str, suffixes: tuple[str, ...]) -> list[tuple[float, Path]]:
+    """(stamp, file) of NAME.txt, else of the files in NAME/."""
+    table = path / f"{name}.txt"
+    entries: list[tuple[float, Path]] = []
+    if table.is_file():
+        with reading(table, "a list of images"):
+            lines = table.read_text(encoding="utf-8").splitlines()
+        for number, line in enumerate(lines, start=1):
+            words = line.split("#", 1)[0].split()
+            if not words:
+                continue
+            if len(words) != 2:
+                raise RecordingError(f"{table}, line {number}: expected 'stamp file', found {line!r}")
+            entries.append((_stamp(words[0], f"{table}, line {number}"), path / words[1]))
+    elif (path / name).is_dir():
+        files = [file for file in (path / name).iterdir() if file.suffix.lower() in suffixes]
+        entries = sorted((_stamp(file.stem, str(file)), file) for file in files)
+    for (before, _), (after, file) in zip(entries, entries[1:], strict=False):
+        if after <= before:
+            raise RecordingError(f"{file}: expected a stamp after {before:.6f}, found {after:.6f}")
+    return entries
+
+
+def _stamp(text: str, where: str) -> float:
+    try:
+        stamp = float(text)
+    except ValueError:
+        stamp = math.nan
+    if not math.isfinite(stamp):
+        raise RecordingError(f"{where}: expected a stamp in seconds, found {text!r}")
+    return stamp
+
+
+def _read(file: Path) -> bytes:
+    with reading(file, "a readable picture"):
+        return file.read_bytes()
+
+
+def _color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
+    size = (color.camera.width, color.camera.height)
+    load = partial(lambda f, s: decode_color(_read(f), f, s), file, size)
+    return ColorImage("rgb", stamp, load, color.camera, color.root_from_sensor)
+
+
+def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: Calibration) -> SensorInfo:
+    rate = mean_rate(len(entries), entries[-1][0] - entries[0][0])
+    detail = f"{calibration.camera.width}x{calibration.camera.height} {words}"
+    name = "rgb" if kind == "color" else kind
+    return SensorInfo(name, kind, calibration.sensor_frame, len(entries), rate, detail)

@@ -1,0 +1,87 @@
+"""Finding the loader of a recording."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from voodoo.errors import RecordingError
+from voodoo.recordings.folder import FolderRecording
+from voodoo.recordings.recording import Recording
+from voodoo.recordings.ros import RosRecording
+from voodoo.recordings.ros_bag import find_bag, zip_members
+from voodoo.recordings.utd_mhad import UtdMhadRecording
+
+
+@dataclass(frozen=True)
+class Loader:
+    """How one kind of recording is opened, and what it looks like on disk."""
+
+    open: Callable[..., Recording]
+    expects: str
+
+
+LOADERS: dict[str, Loader] = {
+    "ros2": Loader(RosRecording, "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"),
+    "ros1": Loader(RosRecording, "a ROS 1 .bag, or a .zip of it"),
+    "utd-mhad": Loader(UtdMhadRecording, "a *_depth.mat of UTD-MHAD"),
+    "folder": Loader(FolderRecording, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
+}
+
+
+def open_recording(path: str | Path, *, loader: str | None = None, **options: Any) -> Recording:  # noqa: ANN401
+    """Open a recording.
+
+    Args:
+        path: file or folder.
+        loader: name in LOADERS; guessed from the path when None.
+        **options: of the loader, e.g. `use=("depth", "scan")`, `root_frame="odom"` for bags; see RosRecording,
+            UtdMhadRecording and FolderRecording.
+
+    Raises:
+        RecordingError: nothing there, no loader for it, an unknown loader or option, or damage.
+    """
+    path = Path(path).expanduser()
+    if loader is not None and loader not in LOADERS:
+        raise RecordingError(f"loader {loader!r}: expected one of {', '.join(LOADERS)}")
+    if not path.exists():
+        raise RecordingError(f"{path}: expected a recording, found no such file or folder")
+    name = guess_loader(path) if loader is None else loader
+    known = list(inspect.signature(LOADERS[name].open).parameters)[1:]
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise RecordingError(
+            f"loader {name!r} has no option {', '.join(unknown)}; its options: {', '.join(known) or 'none'}"
+        )
+    return LOADERS[name].open(path, **options)
+
+
+def guess_loader(path: Path) -> str:
+    """Name of the loader for what lies at `path`.
+
+    Raises:
+        RecordingError: nothing fits; the message lists the loaders.
+    """
+    if path.is_file():
+        if path.name.endswith("_depth.mat"):
+            return "utd-mhad"
+        names = zip_members(path) if path.suffix == ".zip" else [path.name]
+        if any(name.endswith(".bag") for name in names):
+            return "ros1"
+        if any(name.endswith((".mcap", ".db3")) for name in names):
+            return "ros2"
+    else:
+        if (path / "depth").is_dir() or (path / "depth.txt").is_file():
+            return "folder"
+        try:
+            return "ros1" if find_bag(path).suffix == ".bag" else "ros2"
+        except RecordingError as error:
+            raise RecordingError(f"{error}; {_listing()}") from error
+    raise RecordingError(f"{path}: found no loader for it; {_listing()}")
+
+
+def _listing() -> str:
+    return "loaders: " + "; ".join(f"{name}: {loader.expects}" for name, loader in LOADERS.items())

@@ -1,0 +1,91 @@
+"""Decoding of stored pictures that refuses damaged ones.
+
+OpenCV fills what it cannot read with grey or black and says nothing, so the container is checked first.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError
+
+_PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+
+
+def check_png(data: bytes, source: object) -> None:
+    """Check signature, chunk lengths and checksums of a PNG up to its end mark.
+
+    Raises:
+        RecordingError: naming the first thing that is wrong.
+    """
+    if data[:8] != _PNG_MAGIC:
+        raise RecordingError(f"{source}: expected a PNG, found bytes starting with {data[:8]!r}")
+    position = 8
+    while position + 12 <= len(data):
+        (length,) = struct.unpack_from(">I", data, position)
+        end = position + 8 + length
+        if end + 4 > len(data):
+            break
+        kind = data[position + 4 : position + 8]
+        if zlib.crc32(data[position + 4 : end]) != struct.unpack_from(">I", data, end)[0]:
+            raise RecordingError(f"{source}: expected a sound PNG, found a wrong checksum in its chunk {kind!r}")
+        if kind == b"IEND":
+            return
+        position = end + 4
+    raise RecordingError(f"{source}: expected a complete PNG, found it cut off after {len(data)} bytes")
+
+
+def decode_depth_png(data: bytes, source: object) -> npt.NDArray[np.uint16]:
+    """Decode a 16-bit single-channel PNG to (H, W) uint16.
+
+    Raises:
+        RecordingError: damaged, or not 16-bit grey.
+    """
+    check_png(data, source)
+    image = _decode(data, cv2.IMREAD_UNCHANGED, source)
+    if image.ndim != 2 or image.dtype != np.uint16:
+        raise RecordingError(
+            f"{source}: expected a 16-bit single-channel PNG, found shape {image.shape} of {image.dtype}"
+        )
+    return image
+
+
+def decode_color(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
+    """Decode a PNG or JPEG to (H, W, 3) BGR uint8.
+
+    Args:
+        data: the file's bytes.
+        source: what to name in errors.
+        size: expected (width, height).
+
+    Raises:
+        RecordingError: damaged, cut off, neither PNG nor JPEG, or of another size.
+    """
+    if data[:3] == b"\xff\xd8\xff":
+        if b"\xff\xd9" not in data[-1024:]:  # some cameras pad after the end mark
+            raise RecordingError(f"{source}: expected a complete JPEG, found no end mark in {len(data)} bytes")
+    elif data[:8] == _PNG_MAGIC:
+        check_png(data, source)
+    else:
+        raise RecordingError(f"{source}: expected a JPEG or PNG, found bytes starting with {data[:8]!r}")
+    image = _decode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, source)
+    if (image.shape[1], image.shape[0]) != size:
+        raise RecordingError(
+            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {image.shape[1]}x{image.shape[0]}"
+        )
+    return image.astype(np.uint8, copy=False)
+
+
+def _decode(data: bytes, flags: int, source: object) -> npt.NDArray[np.generic]:
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error as error:
+        raise RecordingError(f"{source}: expected a picture, found damage: {error}") from error
+    if image is None:
+        raise RecordingError(f"{source}: expected a picture, found {len(data)} bytes that do not decode")
+    return image

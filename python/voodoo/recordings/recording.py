@@ -1,0 +1,159 @@
+"""What every loader returns: a recording that can be iterated, and what is known about it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypedDict
+
+import numpy as np
+
+from voodoo.recordings.measurements import FloatArray, RecordedFrame
+
+
+class _Joints(TypedDict):
+    joints: dict[str, tuple[float, float, float]]
+
+
+class Start(_Joints, total=False):
+    """Where the body is in the first frame: `joints` [m] in the root frame and, if known, its stature `height_m`."""
+
+    height_m: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reference:
+    """Joint positions to compare an estimate with.
+
+    Args:
+        stamps: (F,) [s].
+        names: J site names.
+        positions: (F, J, 3) [m] in the recording's root frame; NaN = missing.
+        exact: True for rendered truth, False for another tracker's opinion.
+    """
+
+    stamps: FloatArray
+    names: tuple[str, ...]
+    positions: FloatArray
+    exact: bool
+
+    def __repr__(self) -> str:
+        """One line with the counts."""
+        return f"Reference({len(self.stamps)} stamps, {len(self.names)} joints, {'exact' if self.exact else 'estimated'})"
+
+
+@dataclass(frozen=True)
+class SensorInfo:
+    """One source of measurements: topic or folder, kind ("depth", "points", "scan", "color"), frame id, number of
+    messages, mean rate [Hz] (NaN with less than two messages) and a word on the format."""
+
+    name: str
+    kind: str
+    frame: str
+    messages: int
+    rate_hz: float
+    detail: str
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """Summary of a recording; str() of it is meant for people.
+
+    Args:
+        name: short name.
+        path: what was opened.
+        loader: which loader reads it.
+        frames: number of RecordedFrames.
+        start_stamp: stamp of the first frame [s].
+        duration: from the first to the last frame [s].
+        rate_hz: mean frame rate, NaN with less than two frames.
+        root_frame: frame of all `root_from_sensor` and of the reference.
+        sensors: what is yielded; the first one makes the frames.
+        unused: (topic, reason) of what was recognised but is not yielded.
+        reference: words on the reference, or "none".
+        notes: what to mind about this kind of recording.
+    """
+
+    name: str
+    path: Path
+    loader: str
+    frames: int
+    start_stamp: float
+    duration: float
+    rate_hz: float
+    root_frame: str
+    sensors: tuple[SensorInfo, ...]
+    unused: tuple[tuple[str, str], ...] = ()
+    reference: str = "none"
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Several lines of text."""
+        rate = "" if np.isnan(self.rate_hz) else f" at {self.rate_hz:.2f} Hz"
+        lines = [
+            f"{self.name}  ({self.loader}, {self.path})",
+            f"  frames     {self.frames} in {self.duration:.3f} s{rate}, from {self.start_stamp:.6f} s",
+            f"  root frame {self.root_frame}",
+        ]
+        width = max((len(sensor.name) for sensor in self.sensors), default=0)
+        for sensor in self.sensors:
+            rate = "" if np.isnan(sensor.rate_hz) else f", {sensor.rate_hz:.2f} Hz"
+            count = f"{sensor.messages} x {sensor.detail}{rate}, frame {sensor.frame}"
+            lines.append(f"  {sensor.kind:<10} {sensor.name:<{width}}  {count}")
+        lines += [f"  unused     {topic}: {reason}" for topic, reason in self.unused]
+        lines.append(f"  reference  {self.reference}")
+        lines += [f"  note       {note}" for note in self.notes]
+        return "\n".join(lines)
+
+
+class Recording(ABC):
+    """Base of all recordings: sized, iterable as often as one likes, read while iterating.
+
+    Attributes:
+        path: what was opened.
+        name: short name for reports.
+        root_frame: frame all poses and the reference are in.
+        start: where the body is in the first frame, or None.
+        reference: joint positions to compare with, or None.
+    """
+
+    path: Path
+    name: str
+    root_frame: str
+    start: Start | None
+    reference: Reference | None
+
+    @abstractmethod
+    def __len__(self) -> int:
+        """Number of frames."""
+
+    @abstractmethod
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Read the frames in the order of their stamps.
+
+        Raises:
+            RecordingError: as soon as damage is met; frames before it have been yielded by then.
+        """
+
+    @abstractmethod
+    def info(self) -> RecordingInfo:
+        """Summarize without decoding the images."""
+
+    def __repr__(self) -> str:
+        """Class, name and length."""
+        return f"{type(self).__name__}({self.name!r}, {len(self)} frames, root frame {self.root_frame!r})"
+
+
+def reference_words(reference: Reference | None) -> str:
+    """The reference in words for RecordingInfo."""
+    if reference is None:
+        return "none"
+    kind = "exact" if reference.exact else "estimated by another tracker"
+    return f"{len(reference.names)} joints, {len(reference.stamps)} stamps, {kind}"
+
+
+def mean_rate(count: int, duration: float) -> float:
+    """Mean rate [Hz] of `count` stamps over `duration` seconds from first to last; NaN when undefined."""
+    return (count - 1) / duration if count > 1 and duration > 0.0 else float("nan")

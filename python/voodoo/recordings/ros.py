@@ -1,0 +1,215 @@
+"""ROS 1 and ROS 2 bags as recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from voodoo.errors import RecordingError, reading
+from voodoo.recordings.measurements import (
+    ColorImage,
+    DepthImage,
+    FloatArray,
+    LaserScan,
+    Measurement,
+    PointCloud,
+    RecordedFrame,
+)
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, reference_words
+from voodoo.recordings.ros_bag import Bag
+from voodoo.recordings.ros_messages import (
+    camera_of,
+    cloud_points,
+    color_image,
+    compressed_color_image,
+    compressed_depth_image,
+    depth_image,
+    frame_of,
+    scan_fields,
+    stamp_of,
+)
+from voodoo.recordings.ros_topics import COMPRESSED, KINDS, Kind, Source, TopicChoice, TopicFinder
+from voodoo.recordings.transforms import TransformTree
+from voodoo.recordings.truth import TRUTH_FRAME, find_beside, read_start, read_truth
+
+_TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+
+
+class RosRecording(Recording):
+    """A ROS bag: depth images, clouds, laser scans and colour images in one root frame.
+
+    There is one frame for each depth image (without depth: for each cloud, else each scan, else each colour image);
+    it also holds what was recorded since the previous one. What comes after the last one is not yielded. Stamps are
+    header stamps. Messages are read while iterating and colour is decoded on access. A bag that was cut off is refused
+    (`ros2 bag reindex` or `mcap recover` repair it), as is one whose index announces more messages than it holds.
+
+    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`.
+
+    Args:
+        path: see voodoo.recordings.ros_bag.Bag.
+        use: kinds of measurements to yield.
+        depth_topic, points_topic, scan_topic, color_topic: a topic or several, instead of the one found by type and
+            name. The first one of the first kind makes the frames.
+        camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
+        root_frame: by default base_link if the bag's transforms know it, else the frame of the first sensor.
+        metres_per_unit: of 16-bit depth images.
+        tf_max_age: how old a changing transform may be [s].
+
+    Raises:
+        RecordingError: the bag is damaged, or calibration, transforms or usable topics are missing.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        use: Sequence[Kind] = KINDS,
+        depth_topic: TopicChoice = None,
+        points_topic: TopicChoice = None,
+        scan_topic: TopicChoice = None,
+        color_topic: TopicChoice = None,
+        camera_info_topic: str | None = None,
+        root_frame: str | None = None,
+        metres_per_unit: float = 0.001,
+        tf_max_age: float = 0.5,
+    ) -> None:
+        use = (use,) if isinstance(use, str) else tuple(use)
+        if not use or not set(use) <= set(KINDS):
+            raise RecordingError(f"use: expected some of {', '.join(KINDS)}, found {use!r}")
+        if not metres_per_unit > 0.0 or not tf_max_age >= 0.0:
+            raise RecordingError(
+                f"expected metres_per_unit > 0 and tf_max_age >= 0, found {metres_per_unit!r} and {tf_max_age!r}"
+            )
+        self.path = path
+        self._metres_per_unit = metres_per_unit
+        self._bag = Bag(path)
+        choices: dict[Kind, TopicChoice] = {
+            "depth": depth_topic,
+            "points": points_topic,
+            "scan": scan_topic,
+            "color": color_topic,
+        }
+        finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
+        sources = finder.find(use)
+        self._unused = finder.unused
+        self._tree = TransformTree(path, max_age=tf_max_age)
+        self.root_frame = self._read_transforms(root_frame, sources)
+        self._driver = sources[0]
+        self._sources = {s.topic: s for s in sources if self._connected(s, optional=color_topic is None)}
+
+        place = path if path.suffix == ".zip" else self._bag.file
+        folder = place.parent if place.is_file() or place.name == "bag" else place
+        self.name = place.stem if place.is_file() and find_beside(place, "truth.csv") is None else folder.name
+        truth, start = find_beside(place, "truth.csv"), find_beside(place, "init.json")
+        self.reference = None if truth is None else read_truth(truth, self._root_from_truth)
+        self.start = None if start is None else read_start(start, self._root_from_truth(self._driver.first_stamp))
+
+    def __len__(self) -> int:
+        """Number of messages on the topic that makes the frames."""
+        return self._driver.messages
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Read the bag; see Recording."""
+        infos = {source.info_topic for source in self._sources.values() if source.info_topic is not None}
+        last: dict[str, float] = {}
+        pending: list[Measurement] = []
+        for topic, message in self._bag.read([*self._sources, *infos]):
+            if topic in infos:
+                self._check_calibration(topic, message)
+                continue
+            where = f"{self.path}, topic {topic}"
+            with reading(where, "a readable message"):
+                stamp = stamp_of(message, where)
+                if stamp < last.get(topic, stamp):
+                    raise RecordingError(f"{where}: expected rising stamps, found {stamp:.6f} after {last[topic]:.6f}")
+                last[topic] = stamp
+                pending.append(self._measurement(self._sources[topic], message, stamp, f"{where}, stamp {stamp:.6f}"))
+            if topic == self._driver.topic:
+                yield RecordedFrame(stamp, tuple(pending))
+                pending.clear()
+
+    def info(self) -> RecordingInfo:
+        """Summarize; reads the first and last message of every topic in use."""
+        ends = {s.topic: stamp_of(self._bag.last(s.topic), f"{self.path}, topic {s.topic}") for s in self._sources.values()}
+        sensors = tuple(
+            SensorInfo(s.topic, s.kind, s.frame, s.messages, mean_rate(s.messages, ends[s.topic] - s.first_stamp), s.detail)
+            for s in self._sources.values()
+        )
+        duration = ends[self._driver.topic] - self._driver.first_stamp
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader="ros2" if self._bag.is_ros2 else "ros1",
+            frames=len(self),
+            start_stamp=self._driver.first_stamp,
+            duration=duration,
+            rate_hz=mean_rate(len(self), duration),
+            root_frame=self.root_frame,
+            sensors=sensors,
+            unused=tuple(self._unused),
+            reference=reference_words(self.reference),
+        )
+
+    def _read_transforms(self, asked: str | None, sources: Sequence[Source]) -> str:
+        """Fill the tree and choose the root frame; the big topic tf is only read when tf_static does not suffice."""
+        names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
+        static = [name for name in names if name.endswith("tf_static")]
+        dynamic = [name for name in names if name not in static]
+        for topics, is_static in ((static, True), (dynamic, False)):
+            for _, message in self._bag.read(topics):
+                with reading(self.path, "a readable transform"):
+                    self._tree.add(message, static=is_static)
+            known = {*self._tree.frames, *(source.frame for source in sources)}
+            root = asked if asked is not None else TRUTH_FRAME
+            if root in known and all(self._reaches(root, source.frame) for source in sources):
+                return root
+        if asked is not None or TRUTH_FRAME in known:
+            return root
+        return sources[0].frame
+
+    def _reaches(self, root: str, frame: str) -> bool:
+        try:
+            self._tree.path(root, frame)
+        except RecordingError:
+            return False
+        return True
+
+    def _connected(self, source: Source, *, optional: bool) -> bool:
+        if optional and source.kind == "color" and source is not self._driver and not self._reaches(self.root_frame, source.frame):
+            self._unused.append((source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
+            return False
+        self._tree.path(self.root_frame, source.frame)
+        return True
+
+    def _root_from_truth(self, stamp: float) -> FloatArray:
+        return self._tree.lookup(self.root_frame, TRUTH_FRAME, stamp)
+
+    def _check_calibration(self, topic: str, message: Any) -> None:
+        for source in self._sources.values():
+            if source.info_topic == topic:
+                camera = camera_of(message, source.topic, f"{self.path}, topic {topic}")
+                if camera != source.camera:
+                    raise RecordingError(
+                        f"{self.path}, topic {topic}: expected one calibration, found {camera} after {source.camera}"
+                    )
+
+    def _measurement(self, source: Source, message: Any, stamp: float, where: str) -> Measurement:
+        root_from_sensor = self._tree.lookup(self.root_frame, frame_of(message), stamp)
+        camera, compressed = source.camera, source.type == COMPRESSED
+        if source.kind == "scan":
+            return LaserScan(source.topic, stamp, **scan_fields(message, where), root_from_sensor=root_from_sensor)
+        if source.kind == "points":
+            return PointCloud(source.topic, stamp, cloud_points(message, where), root_from_sensor)
+        if camera is None:
+            raise RecordingError(f"{where}: expected a calibrated camera, found none")
+        if source.kind == "depth":
+            image = (compressed_depth_image if compressed else depth_image)(message, camera, where)
+            scale = self._metres_per_unit if image.dtype.kind == "u" else 1.0
+            return DepthImage(source.topic, stamp, image, scale, camera, root_from_sensor)
+
+        def decode() -> Any:
+            with reading(where, "a readable picture"):
+                return (compressed_color_image if compressed else color_image)(message, camera, where)
+
+        return ColorImage(source.topic, stamp, decode, camera, root_from_sensor)

@@ -1,0 +1,212 @@
+"""Access to the messages of ROS 1 and ROS 2 bags through rosbags, with every failure made a RecordingError."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from voodoo.errors import RecordingError, reading
+
+_BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+_MCAP_MAGIC = b"\x89MCAP0\r\n"
+_MCAP_FOOTER = 0x02
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag: its message type as ROS 2 writes it and how many messages the bag's index announces."""
+
+    name: str
+    type: str
+    messages: int
+
+
+class Bag:
+    """A bag on disk; every read opens it afresh, so reads may overlap.
+
+    Args:
+        path: a .bag, .mcap or .db3 file, a ROS 2 bag directory, a directory holding one of these (also as `bag/`),
+            or a .zip holding one, which is unpacked into a temporary directory for the life of this object.
+
+    Raises:
+        RecordingError: no bag there, or its index is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+        folder = path
+        if path.suffix == ".zip":
+            self._temporary = tempfile.TemporaryDirectory(prefix="voodoo-")
+            folder = Path(self._temporary.name)
+            _unpack(path, folder)
+        self.file = find_bag(folder) if folder.is_dir() else folder
+        for part in [self.file] if self.file.is_file() else sorted(self.file.iterdir()):
+            if part.suffix == ".mcap":
+                check_mcap(part)
+        with self._open() as reader:
+            self.is_ros2: bool = reader.is2
+            self.topics = tuple(
+                Topic(name, str(item.msgtype), item.msgcount) for name, item in sorted(reader.topics.items())
+            )
+            self.start_time: int = reader.start_time
+            self.end_time: int = reader.end_time
+
+    def read(self, topics: Collection[str]) -> Iterator[tuple[str, Any]]:
+        """Messages of `topics` in the order they were recorded, as (topic, message).
+
+        Raises:
+            RecordingError: damage, or fewer messages than the bag's index announces.
+        """
+        counts = dict.fromkeys(topics, 0)
+        with self._open() as reader:
+            for topic, message in self._messages(reader, topics, None):
+                counts[topic] += 1
+                yield topic, message
+        announced = {topic.name: topic.messages for topic in self.topics}
+        for name, count in counts.items():
+            if count != announced[name]:
+                raise RecordingError(
+                    f"{self.path}: expected {announced[name]} messages on {name} as the bag's index says, found {count}"
+                    " (metadata.yaml and storage file may disagree; opening the storage file itself skips the former)"
+                )
+
+    def first(self, topic: str) -> Any:
+        """The first message of `topic`.
+
+        Raises:
+            RecordingError: damage, or no message although the index announces some.
+        """
+        with self._open() as reader:
+            for _, message in self._messages(reader, [topic], None):
+                return message
+        raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
+
+    def last(self, topic: str) -> Any:
+        """The last message of `topic`; looks at the end of the bag first."""
+        found = None
+        with self._open() as reader:
+            for seconds in (1, 10, None):
+                start = None if seconds is None else self.end_time - seconds * 1_000_000_000
+                for _, found in self._messages(reader, [topic], start):
+                    pass
+                if found is not None:
+                    return found
+        raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
+
+    @contextmanager
+    def _open(self) -> Iterator[AnyReader]:
+        with reading(self.path, "a complete ROS bag"):
+            # Bags of older ROS 2 releases carry no message definitions; those used here are the same in all of them.
+            reader = AnyReader([self.file], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            reader.open()
+        try:
+            yield reader
+        finally:
+            reader.close()
+
+    def _messages(self, reader: AnyReader, topics: Collection[str], start: int | None) -> Iterator[tuple[str, Any]]:
+        connections = [connection for connection in reader.connections if connection.topic in topics]
+        if not connections:
+            return
+        stream = reader.messages(connections, start=start)
+        while True:
+            with reading(self.path, "a complete ROS bag"):
+                item = next(stream, None)
+            if item is None:
+                return
+            connection, _, raw = item
+            with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
+                message = reader.deserialize(raw, connection.msgtype)
+            yield connection.topic, message
+
+
+def find_bag(folder: Path) -> Path:
+    """The bag in a folder: itself with metadata.yaml, else `bag/`, else the only .bag, .mcap or .db3 file in it.
+
+    Raises:
+        RecordingError: none, or several files and no metadata.yaml that says how they belong together.
+    """
+    for candidate in (folder, folder / "bag"):
+        if (candidate / "metadata.yaml").is_file():
+            return candidate
+    for candidate in (folder, folder / "bag"):
+        if candidate.is_dir():
+            files = sorted(item for item in candidate.iterdir() if item.suffix in _BAG_SUFFIXES and item.is_file())
+            if len(files) == 1:
+                return files[0]
+            if files:
+                names = ", ".join(item.name for item in files)
+                raise RecordingError(f"{candidate}: expected a metadata.yaml or a single bag file, found {names}")
+    raise RecordingError(f"{folder}: expected a ROS bag (metadata.yaml, .mcap, .db3 or .bag), found none")
+
+
+def zip_members(path: Path) -> list[str]:
+    """Names in a .zip.
+
+    Raises:
+        RecordingError: not a .zip, or a damaged one.
+    """
+    with reading(path, "a complete .zip file"), zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    with reading(path, "a complete .zip file"), zipfile.ZipFile(path) as archive:
+        for member in archive.infolist():
+            name = PurePosixPath(member.filename).name
+            if not member.is_dir() and (name == "metadata.yaml" or name.endswith(_BAG_SUFFIXES)):
+                if (folder / name).exists():
+                    raise RecordingError(f"{path}: expected one bag, found several files named {name}")
+                with archive.open(member) as source, (folder / name).open("wb") as target:
+                    shutil.copyfileobj(source, target)
+
+
+def check_mcap(path: Path) -> None:
+    """Check that the records of an MCAP file follow each other up to its footer and that the summary is sound.
+
+    A reader that skips records by their length would step over a damaged length in silence.
+    See the MCAP specification, "Records" and "Footer".
+
+    Raises:
+        RecordingError: naming the offset.
+    """
+    size = path.stat().st_size
+    with reading(path, "a readable file"), path.open("rb") as file:
+        if file.read(8) != _MCAP_MAGIC:
+            raise RecordingError(f"{path}: expected an MCAP file, found other bytes at its start")
+        position = 8
+        while True:
+            head = file.read(9)
+            if len(head) < 9:
+                raise RecordingError(f"{path}: expected a complete MCAP file, found it cut off at byte {size}")
+            code, length = struct.unpack("<BQ", head)
+            if position + 9 + length > size:
+                raise RecordingError(
+                    f"{path}: expected a complete MCAP file, found a record of {length} bytes at byte {position} of "
+                    f"{size}: cut off or damaged"
+                )
+            if code == _MCAP_FOOTER:
+                break
+            position += 9 + length
+            file.seek(position)
+        footer = file.read(length)
+        if length != 20 or file.read() != _MCAP_MAGIC:
+            raise RecordingError(f"{path}: expected an MCAP footer at byte {position}, found damage")
+        summary_start, _, summary_crc = struct.unpack("<QQI", footer)
+        if summary_crc:
+            file.seek(summary_start)
+            summary = file.read(position + 9 + 16 - summary_start)
+            if zlib.crc32(summary) != summary_crc:
+                raise RecordingError(f"{path}: expected a sound MCAP summary, found a wrong checksum")

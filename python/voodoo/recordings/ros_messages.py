@@ -1,0 +1,209 @@
+"""ROS messages (as rosbags deserializes them) turned into images, points, ranges and cameras."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.camera import Camera
+from voodoo.errors import RecordingError
+from voodoo.recordings.measurements import FloatArray
+from voodoo.recordings.pictures import decode_color, decode_depth_png
+
+DEPTH_ENCODINGS = {"16UC1": np.dtype(np.uint16), "mono16": np.dtype(np.uint16), "32FC1": np.dtype(np.float32)}
+"""16-bit depth counts millimetres (REP-118), 32-bit float depth metres."""
+COLOR_CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "8UC3": 3, "8UC4": 4, "mono8": 1, "8UC1": 1}
+
+# sensor_msgs/PointField: INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64
+_POINT_FIELDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+
+
+def stamp_of(message: Any, source: str) -> float:
+    """Header stamp in seconds; double precision keeps about 0.2 microseconds of a Unix time's nanoseconds.
+
+    Raises:
+        RecordingError: the stamp is zero (a driver without a clock) or its nanoseconds are out of range.
+    """
+    stamp = message.header.stamp
+    if stamp.sec <= 0 and stamp.nanosec == 0:
+        raise RecordingError(f"{source}: expected a header stamp, found zero")
+    if not (0 <= stamp.nanosec < 1_000_000_000 and stamp.sec >= 0):
+        raise RecordingError(f"{source}: expected a header stamp, found {stamp.sec} s {stamp.nanosec} ns")
+    return float(stamp.sec) + float(stamp.nanosec) * 1e-9
+
+
+def frame_of(message: Any) -> str:
+    """frame_id of the header, without the leading slash ROS 1 sometimes writes."""
+    return str(message.header.frame_id).lstrip("/")
+
+
+def base_topic(topic: str) -> str:
+    """Name of an image topic without its image_transport suffix."""
+    return topic.removesuffix("/compressedDepth").removesuffix("/compressed")
+
+
+def camera_of(info: Any, topic: str, source: str) -> Camera:
+    """Camera of a CameraInfo message, for the images on `topic`.
+
+    image_rect and the like are rectified images: there P counts, not K and D.
+
+    Raises:
+        RecordingError: binning or a region of interest, which are not supported.
+        CameraError: uncalibrated, or numbers that make no camera.
+    """
+    names = ("K", "D", "P") if hasattr(info, "K") else ("k", "d", "p")
+    k, d, p = (getattr(info, name) for name in names)
+    region = info.roi
+    if info.binning_x > 1 or info.binning_y > 1 or region.x_offset or region.y_offset:
+        raise RecordingError(
+            f"{source}: expected the calibration of the full image, found binning {info.binning_x}x{info.binning_y} "
+            f"and a region of interest at ({region.x_offset}, {region.y_offset})"
+        )
+    rectified = "rect" in base_topic(topic).rsplit("/", 1)[-1]
+    return Camera.from_camera_info(
+        width=info.width, height=info.height, k=k, d=d, model=info.distortion_model, p=p, rectified=rectified
+    )
+
+
+def depth_image(message: Any, camera: Camera, source: str) -> npt.NDArray[Any]:
+    """(H, W) uint16 or float32 of a raw sensor_msgs/Image.
+
+    Raises:
+        RecordingError: another encoding, fewer bytes than announced, or another size than the camera's.
+    """
+    dtype = DEPTH_ENCODINGS.get(message.encoding)
+    if dtype is None:
+        raise RecordingError(
+            f"{source}: expected a depth encoding ({', '.join(DEPTH_ENCODINGS)}), found {message.encoding!r}"
+        )
+    rows = _rows(message, dtype.itemsize, source)
+    _check_size(message.width, message.height, camera, source)
+    order = ">" if message.is_bigendian else "<"
+    return np.ascontiguousarray(rows).view(dtype.newbyteorder(order)).astype(dtype, copy=False)
+
+
+def compressed_depth_image(message: Any, camera: Camera, source: str) -> npt.NDArray[Any]:
+    """(H, W) uint16 or float32 of a sensor_msgs/CompressedImage written by compressed_depth_image_transport.
+
+    The PNG follows a header of 12 bytes (a format number and two floats A, B); 32FC1 images are stored as
+    quantized inverse depth q with depth = A / (q - B), q = 0 meaning none.
+
+    Raises:
+        RecordingError: damaged, RVL-compressed or of another size than the camera's.
+    """
+    data = message.data.tobytes()
+    if "rvl" in message.format.lower():
+        raise RecordingError(f"{source}: expected PNG-compressed depth, found format {message.format!r}")
+    header = b"" if data.startswith(b"\x89PNG") else data[:12]
+    image: npt.NDArray[Any] = decode_depth_png(data[len(header) :], source)
+    if "32FC1" in message.format:
+        if len(header) != 12:
+            raise RecordingError(f"{source}: expected the 12-byte header of compressed depth, found none")
+        a, b = (float(value) for value in np.frombuffer(header, "<f4", count=2, offset=4))
+        if not (math.isfinite(a) and math.isfinite(b) and a > 0.0):
+            raise RecordingError(f"{source}: expected quantization A > 0 and B, found {a!r} and {b!r}")
+        steps = image.astype(np.float64) - b
+        with np.errstate(divide="ignore"):
+            image = np.where((image > 0) & (steps > 0.0), a / steps, np.nan).astype(np.float32)
+    _check_size(image.shape[1], image.shape[0], camera, source)
+    return image
+
+
+def color_image(message: Any, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+    """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image.
+
+    Raises:
+        RecordingError: another encoding, fewer bytes than announced, or another size than the camera's.
+    """
+    channels = COLOR_CHANNELS.get(message.encoding)
+    if channels is None:
+        raise RecordingError(
+            f"{source}: expected a colour encoding ({', '.join(COLOR_CHANNELS)}), found {message.encoding!r}"
+        )
+    _check_size(message.width, message.height, camera, source)
+    image = _rows(message, channels, source).reshape(message.height, message.width, channels)
+    if channels == 1:
+        return np.repeat(image, 3, axis=2)
+    return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
+
+
+def compressed_color_image(message: Any, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+    """(H, W, 3) BGR uint8 of a JPEG or PNG sensor_msgs/CompressedImage."""
+    return decode_color(message.data.tobytes(), source, (camera.width, camera.height))
+
+
+def cloud_points(message: Any, source: str) -> FloatArray:
+    """(N, 3) of a sensor_msgs/PointCloud2 with any field layout; rows that are not finite are dropped.
+
+    Raises:
+        RecordingError: no x, y, z, an unknown field type, or sizes that do not fit together.
+    """
+    fields = {field.name: field for field in message.fields}
+    missing = [name for name in "xyz" if name not in fields]
+    if missing:
+        raise RecordingError(f"{source}: expected fields x, y, z, found {sorted(fields)}")
+    order = ">" if message.is_bigendian else "<"
+    height, width, step = int(message.height), int(message.width), int(message.point_step)
+    formats = []
+    for name in "xyz":
+        code = _POINT_FIELDS.get(fields[name].datatype)
+        if code is None:
+            raise RecordingError(f"{source}: field {name}: expected datatype 1 to 8, found {fields[name].datatype}")
+        formats.append(np.dtype(order + code))
+        if fields[name].offset + formats[-1].itemsize > step:
+            raise RecordingError(f"{source}: field {name} at {fields[name].offset} leaves the point of {step} bytes")
+    if height * width == 0:
+        return np.empty((0, 3))
+    row_step = int(message.row_step) or width * step
+    if row_step < width * step or len(message.data) < row_step * (height - 1) + width * step:
+        raise RecordingError(
+            f"{source}: expected {height} rows of {width} points of {step} bytes, found {len(message.data)} bytes "
+            f"in rows of {row_step}"
+        )
+    layout = np.dtype(
+        {"names": list("xyz"), "formats": formats, "offsets": [fields[n].offset for n in "xyz"], "itemsize": step}
+    )
+    view = np.ndarray((height, width), layout, buffer=message.data.tobytes(), strides=(row_step, step))
+    points = np.stack([view[name].astype(np.float64).ravel() for name in "xyz"], axis=1)
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def scan_fields(message: Any, source: str) -> dict[str, Any]:
+    """Ranges and geometry of a sensor_msgs/LaserScan, as keyword arguments of LaserScan.
+
+    Raises:
+        RecordingError: angles or limits that are not finite, or a zero increment.
+    """
+    numbers = {
+        name: float(getattr(message, name)) for name in ("angle_min", "angle_increment", "range_min", "range_max")
+    }
+    finite = all(math.isfinite(value) for name, value in numbers.items() if name != "range_max")
+    if not finite or math.isnan(numbers["range_max"]) or numbers["angle_increment"] == 0.0:
+        raise RecordingError(f"{source}: expected finite angles and limits and an increment, found {numbers}")
+    if abs(numbers["angle_increment"]) * max(len(message.ranges) - 1, 0) > 2.0 * math.pi + 0.1:
+        raise RecordingError(
+            f"{source}: expected one turn at most, found {len(message.ranges)} rays by {numbers['angle_increment']} rad"
+        )
+    return {"ranges": message.ranges.astype(np.float32), **numbers}
+
+
+def _rows(message: Any, pixel_bytes: int, source: str) -> npt.NDArray[np.uint8]:
+    """(H, W * pixel_bytes) bytes without the padding at the end of the rows."""
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    wanted = width * pixel_bytes
+    if height < 1 or width < 1 or step < wanted or len(message.data) < step * (height - 1) + wanted:
+        raise RecordingError(
+            f"{source}: expected {height} rows of {wanted} bytes for {width}x{height} {message.encoding}, "
+            f"found {len(message.data)} bytes in rows of {step}"
+        )
+    return np.lib.stride_tricks.as_strided(message.data, (height, wanted), (step, 1))
+
+
+def _check_size(width: int, height: int, camera: Camera, source: str) -> None:
+    if (width, height) != (camera.width, camera.height):
+        raise RecordingError(
+            f"{source}: expected {camera.width}x{camera.height} px as calibrated, found {width}x{height}"
+        )

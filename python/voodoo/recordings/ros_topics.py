@@ -1,0 +1,190 @@
+"""Which topics of a bag are measurements, and how they are calibrated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+from voodoo.camera import Camera
+from voodoo.errors import RecordingError, reading
+from voodoo.recordings.ros_bag import Bag
+from voodoo.recordings.ros_messages import COLOR_CHANNELS, DEPTH_ENCODINGS, base_topic, camera_of, frame_of, stamp_of
+
+Kind: TypeAlias = Literal["depth", "points", "scan", "color"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+"""In the order of precedence: the first kind a recording has makes its frames."""
+TopicChoice: TypeAlias = str | Sequence[str] | None
+
+IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+_TYPES: dict[Kind, tuple[str, ...]] = {
+    "depth": (IMAGE, COMPRESSED),
+    "points": ("sensor_msgs/msg/PointCloud2",),
+    "scan": ("sensor_msgs/msg/LaserScan",),
+    "color": (IMAGE, COMPRESSED),
+}
+
+
+@dataclass(frozen=True)
+class Source:
+    """A topic that is read: kind, message type, number of messages, and from its first message the frame id, the
+    stamp [s] and a word on the format. `camera` and the topic it came from are set for images."""
+
+    topic: str
+    kind: Kind
+    type: str
+    messages: int
+    frame: str
+    first_stamp: float
+    detail: str
+    camera: Camera | None = None
+    info_topic: str | None = None
+
+
+class TopicFinder:
+    """Chooses topics by type, name and encoding, or as told.
+
+    A kind for which several topics qualify needs a choice; colour, which nothing depends on, is left out instead
+    when it is ambiguous or not calibrated, and noted in `unused`.
+
+    Args:
+        bag: the bag.
+        choices: topics asked for, by kind.
+        camera_info_topic: calibration of the depth image, if it isn't beside it.
+    """
+
+    def __init__(self, bag: Bag, *, choices: dict[Kind, TopicChoice], camera_info_topic: str | None) -> None:
+        self.bag = bag
+        self.unused: list[tuple[str, str]] = []
+        self._choices = choices
+        self._camera_info_topic = camera_info_topic
+        self._topics = {topic.name: topic for topic in bag.topics}
+        self._first: dict[str, Any] = {}
+
+    def find(self, use: Sequence[Kind]) -> list[Source]:
+        """Sources of the kinds in `use`, the first one making the frames.
+
+        Raises:
+            RecordingError: nothing usable, an ambiguous choice, a missing calibration or a wrong encoding.
+        """
+        sources: list[Source] = []
+        for kind in KINDS:
+            if kind not in use:
+                continue
+            if self._choices[kind] is None and kind == "color":
+                try:
+                    sources += [self._source(name, kind) for name in self._automatic(kind)]
+                except RecordingError as error:
+                    self.unused.append(("color", str(error)))
+            elif self._choices[kind] is None:
+                found = [self._source(name, kind) for name in self._automatic(kind)]
+                sources += [source for source in found if not self._same_as_depth(source, sources)]
+            else:
+                sources += [self._source(name, kind) for name in self._chosen(kind)]
+        if not sources:
+            listing = ", ".join(f"{topic.name} ({topic.type})" for topic in self.bag.topics) or "no topics"
+            why = "".join(f"; {topic}: {reason}" for topic, reason in self.unused)
+            raise RecordingError(f"{self.bag.path}: expected topics for {', '.join(use)}, found {listing}{why}")
+        return sources
+
+    def _chosen(self, kind: Kind) -> list[str]:
+        choice = self._choices[kind]
+        names = [choice] if isinstance(choice, str) else list(choice or ())
+        for name in names:
+            topic = self._topics.get(name)
+            if topic is None or topic.type not in _TYPES[kind] or topic.messages == 0:
+                fit = [item.name for item in self.bag.topics if item.type in _TYPES[kind] and item.messages]
+                found = "no such topic" if topic is None else f"{topic.messages} messages of type {topic.type}"
+                raise RecordingError(
+                    f"{self.bag.path}: {kind}_topic {name!r}: expected one of {fit or 'none in this bag'}, found {found}"
+                )
+        return names
+
+    def _automatic(self, kind: Kind) -> list[str]:
+        names = [topic.name for topic in self.bag.topics if topic.type in _TYPES[kind] and topic.messages]
+        if kind == "depth":
+            names = self._depth_candidates(names)
+        elif kind == "color":
+            names = self._color_candidates(names)
+        # image_transport publishes the same picture several times; the raw one is the base
+        bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
+        if len(bases) > 1:
+            raise RecordingError(
+                f"{self.bag.path}: expected one topic for {kind}, found {', '.join(sorted(bases.values()))}; "
+                f"choose with {kind}_topic= or leave it out with use="
+            )
+        return list(bases.values())
+
+    def _depth_candidates(self, names: list[str]) -> list[str]:
+        named = [name for name in names if "depth" in name.lower()]
+        usable, refused = [], []
+        for name in named:
+            message = self._message(name)
+            if self._topics[name].type == COMPRESSED:
+                if "compressedDepth" in name or "compressedDepth" in message.format:
+                    usable.append(name)
+            elif message.encoding in DEPTH_ENCODINGS:
+                usable.append(name)
+            else:
+                refused.append(f"{name} with encoding {message.encoding!r}")
+        if refused and not usable:
+            raise RecordingError(
+                f"{self.bag.path}: expected a depth topic encoded as {', '.join(DEPTH_ENCODINGS)}, "
+                f"found {', '.join(refused)}"
+            )
+        self.unused += [(item.split(" ")[0], "not a depth encoding") for item in refused]
+        return usable
+
+    def _color_candidates(self, names: list[str]) -> list[str]:
+        usable = []
+        for name in names:
+            message = self._message(name)
+            if self._topics[name].type == COMPRESSED:
+                if "compressedDepth" not in name and "compressedDepth" not in message.format:
+                    usable.append(name)
+            elif COLOR_CHANNELS.get(message.encoding, 0) >= 3:
+                usable.append(name)
+        named = [name for name in usable if "color" in name.lower() or "rgb" in name.lower()]
+        return named or usable
+
+    def _same_as_depth(self, source: Source, sources: list[Source]) -> bool:
+        """Whether a cloud is a depth image once more: counted twice, it would weigh twice."""
+        same = source.kind == "points" and any(s.kind == "depth" and s.frame == source.frame for s in sources)
+        if same:
+            self.unused.append((source.topic, "same frame as the depth image, hence the same points (points_topic=)"))
+        return same
+
+    def _source(self, name: str, kind: Kind) -> Source:
+        topic, message = self._topics[name], self._message(name)
+        camera, info_topic = None, None
+        with reading(f"{self.bag.path}, topic {name}", f"a {topic.type} message"):
+            if kind in ("depth", "color"):
+                info_topic, camera = self._calibration(name, kind, frame_of(message))
+                words = message.format if topic.type == COMPRESSED else message.encoding
+                detail = f"{camera.width}x{camera.height} {words}"
+            elif kind == "points":
+                detail = f"cloud of {message.height * message.width} points ({'/'.join(f.name for f in message.fields)})"
+            else:
+                detail = f"scan of {len(message.ranges)} rays"
+            stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), frame_of(message)
+        return Source(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
+
+    def _calibration(self, name: str, kind: Kind, frame: str) -> tuple[str, Camera]:
+        """CameraInfo beside the image (its name with the last part replaced), or as chosen for depth."""
+        expected = f"{base_topic(name).rsplit('/', 1)[0]}/camera_info"
+        if kind == "depth" and self._camera_info_topic is not None:
+            expected = self._camera_info_topic
+        topic = self._topics.get(expected)
+        if topic is None or topic.type != CAMERA_INFO or topic.messages == 0:
+            infos = ", ".join(t.name for t in self.bag.topics if t.type == CAMERA_INFO and t.messages) or "none"
+            raise RecordingError(
+                f"{self.bag.path}: expected the calibration of {name} (frame {frame!r}) on {expected}, "
+                f"found CameraInfo topics: {infos}" + (" (choose with camera_info_topic=)" if kind == "depth" else "")
+            )
+        return expected, camera_of(self._message(expected), name, f"{self.bag.path}, topic {expected}")
+
+    def _message(self, name: str) -> Any:
+        if name not in self._first:
+            self._first[name] = self.bag.first(name)
+        return self._first[name]

@@ -1,0 +1,162 @@
+"""Rigid transforms of a recording: tf messages chained into root_from_sensor."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from voodoo.errors import RecordingError
+from voodoo.recordings.measurements import FloatArray
+
+
+def matrix(translation: Any, rotation: Any, source: object) -> FloatArray:
+    """(4, 4) of a geometry_msgs translation and quaternion (x, y, z, w).
+
+    Raises:
+        RecordingError: a number that is not finite or a quaternion whose norm is not 1 within 1 %.
+    """
+    t = np.array([translation.x, translation.y, translation.z], dtype=np.float64)
+    q = np.array([rotation.x, rotation.y, rotation.z, rotation.w], dtype=np.float64)
+    norm = math.sqrt(float(q @ q))
+    if not np.isfinite(t).all() or not abs(norm - 1.0) < 0.01:
+        raise RecordingError(f"{source}: expected a finite translation and a unit quaternion, found {t} and {q}")
+    x, y, z, w = (float(value) for value in q / norm)
+    result = np.eye(4)
+    result[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    result[:3, 3] = t
+    return result
+
+
+def inverse(a_from_b: FloatArray) -> FloatArray:
+    """b_from_a (4, 4) of a rigid a_from_b."""
+    result = np.eye(4)
+    result[:3, :3] = a_from_b[:3, :3].T
+    result[:3, 3] = -a_from_b[:3, :3].T @ a_from_b[:3, 3]
+    return result
+
+
+class _Edge:
+    """parent_from_child over time, sorted by stamp."""
+
+    def __init__(self) -> None:
+        self.stamps: list[float] = []
+        self.transforms: list[FloatArray] = []
+        self.constant = True
+
+    def add(self, stamp: float, transform: FloatArray, *, static: bool) -> None:
+        if static:
+            self.stamps, self.transforms = [stamp], [transform]
+            return
+        if self.transforms and not np.array_equal(self.transforms[0], transform):
+            self.constant = False
+        at = bisect_right(self.stamps, stamp)
+        self.stamps.insert(at, stamp)
+        self.transforms.insert(at, transform)
+
+
+class TransformTree:
+    """Frames joined by transforms.
+
+    A transform that never changes holds at all times, whichever topic it came on. One that changes is taken at
+    the latest stamp at or before the one asked for, if that is at most `max_age` seconds old; before its first stamp
+    the first one is taken, if it comes at most `max_age` later.
+
+    Args:
+        source: recording to name in errors.
+        max_age: [s].
+    """
+
+    def __init__(self, source: object, *, max_age: float) -> None:
+        self.source = source
+        self.max_age = max_age
+        self._edges: dict[tuple[str, str], _Edge] = {}
+        self._neighbours: dict[str, list[str]] = {}
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of all frames, sorted."""
+        return tuple(sorted(self._neighbours))
+
+    def add(self, message: Any, *, static: bool) -> None:
+        """Take up a tf2_msgs/TFMessage."""
+        for item in message.transforms:
+            parent, child = str(item.header.frame_id).lstrip("/"), str(item.child_frame_id).lstrip("/")
+            where = f"{self.source}: transform {parent!r} from {child!r}"
+            if not parent or not child or parent == child:
+                raise RecordingError(f"{where}: expected two different frame names")
+            stamp = float(item.header.stamp.sec) + float(item.header.stamp.nanosec) * 1e-9
+            transform = matrix(item.transform.translation, item.transform.rotation, where)
+            if (parent, child) not in self._edges:
+                self._edges[parent, child] = _Edge()
+                self._neighbours.setdefault(parent, []).append(child)
+                self._neighbours.setdefault(child, []).append(parent)
+            self._edges[parent, child].add(stamp, transform, static=static)
+
+    def path(self, root: str, frame: str) -> list[str]:
+        """Frames from `root` to `frame`, both included.
+
+        Raises:
+            RecordingError: they are not connected.
+        """
+        previous: dict[str, str] = {}
+        queue = deque([root])
+        while queue and frame not in previous and root != frame:
+            current = queue.popleft()
+            for other in self._neighbours.get(current, ()):
+                if other != root and other not in previous:
+                    previous[other] = current
+                    queue.append(other)
+        if frame != root and frame not in previous:
+            known = ", ".join(self.frames) or "none"
+            raise RecordingError(
+                f"{self.source}: expected a transform {root!r} from {frame!r} on tf or tf_static, "
+                f"found no chain between them; frames with transforms: {known}"
+            )
+        result = [frame]
+        while result[-1] != root:
+            result.append(previous[result[-1]])
+        return result[::-1]
+
+    def constant(self, root: str, frame: str) -> bool:
+        """Whether root_from_frame is the same at all times."""
+        path = self.path(root, frame)
+        return all(self._edge(a, b)[0].constant for a, b in zip(path, path[1:], strict=False))
+
+    def lookup(self, root: str, frame: str, stamp: float) -> FloatArray:
+        """root_from_frame (4, 4) at `stamp`.
+
+        Raises:
+            RecordingError: not connected, or no transform near that stamp.
+        """
+        result = np.eye(4)
+        path = self.path(root, frame)
+        for a, b in zip(path, path[1:], strict=False):
+            edge, forward = self._edge(a, b)
+            transform = self._at(edge, stamp, a, b)
+            result = result @ (transform if forward else inverse(transform))
+        return result
+
+    def _edge(self, a: str, b: str) -> tuple[_Edge, bool]:
+        edge = self._edges.get((a, b))
+        return (edge, True) if edge is not None else (self._edges[b, a], False)
+
+    def _at(self, edge: _Edge, stamp: float, a: str, b: str) -> FloatArray:
+        if edge.constant:
+            return edge.transforms[0]
+        index = max(bisect_right(edge.stamps, stamp) - 1, 0)
+        age = stamp - edge.stamps[index]
+        if abs(age) > self.max_age:
+            raise RecordingError(
+                f"{self.source}: expected a transform between {a!r} and {b!r} within {self.max_age} s of stamp "
+                f"{stamp:.6f}, found the nearest usable one {abs(age):.3f} s {'before' if age > 0 else 'after'} it "
+                "(option tf_max_age)"
+            )
+        return edge.transforms[index]

@@ -1,0 +1,90 @@
+"""truth.csv and init.json beside a rendered recording: exact joint positions and where the body starts."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from voodoo.errors import RecordingError, reading
+from voodoo.recordings.measurements import FloatArray
+from voodoo.recordings.recording import Reference, Start
+
+TRUTH_FRAME = "base_link"
+"""Frame of both files."""
+
+RootFromTruth: TypeAlias = Callable[[float], FloatArray]
+"""(4, 4) root_from_base_link at a stamp [s]."""
+
+
+def find_beside(bag: Path, name: str) -> Path | None:
+    """`name` in the bag's folder or in the folder above, or None."""
+    folder = bag if bag.is_dir() else bag.parent
+    for candidate in (folder / name, folder.parent / name):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
+    """Read a truth.csv: stamp_s, then NAME_x,NAME_y,NAME_z [m] in base_link; empty cells are missing joints.
+
+    Raises:
+        RecordingError: another header, a short row, a cell that is no number, stamps that do not rise.
+    """
+    with reading(path, "a table of joint positions"), path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    if len(rows) < 2:
+        raise RecordingError(f"{path}: expected a header and at least one row, found {len(rows)} lines")
+    header = rows[0]
+    names = tuple(cell.removesuffix("_x") for cell in header[1::3])
+    if header != ["stamp_s", *(f"{name}_{axis}" for name in names for axis in "xyz")] or len(set(names)) != len(names):
+        raise RecordingError(f"{path}: expected columns stamp_s, NAME_x, NAME_y, NAME_z, ..., found {header[:4]}...")
+    table = np.empty((len(rows) - 1, len(header)))
+    for index, row in enumerate(rows[1:]):
+        where = f"{path}, line {index + 2}"
+        if len(row) != len(header):
+            raise RecordingError(f"{where}: expected {len(header)} cells, found {len(row)}")
+        try:
+            table[index] = [float(cell) if cell else math.nan for cell in row]
+        except ValueError as error:
+            raise RecordingError(f"{where}: expected numbers, found {error}") from error
+    stamps = table[:, 0]
+    if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any() or np.isinf(table).any():
+        raise RecordingError(f"{path}: expected rising stamps and finite positions, found others")
+    positions = table[:, 1:].reshape(len(table), len(names), 3)
+    for index, stamp in enumerate(stamps):
+        root_from_base = root_from_truth(float(stamp))
+        positions[index] = positions[index] @ root_from_base[:3, :3].T + root_from_base[:3, 3]
+    return Reference(stamps, names, positions, exact=True)
+
+
+def read_start(path: Path, root_from_base: FloatArray) -> Start:
+    """Read an init.json: {"height_m": stature, "joints": {name: [x, y, z] in base_link}}.
+
+    Raises:
+        RecordingError: not JSON, or not of that form.
+    """
+    with reading(path, "a JSON file"):
+        content = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(content, dict) or not isinstance(content.get("joints"), dict) or not content["joints"]:
+        raise RecordingError(f"{path}: expected an object with the joints of the first frame, found {content!r:.80}")
+    joints = {}
+    for name, value in content["joints"].items():
+        numbers = isinstance(value, list) and len(value) == 3 and all(isinstance(v, (int, float)) for v in value)
+        if not numbers or not all(math.isfinite(v) for v in value):
+            raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in metres, found {value!r}")
+        x, y, z = (float(v) for v in root_from_base[:3, :3] @ np.array(value) + root_from_base[:3, 3])
+        joints[str(name)] = (x, y, z)
+    start = Start(joints=joints)
+    height = content.get("height_m")
+    if height is not None:
+        if not isinstance(height, (int, float)) or not 0.3 < height < 3.0:
+            raise RecordingError(f"{path}: height_m: expected a stature in metres, found {height!r}")
+        start["height_m"] = float(height)
+    return start

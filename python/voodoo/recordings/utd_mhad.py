@@ -1,0 +1,143 @@
+"""UTD-MHAD sequences: Kinect v1 depth and the Kinect SDK's skeleton, in MATLAB files.
+
+C. Chen, R. Jafari, N. Kehtarnavaz, "UTD-MHAD: A Multimodal Dataset for Human Action Recognition Utilizing a Depth
+Camera and a Wearable Inertial Sensor", ICIP 2015.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.io
+
+from voodoo.camera import Camera
+from voodoo.errors import RecordingError, reading
+from voodoo.recordings.measurements import DepthImage, RecordedFrame
+from voodoo.recordings.recording import (
+    Recording,
+    RecordingInfo,
+    Reference,
+    SensorInfo,
+    Start,
+    mean_rate,
+    reference_words,
+)
+
+CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=159.0, cy=120.0)
+"""Nominal Kinect v1 at 320x240. The data's u = 160 + f X/Z holds for the mirrored image; u -> 319 - u makes it 159."""
+
+FRAME = "kinect_depth_optical_frame"
+RATE_HZ = 30.0
+
+# Kinect's order. Its spine (half way up the trunk) has no counterpart here; its foot is the front of the foot.
+_JOINTS: tuple[str | None, ...] = (
+    "head_center", "vc7", None, "humanoid_root",
+    "l_shoulder", "l_elbow", "l_wrist", "l_hand", "r_shoulder", "r_elbow", "r_wrist", "r_hand",
+    "l_hip", "l_knee", "l_ankle", "l_toe", "r_hip", "r_knee", "r_ankle", "r_toe",
+)  # fmt: skip
+NAMES = tuple(name for name in _JOINTS if name is not None)
+
+
+class UtdMhadRecording(Recording):
+    """One UTD-MHAD sequence, un-mirrored: left is the person's own left.
+
+    The root frame is the camera's optical frame (x right, y down, z forward). The data set shows the person as in a
+    mirror, so columns are reversed and the skeleton's X and Y change sign (it is Y up). The person is already cut out;
+    the band of floor at the feet and the chair of the sitting actions are kept.
+
+    Stamps are k / 30 s: the paper says 30 Hz, but the data itself suggests that the true rate may be near 19 Hz,
+    so speeds are uncertain by that factor. The skeleton LEADS the depth by one or two frames; compare at the best
+    constant lag. It is another tracker's estimate: `reference.exact` is False. Kinect's joints stand for ours
+    approximately: head -> head_center, shoulder_center -> vc7, hip_center (above the hip line) -> humanoid_root,
+    foot -> toe; its spine is left out.
+
+    Args:
+        path: the *_depth.mat file; the skeleton is expected in ../Skeleton/*_skeleton.mat (no reference without it).
+
+    Raises:
+        RecordingError: damaged, or not of the data set's form.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.name = path.name.removesuffix("_depth.mat").removesuffix(".mat")
+        self.root_frame = FRAME
+        depth = _variable(path, "d_depth")
+        if depth.dtype != np.uint16 or depth.ndim != 3 or depth.shape[:2] != (CAMERA.height, CAMERA.width):
+            raise RecordingError(
+                f"{path}: expected d_depth uint16 of shape (240, 320, N), found {depth.dtype} of {depth.shape}"
+            )
+        self._depth: npt.NDArray[np.uint16] = depth
+        skeleton = path.parent.parent / "Skeleton" / f"{self.name}_skeleton.mat"
+        self.reference = _read_skeleton(skeleton, len(self)) if skeleton.is_file() else None
+        self.start = None if self.reference is None else _start(self.reference)
+
+    def __len__(self) -> int:
+        """Number of depth images."""
+        return int(self._depth.shape[2])
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Depth images in order; see Recording."""
+        for index in range(len(self)):
+            image = np.ascontiguousarray(self._depth[:, ::-1, index])
+            stamp = index / RATE_HZ
+            yield RecordedFrame(stamp, (DepthImage("depth", stamp, image, 0.001, CAMERA, np.eye(4)),))
+
+    def info(self) -> RecordingInfo:
+        """Summarize."""
+        duration = (len(self) - 1) / RATE_HZ
+        rate = mean_rate(len(self), duration)
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader="utd-mhad",
+            frames=len(self),
+            start_stamp=0.0,
+            duration=duration,
+            rate_hz=rate,
+            root_frame=FRAME,
+            sensors=(SensorInfo("depth", "depth", FRAME, len(self), rate, "320x240 16UC1, person cut out"),),
+            reference=reference_words(self.reference),
+            notes=(
+                "stamps are nominal (30 Hz); the true rate may be near 19 Hz",
+                "the reference leads the depth by one or two frames",
+            ),
+        )
+
+
+def _variable(path: Path, name: str) -> npt.NDArray[Any]:
+    with reading(path, f"a MATLAB file with {name}"):
+        content = scipy.io.loadmat(str(path))
+    if not isinstance(content.get(name), np.ndarray):
+        names = ", ".join(key for key in content if not key.startswith("__")) or "no variables"
+        raise RecordingError(f"{path}: expected the variable {name}, found {names}")
+    return np.asarray(content[name])
+
+
+def _read_skeleton(path: Path, frames: int) -> Reference:
+    skeleton = _variable(path, "d_skel")
+    if skeleton.dtype.kind != "f" or skeleton.shape != (len(_JOINTS), 3, frames):
+        raise RecordingError(
+            f"{path}: expected d_skel float of shape (20, 3, {frames}), found {skeleton.dtype} of {skeleton.shape}"
+        )
+    if not np.isfinite(skeleton).all() or np.abs(skeleton).max() > 20.0:
+        raise RecordingError(f"{path}: expected joints in metres, found values that are not finite or beyond 20 m")
+    kept = [index for index, name in enumerate(_JOINTS) if name is not None]
+    # X changes sign because the image was mirrored, Y because the optical frame points down.
+    positions = skeleton[kept].transpose(2, 0, 1).astype(np.float64) * (-1.0, -1.0, 1.0)
+    positions[(positions == 0.0).all(axis=2)] = np.nan  # the SDK's "not tracked"
+    return Reference(np.arange(frames) / RATE_HZ, NAMES, positions, exact=False)
+
+
+def _start(reference: Reference) -> Start:
+    """First frame of the reference without the toes, which a body without feet cannot be fitted to."""
+    joints = {}
+    for name, position in zip(reference.names, reference.positions[0], strict=True):
+        if not name.endswith("_toe") and np.isfinite(position).all():
+            x, y, z = (float(value) for value in position)
+            joints[name] = (x, y, z)
+    return Start(joints=joints)
