@@ -1,1 +1,30 @@
+"""voodoo: the 3-D pose of a person, or any articulated body, every frame, on a plain CPU, from whatever the robot has."""
 
+from voodoo._core import ClosestPoints, Estimate, Frame, TaperedEllipticCylinder, __version__
+from voodoo.body import Body, Joint, Limb
+from voodoo.camera import Camera
+from voodoo.config import Config
+from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
+from voodoo.recordings import open_recording
+from voodoo.tracker import Tracker
+
+__all__ = [
+    "Body",
+    "BodyError",
+    "Camera",
+    "CameraError",
+    "ClosestPoints",
+    "Config",
+    "ConfigError",
+    "Estimate",
+    "Frame",
+    "Joint",
+    "Limb",
+    "MeasurementError",
+    "RecordingError",
+    "TaperedEllipticCylinder",
+    "Tracker",
+    "VoodooError",
+    "__version__",
+    "open_recording",
+]

@@ -119,6 +119,11 @@ class Camera:
         return cls(width, height, k[0], k[4], k[2], k[5], coefficients, name)  # type: ignore[arg-type]
 
     @property
+    def distorted(self) -> bool:
+        """True when pixels are not simply u = fx x/z + cx, v = fy y/z + cy."""
+        return self.model == "equidistant" or bool(self.distortion)
+
+    @property
     def matrix(self) -> npt.NDArray[np.float64]:
         """The 3x3 intrinsic matrix."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
@@ -156,7 +161,7 @@ class Camera:
 
     def _distorted(self, xy: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Pixels (N, 2) of normalized coordinates (N, 2)."""
-        if self.model != "equidistant" and not self.distortion:
+        if not self.distorted:
             return xy * (self.fx, self.fy) + (self.cx, self.cy)
         points = np.column_stack([xy, np.ones(len(xy))])[:, None, :]
         zero = np.zeros(3)
@@ -174,7 +179,7 @@ class Camera:
 def _rays(camera: Camera) -> npt.NDArray[np.float32]:
     u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
     pixels = np.stack([u, v], axis=-1).reshape(-1, 2)
-    if camera.model != "equidistant" and not camera.distortion:
+    if not camera.distorted:
         xy = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
     else:
         # The default of five fixed-point iterations leaves whole pixels of error on wide lenses.

@@ -14,6 +14,18 @@ class CameraError(VoodooError):
     """A camera model whose numbers cannot be meant: it names the field, what was expected and what was found."""
 
 
+class BodyError(VoodooError):
+    """A body that cannot be tracked: it names the key, what was expected and what was found."""
+
+
+class ConfigError(VoodooError):
+    """A configuration entry that is unknown or outside its range."""
+
+
+class MeasurementError(VoodooError):
+    """A measurement or an initial pose the tracker refuses; the tracker is unchanged."""
+
+
 class RecordingError(VoodooError):
     """A recording that cannot be read: it names the file, what was expected and what was found."""
 

@@ -228,6 +228,8 @@ config! {
     max_distance: f64 = 0.15, "m", 0.001 ..= 10.0;
     /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7).
     band_ratio: f64 = 0.5, "", 0.0 ..= 100.0;
+    /// After a reset that fits sizes, the first frame's points also fit the girths.
+    fit_girths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.
     ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;
     /// Threads for one step. The result is the same, bit by bit, for any number.

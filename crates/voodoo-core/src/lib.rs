@@ -9,6 +9,7 @@
 
 pub mod associate;
 pub mod body;
+mod calibrate;
 pub mod candidates;
 pub mod config;
 pub mod correspondence;

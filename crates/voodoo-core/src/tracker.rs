@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::associate::Assignment;
 use crate::body::Body;
+use crate::calibrate::{GirthFit, girth_step};
 use crate::candidates::{Candidates, body_box, shifted};
 use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
@@ -14,6 +15,9 @@ use crate::geometry::{Points, Pose, Vec3};
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
 use crate::solver::{Solver, solver};
 
+/// Gauss-Newton steps of the girth fit.
+const GIRTH_STEPS: usize = 6;
+
 /// Follows one body through frames.
 #[derive(Debug)]
 pub struct Tracker {
@@ -23,6 +27,8 @@ pub struct Tracker {
     threads: Option<rayon::ThreadPool>,
     stamp: Option<f64>,
     started: bool,
+    /// The next frame shall fit the girths.
+    girths_open: bool,
     /// Current poses in the working frame, whose origin lies at `origin` in the world.
     poses: Vec<Pose>,
     origin: Vec3,
@@ -49,6 +55,7 @@ impl Tracker {
             threads,
             stamp: None,
             started: false,
+            girths_open: false,
             poses: Vec::new(),
             origin: Vec3::ZERO,
             candidates: Candidates::default(),
@@ -82,6 +89,7 @@ impl Tracker {
         }
         let (body, poses) = self.body.fit(positions, fit_sizes)?;
         self.restart(body, poses);
+        self.girths_open = fit_sizes && self.config.fit_girths;
         Ok(&self.estimate)
     }
 
@@ -105,6 +113,7 @@ impl Tracker {
         self.origin = Vec3::ZERO;
         self.stamp = None;
         self.started = true;
+        self.girths_open = false;
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
         self.candidates = Candidates::default();
@@ -123,6 +132,9 @@ impl Tracker {
         // 1 Prefilter the free points by the enlarged box of the whole body.
         let bounds = body_box(&self.body, &self.poses, self.config.body_box_margin);
         self.candidates.gather(frame, self.origin, &bounds, self.config.ground_clearance);
+        if std::mem::take(&mut self.girths_open) {
+            self.fit_girths();
+        }
         let mut steps = 0;
         let mut previous = f64::INFINITY;
         while steps < self.config.max_steps {
@@ -178,6 +190,25 @@ impl Tracker {
         self.origin += shift;
         for pose in &mut self.poses {
             *pose = shifted(pose, shift);
+        }
+    }
+
+    /// Fits the girths to the first frame after a reset, whose pose is known.
+    fn fit_girths(&mut self) {
+        let mut totals = vec![GirthFit { shift: Vec3::ZERO, girth: 1.0 }; self.poses.len()];
+        for _ in 0..GIRTH_STEPS {
+            self.match_points();
+            for (limb, total) in totals.iter_mut().enumerate() {
+                let Some(step) = girth_step(&self.correspondences.limbs[limb], &self.poses[limb], total) else {
+                    continue;
+                };
+                let girth = (total.girth * step.girth).clamp(0.7, 1.4);
+                if self.body.change_girth(limb, step.shift, girth / total.girth) {
+                    let pose = &mut self.poses[limb];
+                    pose.translation += pose.rotation * step.shift;
+                    *total = GirthFit { shift: total.shift + step.shift, girth };
+                }
+            }
         }
     }
 

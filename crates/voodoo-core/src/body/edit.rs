@@ -44,6 +44,18 @@ impl Body {
         Ok(body)
     }
 
+    /// Moves the surface of a limb across its axis by `shift` (limb frame, metres) and multiplies its semi-axes by `girth`.
+    /// The limb frame moves with the surface; joints and sites stay where they are in space. A change that makes no solid is
+    /// not made.
+    pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, girth: f64) -> bool {
+        let shape = self.limbs[limb].shape;
+        let [a0, b0, a1, b1] = [shape.a0(), shape.b0(), shape.a1(), shape.b1()].map(|axis| axis * girth);
+        let Ok(shape) = TaperedEllipticCylinder::new(shape.length(), a0, b0, a1, b1) else { return false };
+        self.limbs[limb].shape = shape;
+        self.map_landmarks(limb, |_, position| position - shift);
+        true
+    }
+
     /// The body with a further limb joined to `parent`; its joint-facing proximal cap takes no matches.
     pub fn with_limb(
         &self,

@@ -1,0 +1,233 @@
+"""The compiled core. Arrays are NumPy; lengths in metres, times in seconds, angles in radians."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Protocol, final
+
+import numpy as np
+import numpy.typing as npt
+
+__version__: str
+
+_Points = npt.NDArray[np.float32] | npt.NDArray[np.float64]
+
+class _Camera(Protocol):
+    @property
+    def fx(self) -> float: ...
+    @property
+    def fy(self) -> float: ...
+    @property
+    def cx(self) -> float: ...
+    @property
+    def cy(self) -> float: ...
+    @property
+    def distorted(self) -> bool: ...
+    def rays(self) -> npt.NDArray[np.float32]: ...
+
+def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
+    """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""
+
+@final
+class TaperedEllipticCylinder:
+    """The shape of a limb: axis +z from z = 0 to z = length, semi-axes a along x and b along y, linear in z.
+
+    Raises:
+        BodyError: the numbers do not make a solid.
+    """
+
+    REGIONS: ClassVar[list[str]]
+    def __new__(cls, length: float, a0: float, b0: float, a1: float, b1: float) -> TaperedEllipticCylinder: ...
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+    @property
+    def a0(self) -> float:
+        """Semi-axis along x at the proximal end [m]."""
+    @property
+    def b0(self) -> float:
+        """Semi-axis along y at the proximal end [m]."""
+    @property
+    def a1(self) -> float:
+        """Semi-axis along x at the distal end [m]."""
+    @property
+    def b1(self) -> float:
+        """Semi-axis along y at the distal end [m]."""
+    def closest_point(
+        self, point: Sequence[float] | npt.NDArray[np.float64]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], float]:
+        """Closest surface point (3,), outward normal (3,) and signed distance of one point, all in the limb frame."""
+    def closest_points(self, points: _Points) -> ClosestPoints:
+        """Closest surface points of many points (N, 3) in the limb frame, by the tracker's SIMD kernel."""
+    def __eq__(self, other: object) -> bool: ...
+    def __ne__(self, other: object) -> bool: ...
+
+@final
+class ClosestPoints:
+    """Closest points (N, 3), outward normals (N, 3), signed distances (N,) and regions (N,), see REGIONS."""
+
+    @property
+    def points(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def normals(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def signed_distance(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def region(self) -> npt.NDArray[np.uint8]: ...
+
+@final
+class Body:
+    """A body as the core holds it; use voodoo.Body."""
+
+    def __new__(cls, name: str, limbs: Sequence[Any], sites: Sequence[Any]) -> Body: ...
+    @staticmethod
+    def human(stature: float) -> Body: ...
+    def scaled(self, factor: float) -> Body: ...
+    def parts(self) -> tuple[str, list[Any], list[Any]]: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __ne__(self, other: object) -> bool: ...
+
+@final
+class Frame:
+    """All measurements of one instant, from any number of sensors.
+
+    Arrays are referenced, not copied (unless they are not contiguous): leave them unchanged until the step.
+
+    Args:
+        stamp: time [s].
+    """
+
+    def __new__(cls, stamp: float) -> Frame: ...
+    @property
+    def stamp(self) -> float:
+        """Time [s]."""
+    def add_points(
+        self,
+        points: _Points,
+        *,
+        world_from_sensor: npt.ArrayLike | None = None,
+        weight: float = 1.0,
+        limb: str | None = None,
+        on_body: bool = False,
+        source: str = "points",
+    ) -> None:
+        """Add 3-D points (N, 3) [m] in the sensor's frame (K06 IV-A, first three kinds).
+
+        Args:
+            points: float32 or float64, finite.
+            world_from_sensor: rigid (4, 4); identity by default.
+            weight: weight of each point, above zero; a larger one costs no time.
+            limb: the points are known to be on this limb.
+            on_body: the points are known to be on the body.
+            source: name for the report in `Estimate.sources`.
+
+        Raises:
+            MeasurementError: wrong shape or dtype, or no rigid transform (finiteness is checked by the step).
+        """
+    def add_depth(
+        self,
+        image: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
+        *,
+        camera: _Camera,
+        metres_per_unit: float = 0.001,
+        world_from_sensor: npt.ArrayLike | None = None,
+        weight: float = 1.0,
+        source: str = "depth",
+    ) -> None:
+        """Add an organised depth image (height, width): distance along the optical axis, 0 or NaN where nothing returned.
+
+        Raises:
+            MeasurementError: wrong shape or dtype, or no rigid transform.
+        """
+    def add_position(
+        self,
+        site: str,
+        position: Sequence[float] | npt.NDArray[np.float64],
+        *,
+        weight: float = 1.0,
+        source: str = "positions",
+    ) -> None:
+        """Add the position (3,) [m] of a named site in the world (3-D point-to-point relation)."""
+    def add_ray(
+        self,
+        site: str,
+        *,
+        origin: Sequence[float] | npt.NDArray[np.float64],
+        direction: Sequence[float] | npt.NDArray[np.float64],
+        weight: float = 1.0,
+        source: str = "rays",
+    ) -> None:
+        """Add a ray in the world on which a named site was seen (2-D point-to-line relation)."""
+    def set_ground(self, *, normal: Sequence[float] | npt.NDArray[np.float64], offset: float = 0.0) -> None:
+        """Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background."""
+
+@final
+class Estimate:
+    """What a step found; immutable. World frame, metres, seconds."""
+
+    @property
+    def stamp(self) -> float:
+        """Time of the frame [s]; NaN after a reset."""
+    @property
+    def status(self) -> str:
+        """tracking, degraded (half of the limbs or more are carried by their joints only) or lost (nothing measured)."""
+    @property
+    def steps(self) -> int:
+        """ICP steps used."""
+    @property
+    def mean_squared_distance(self) -> float:
+        """Weighted mean of the squared distances of all measurements to the final pose [m^2]; NaN without any."""
+    @property
+    def residual(self) -> float:
+        """Root of the mean squared distance [m]."""
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the rows of joint_positions."""
+    @property
+    def limb_names(self) -> tuple[str, ...]:
+        """Names of the rows of limb_poses."""
+    @property
+    def joint_positions(self) -> npt.NDArray[np.float64]:
+        """Positions (J, 3) [m] of all joints and sites."""
+    @property
+    def limb_poses(self) -> npt.NDArray[np.float64]:
+        """world_from_limb (L, 4, 4) of all limbs."""
+    @property
+    def joints(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """Position (3,) [m] of every named joint and site."""
+    @property
+    def world_from_limb(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """Pose (4, 4) of every limb."""
+    @property
+    def limb_points(self) -> Mapping[str, int]:
+        """Matched points of every limb."""
+    @property
+    def limb_residual(self) -> Mapping[str, float]:
+        """Root of the mean squared distance of every limb's points [m]; NaN without any."""
+    @property
+    def joint_gaps(self) -> Mapping[str, float]:
+        """Distance between the two halves of every joint [m]."""
+    @property
+    def sources(self) -> Mapping[str, tuple[int, int, float]]:
+        """What each source gave: candidates, those that matched, root of their mean squared distance [m]."""
+
+class Tracker:
+    """The tracker of the core; use voodoo.Tracker."""
+
+    def __new__(cls, body: Body, values: Mapping[str, Any]) -> Tracker: ...
+    @property
+    def estimate(self) -> Estimate: ...
+    def _body(self) -> Body: ...
+    def _reset(self, joints: Mapping[str, tuple[float, float, float]], *, fit_sizes: bool = True) -> Estimate: ...
+    def _reset_pose(self, world_from_limb: Sequence[npt.NDArray[np.float64]]) -> Estimate: ...
+    def step(self, frame: Frame) -> Estimate: ...
+    def distance(self, points: _Points) -> npt.NDArray[np.float32]: ...
+    def scale(self, factor: float) -> None: ...
+    def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None: ...
+    def _add_limb(
+        self,
+        name: str,
+        parent: str,
+        shape: TaperedEllipticCylinder,
+        parts: Any,
+        sites: Sequence[tuple[str, tuple[float, float, float]]],
+    ) -> None: ...
+    def remove_limb(self, name: str) -> None: ...

@@ -1,0 +1,258 @@
+"""The tracked body: a tree of limbs with elastic-band joints and named sites; a TOML file describes it."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from voodoo import _core
+from voodoo._core import TaperedEllipticCylinder
+from voodoo.errors import BodyError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Vector = tuple[_Number, _Number, _Number]
+_ZERO = (0.0, 0.0, 0.0)
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _ShapeSpec(_Strict):
+    length: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    a0: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    b0: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    a1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    b1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
+class _PlaceSpec(_Strict):
+    position: _Vector = _ZERO
+    rotation: _Vector = _ZERO
+
+
+class Joint(_Strict):
+    """An elastic-band joint of a limb to its parent (K07 section 4).
+
+    Attributes:
+        name: usually that of the site at its centre.
+        on_parent: position [m] and rotation vector [rad] of the joint's ellipse in the parent's frame.
+        on_limb: the same in the limb's own frame.
+        semi_axes: semi-axes of the ellipse along the joint frame's x and y [m]: (0, 0) universal, one positive: hinge
+            about that axis, both positive: elliptic.
+        weight: strength relative to the other joints of a limb.
+    """
+
+    name: str
+    on_parent: _PlaceSpec = _PlaceSpec()
+    on_limb: _PlaceSpec = _PlaceSpec()
+    semi_axes: tuple[_Number, _Number] = (0.0, 0.0)
+    weight: _Number = 1.0
+
+    def parts(self) -> Any:
+        """The joint as the core takes it."""
+        places = [(place.position, place.rotation) for place in (self.on_parent, self.on_limb)]
+        return (self.name, *places, self.semi_axes, self.weight)
+
+
+class _LimbSpec(_Strict):
+    name: str
+    parent: str | None = None
+    shape: _ShapeSpec
+    joint: Joint | None = None
+    match_caps: tuple[bool, bool] = (False, True)
+
+
+class _SiteSpec(_Strict):
+    name: str
+    limb: str
+    position: _Vector
+
+
+class _BodySpec(_Strict):
+    name: str
+    limbs: list[_LimbSpec]
+    sites: list[_SiteSpec] = []
+
+
+@dataclass(frozen=True)
+class Limb:
+    """One rigid part: name, name of the parent (None for the root) and shape [m].
+
+    Its frame has z along the axis from the proximal end (z = 0) to the distal end (z = shape.length).
+    """
+
+    name: str
+    parent: str | None
+    shape: TaperedEllipticCylinder
+
+
+class Body:
+    """A body to track. Immutable; made by `human`, `load` or `from_toml`."""
+
+    def __init__(self, core: _core.Body) -> None:
+        """Wrap a body of the core; use `human`, `load` or `from_toml` instead."""
+        self._core = core
+        name, limbs, sites = core.parts()
+        self.name: str = name
+        self.limbs: tuple[Limb, ...] = tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in limbs)
+        self.site_names: tuple[str, ...] = tuple(site[0] for site in sites)
+
+    @property
+    def core(self) -> _core.Body:
+        """The body of the compiled core."""
+        return self._core
+
+    @property
+    def limb_names(self) -> tuple[str, ...]:
+        """Names of the limbs, parents first."""
+        return tuple(limb.name for limb in self.limbs)
+
+    @classmethod
+    def human(cls, height: float = 1.75) -> Body:
+        """The default human of ten limbs and nine joints (K06 III-C).
+
+        Args:
+            height: stature [m], 0.3 to 3.0.
+
+        Raises:
+            BodyError: the stature is out of range.
+        """
+        return cls(_core.Body.human(height))
+
+    @classmethod
+    def from_toml(cls, text: str, *, source: str = "body") -> Body:
+        """A body from TOML text; the format is that of `to_toml`, explained in docs/body.md.
+
+        Raises:
+            BodyError: it names the key, what was expected and what was found.
+        """
+        try:
+            values = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise BodyError(f"{source}: expected TOML, found a syntax error: {error}") from None
+        try:
+            spec = _BodySpec.model_validate(values)
+        except ValidationError as error:
+            raise BodyError(f"{source}: {_problems(values, error)}") from None
+        limbs = []
+        for limb in spec.limbs:
+            shape = limb.shape
+            try:
+                cylinder = TaperedEllipticCylinder(shape.length, shape.a0, shape.b0, shape.a1, shape.b1)
+            except BodyError as error:
+                raise BodyError(f"{source}: limbs.{limb.name}.shape: {error}") from None
+            joint = None if limb.joint is None else limb.joint.parts()
+            limbs.append((limb.name, limb.parent, cylinder, joint, limb.match_caps))
+        sites = [(site.name, site.limb, site.position) for site in spec.sites]
+        try:
+            return cls(_core.Body(spec.name, limbs, sites))
+        except BodyError as error:
+            raise BodyError(f"{source}: {error}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Body:
+        """A body from a TOML file."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise BodyError(f"{path}: expected a readable TOML file, found: {error}") from None
+        return cls.from_toml(text, source=str(path))
+
+    def scaled(self, factor: float) -> Body:
+        """The body with all lengths multiplied by a factor."""
+        return Body(self._core.scaled(factor))
+
+    def to_toml(self) -> str:
+        """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
+        name, limbs, sites = self._core.parts()
+        lines = [f'name = "{name}"']
+        for limb, parent, shape, joint, match_caps in limbs:
+            lines += ["", "[[limbs]]", f'name = "{limb}"']
+            lines += [f'parent = "{parent}"'] if parent is not None else []
+            sizes = {key: getattr(shape, key) for key in ("length", "a0", "b0", "a1", "b1")}
+            lines.append("shape = { " + ", ".join(f"{key} = {_number(value)}" for key, value in sizes.items()) + " }")
+            lines.append(f"match_caps = [{', '.join(str(flag).lower() for flag in match_caps)}]")
+            if joint is not None:
+                joint_name, on_parent, on_limb, semi_axes, weight = joint
+                lines += ["[limbs.joint]", f'name = "{joint_name}"', f"on_parent = {_place(on_parent)}"]
+                lines += [f"on_limb = {_place(on_limb)}", f"semi_axes = {_vector(semi_axes)}"]
+                lines.append(f"weight = {_number(weight)}")
+        for site, limb, position in sites:
+            lines += ["", "[[sites]]", f'name = "{site}"', f'limb = "{limb}"', f"position = {_vector(position)}"]
+        return "\n".join(lines) + "\n"
+
+    def __eq__(self, other: object) -> bool:
+        """Equal when every limb, joint and site is."""
+        return isinstance(other, Body) and bool(self._core == other._core)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Name and counts."""
+        return f"Body(name={self.name!r}, limbs={len(self.limbs)}, sites={len(self.site_names)})"
+
+
+def checked_joints(joints: Mapping[str, Sequence[float]], *, what: str = "joints") -> dict[str, tuple[float, float, float]]:
+    """Positions by name as plain numbers.
+
+    Raises:
+        BodyError: an entry is not three finite numbers; it names the entry.
+    """
+    checked = {}
+    for name, position in joints.items():
+        try:
+            x, y, z = (float(value) for value in np.asarray(position, dtype=np.float64).reshape(-1))
+        except (TypeError, ValueError):
+            raise BodyError(f"{what}[{name}]: expected three numbers in metres, found {position!r}") from None
+        if not all(map(math.isfinite, (x, y, z))):
+            raise BodyError(f"{what}[{name}]: expected finite metres, found {position!r}")
+        checked[name] = (x, y, z)
+    return checked
+
+
+def _problems(values: dict[str, Any], error: ValidationError) -> str:
+    def key(location: tuple[str | int, ...]) -> str:
+        parts: list[str] = []
+        node: Any = values
+        for part in location:
+            node = node[part] if isinstance(node, (dict, list)) and _has(node, part) else None
+            name = node.get("name") if isinstance(part, int) and isinstance(node, dict) else None
+            parts.append(str(name if isinstance(name, str) else part))
+        return ".".join(parts)
+
+    found = [f"{key(item['loc'])}: {item['msg'].lower()}, found {_short(item['input'])}" for item in error.errors()]
+    return "; ".join(found)
+
+
+def _has(node: dict[str, Any] | list[Any], part: str | int) -> bool:
+    return part in node if isinstance(node, dict) else isinstance(part, int) and part < len(node)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) < 80 else text[:77] + "..."
+
+
+def _number(value: float) -> str:
+    return repr(round(value, 9) + 0.0)
+
+
+def _vector(values: Sequence[float]) -> str:
+    return "[" + ", ".join(_number(value) for value in values) + "]"
+
+
+def _place(place: tuple[Sequence[float], Sequence[float]]) -> str:
+    return f"{{ position = {_vector(place[0])}, rotation = {_vector(place[1])} }}"

@@ -1,0 +1,105 @@
+"""The parameters of the tracker: one schema, defined in the core, validated and documented here."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from voodoo import _core
+from voodoo.errors import ConfigError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_FIELDS = {name: row for name, *row in _core.config_fields()}
+
+
+def _annotation(default: object, limits: tuple[float, float] | None, words: list[str]) -> Any:
+    if words:
+        return Literal[tuple(words)]
+    if limits is None:
+        return type(default)
+    return Annotated[type(default), Field(ge=limits[0], le=limits[1])]
+
+
+class _Base(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False, allow_inf_nan=False)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise ConfigError(_message("Config", error)) from None
+
+
+def _message(what: str, error: ValidationError) -> str:
+    problems = []
+    for item in error.errors():
+        key = ".".join(str(part) for part in item["loc"])
+        if item["type"] == "extra_forbidden":
+            problems.append(f"{key}: unknown key; known are {', '.join(_FIELDS)}")
+        else:
+            problems.append(f"{key}: {item['msg'][0].lower()}{item['msg'][1:]}, found {item['input']!r}")
+    return f"{what}: " + "; ".join(problems)
+
+
+_Model: Any = create_model(
+    "_Model",
+    __base__=_Base,
+    **{name: (_annotation(row[2], row[3], row[4]), row[2]) for name, row in _FIELDS.items()},
+)
+
+
+class Config(_Model):
+    """Frozen parameters of a tracker, given by keyword; `Config().to_toml()` explains every one.
+
+    Raises:
+        ConfigError: unknown key, wrong type or out of range; it names the key.
+    """
+
+    @classmethod
+    def from_toml(cls, text: str, *, source: str = "configuration") -> Config:
+        """A configuration from TOML text; keys that are not there keep their defaults."""
+        try:
+            values = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise ConfigError(f"{source}: expected TOML, found a syntax error: {error}") from None
+        try:
+            return cls(**values)
+        except ConfigError as error:
+            raise ConfigError(f"{source}: {error}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Config:
+        """A configuration from a TOML file."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigError(f"{path}: expected a readable TOML file, found: {error}") from None
+        return cls.from_toml(text, source=str(path))
+
+    def to_toml(self) -> str:
+        """The configuration as TOML, each entry with its meaning, unit and range."""
+        lines = ["# Configuration of the voodoo tracker. Lengths in metres, times in seconds, angles in radians.", ""]
+        for name, (doc, unit, _, limits, words) in _FIELDS.items():
+            lines += [f"# {line}" for line in doc.splitlines()]
+            facts = [f"unit: {unit}"] if unit else []
+            if limits:
+                facts.append(f"range: {limits[0]:g} to {limits[1]:g}")
+            if words:
+                facts.append("one of: " + ", ".join(words))
+            if facts:
+                lines.append(f"# ({'; '.join(facts)})")
+            value = getattr(self, name)
+            text = f'"{value}"' if isinstance(value, str) else str(value).lower()
+            lines += [f"{name} = {text}", ""]
+        return "\n".join(lines)
+
+    def values(self) -> dict[str, float | int | bool | str]:
+        """Plain values by key."""
+        return dict(self.model_dump())

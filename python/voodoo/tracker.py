@@ -1,0 +1,115 @@
+"""The tracker as Python holds it: names, defaults and validation around the compiled core."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo import _core
+from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
+from voodoo.body import Body, Joint, checked_joints
+from voodoo.config import Config
+
+
+class Tracker:
+    """Follows one body through frames.
+
+    Args:
+        body: what to track, in its initial sizes.
+        config: parameters; the defaults are the measured ones.
+    """
+
+    def __init__(self, body: Body, *, config: Config | None = None) -> None:
+        """Make a tracker without a pose; `reset` gives it one."""
+        self.config = Config() if config is None else config
+        self._core = _core.Tracker(body.core, self.config.values())
+
+    @property
+    def body(self) -> Body:
+        """The body with its current sizes."""
+        return Body(self._core._body())
+
+    @property
+    def estimate(self) -> Estimate:
+        """The last estimate."""
+        return self._core.estimate
+
+    def reset(self, *, joints: Mapping[str, Sequence[float]], fit_sizes: bool = True) -> Estimate:
+        """Set the pose, and the sizes, from positions of named joints and sites; time may start anew afterwards.
+
+        Args:
+            joints: site name -> (x, y, z) [m] in the world frame. Any subset that fixes the pose: at least three
+                positions that do not lie on a line. Limbs the positions do not reach keep their rest orientation.
+            fit_sizes: also scale the body and stretch its limbs to the distances between the positions.
+
+        Raises:
+            BodyError: an unknown name, or an entry that is not three finite numbers.
+            MeasurementError: the positions do not fix the pose.
+        """
+        return self._core._reset(checked_joints(joints), fit_sizes=fit_sizes)
+
+    def reset_pose(self, world_from_limb: Mapping[str, npt.ArrayLike]) -> Estimate:
+        """Set the pose of every limb directly: limb name -> rigid (4, 4).
+
+        Raises:
+            BodyError: a limb is missing or unknown.
+            MeasurementError: a matrix is not rigid.
+        """
+        from voodoo.errors import BodyError
+
+        names = self.body.limb_names
+        if set(world_from_limb) != set(names):
+            raise BodyError(f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(world_from_limb)}")
+        return self._core._reset_pose([np.asarray(world_from_limb[name], dtype=np.float64) for name in names])
+
+    def step(self, frame: Frame) -> Estimate:
+        """The pose at the frame's time. Releases the GIL; a refused frame leaves the tracker as it was.
+
+        Raises:
+            MeasurementError: no pose yet, time not after the last frame, or a measurement that cannot be used.
+            BodyError: the frame names a limb or site that is not in the body.
+        """
+        return self._core.step(frame)
+
+    def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+        """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside."""
+        return self._core.distance(points)
+
+    def scale(self, factor: float) -> None:
+        """Scale the whole body without losing the track."""
+        self._core.scale(factor)
+
+    def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None:
+        """Change the dimensions of one limb without losing the track."""
+        self._core.set_shape(limb, shape)
+
+    def add_limb(
+        self,
+        name: str,
+        *,
+        parent: str,
+        shape: TaperedEllipticCylinder,
+        joint: Joint,
+        sites: Mapping[str, Sequence[float]] | None = None,
+    ) -> None:
+        """Add a limb (a held box) without losing the track; it starts with its joint closed and at rest.
+
+        Args:
+            name: its name, new in the body.
+            parent: the limb it is joined to.
+            shape: its surface.
+            joint: where it is joined.
+            sites: named points on it: name -> position [m] in the new limb's frame.
+        """
+        places = list(checked_joints(sites or {}, what="sites").items())
+        self._core._add_limb(name, parent, shape, joint.parts(), places)
+
+    def remove_limb(self, name: str) -> None:
+        """Remove a limb, and all that hangs on it, without losing the track."""
+        self._core.remove_limb(name)
+
+    def __repr__(self) -> str:
+        """Body, limbs and last estimate."""
+        return repr(self._core)
