@@ -11,12 +11,12 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from voodoo.errors import RecordingError, reading
+from voodoo.recordings.ros_messages import Message
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -44,6 +44,7 @@ class Bag:
     """
 
     def __init__(self, path: Path) -> None:
+        """Unpack if need be, and read the index."""
         self.path = path
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
         folder = path
@@ -63,7 +64,7 @@ class Bag:
             self.start_time: int = reader.start_time
             self.end_time: int = reader.end_time
 
-    def read(self, topics: Collection[str]) -> Iterator[tuple[str, Any]]:
+    def read(self, topics: Collection[str]) -> Iterator[tuple[str, Message]]:
         """Messages of `topics` in the order they were recorded, as (topic, message).
 
         Raises:
@@ -82,7 +83,7 @@ class Bag:
                     " (metadata.yaml and storage file may disagree; opening the storage file itself skips the former)"
                 )
 
-    def first(self, topic: str) -> Any:
+    def first(self, topic: str) -> Message:
         """The first message of `topic`.
 
         Raises:
@@ -93,14 +94,14 @@ class Bag:
                 return message
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
 
-    def last(self, topic: str) -> Any:
+    def last(self, topic: str) -> Message:
         """The last message of `topic`; looks at the end of the bag first."""
         found = None
         with self._open() as reader:
             for seconds in (1, 10, None):
                 start = None if seconds is None else self.end_time - seconds * 1_000_000_000
-                for _, found in self._messages(reader, [topic], start):
-                    pass
+                for _, message in self._messages(reader, [topic], start):
+                    found = message
                 if found is not None:
                     return found
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
@@ -116,7 +117,7 @@ class Bag:
         finally:
             reader.close()
 
-    def _messages(self, reader: AnyReader, topics: Collection[str], start: int | None) -> Iterator[tuple[str, Any]]:
+    def _messages(self, reader: AnyReader, topics: Collection[str], start: int | None) -> Iterator[tuple[str, Message]]:
         connections = [connection for connection in reader.connections if connection.topic in topics]
         if not connections:
             return

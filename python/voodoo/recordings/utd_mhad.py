@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.io
+import scipy.io  # type: ignore[import-untyped]
 
 from voodoo.camera import Camera
 from voodoo.errors import RecordingError, reading
@@ -63,6 +63,7 @@ class UtdMhadRecording(Recording):
     """
 
     def __init__(self, path: Path) -> None:
+        """Read depth and skeleton; see the class."""
         self.path = path
         self.name = path.name.removesuffix("_depth.mat").removesuffix(".mat")
         self.root_frame = FRAME
