@@ -87,6 +87,7 @@ class RosRecording(Recording):
         self.path = path
         self._metres_per_unit = metres_per_unit
         self._bag = Bag(path)
+        self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices: dict[Kind, TopicChoice] = {
             "depth": depth_topic,
             "points": points_topic,
@@ -147,7 +148,7 @@ class RosRecording(Recording):
         return RecordingInfo(
             name=self.name,
             path=self.path,
-            loader="ros2" if self._bag.is_ros2 else "ros1",
+            loader=self.loader,
             frames=len(self),
             start_stamp=self._driver.first_stamp,
             duration=duration,

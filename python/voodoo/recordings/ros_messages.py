@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.camera import Camera
-from voodoo.errors import RecordingError
+from voodoo.errors import CameraError, RecordingError
 from voodoo.recordings.measurements import FloatArray
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 
@@ -58,8 +58,8 @@ def camera_of(info: Message, topic: str, source: str) -> Camera:
     image_rect and the like are rectified images: there P counts, not K and D.
 
     Raises:
-        RecordingError: binning or a region of interest, which are not supported.
-        CameraError: uncalibrated, or numbers that make no camera.
+        RecordingError: uncalibrated, numbers that make no camera, or binning or a region of interest, which are not
+            supported.
     """
     names = ("K", "D", "P") if hasattr(info, "K") else ("k", "d", "p")
     k, d, p = (getattr(info, name) for name in names)
@@ -70,9 +70,12 @@ def camera_of(info: Message, topic: str, source: str) -> Camera:
             f"and a region of interest at ({region.x_offset}, {region.y_offset})"
         )
     rectified = "rect" in base_topic(topic).rsplit("/", 1)[-1]
-    return Camera.from_camera_info(
-        width=info.width, height=info.height, k=k, d=d, model=info.distortion_model, p=p, rectified=rectified
-    )
+    try:
+        return Camera.from_camera_info(
+            width=info.width, height=info.height, k=k, d=d, model=info.distortion_model, p=p, rectified=rectified
+        )
+    except CameraError as error:
+        raise RecordingError(f"{source}: {error}") from error
 
 
 def depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[Any]:
