@@ -72,7 +72,8 @@ class Camera:
         if len(coefficients) not in _COEFFICIENTS[self.model]:
             counts = " or ".join(map(str, _COEFFICIENTS[self.model]))
             raise CameraError(
-                f"camera distortion: {self.model} takes {counts} coefficients, found {len(coefficients)}: {coefficients}"
+                f"camera distortion: expected {counts} coefficients for {self.model}, "
+                f"found {len(coefficients)}: {coefficients}"
             )
         # For both polynomial models zeros mean "no lens distortion"; for the equidistant one they mean a pure
         # equidistant lens, which is not a pinhole, so they have to stay.

@@ -16,7 +16,7 @@ from voodoo.recordings.measurements import FloatArray
 if sys.version_info >= (3, 11):
     import tomllib
 else:
-    import tomli as tomllib
+    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
 
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
@@ -98,7 +98,7 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
     return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where))
 
 
-def _pose(rows: Any, where: str) -> FloatArray:
+def _pose(rows: object, where: str) -> FloatArray:
     if rows is None:
         return np.eye(4)
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 from voodoo.errors import RecordingError, reading
@@ -53,6 +54,7 @@ class FolderRecording(Recording):
     """
 
     def __init__(self, path: Path, *, calibration: str | Path | None = None) -> None:
+        """List the images; see the class."""
         if not path.is_dir():
             raise RecordingError(f"{path}: expected a folder with depth/ and calibration.toml, found no folder")
         self.path = path
@@ -133,7 +135,7 @@ def _listing(path: Path, name: str, suffixes: tuple[str, ...]) -> list[tuple[flo
     elif (path / name).is_dir():
         files = [file for file in (path / name).iterdir() if file.suffix.lower() in suffixes]
         entries = sorted((_stamp(file.stem, str(file)), file) for file in files)
-    for (before, _), (after, file) in zip(entries, entries[1:], strict=False):
+    for (before, _), (after, file) in pairwise(entries):
         if after <= before:
             raise RecordingError(f"{file}: expected a stamp after {before:.6f}, found {after:.6f}")
     return entries

@@ -56,7 +56,12 @@ def open_recording(path: str | Path, *, loader: str | None = None, **options: An
         raise RecordingError(
             f"loader {name!r} has no option {', '.join(unknown)}; its options: {', '.join(known) or 'none'}"
         )
-    return LOADERS[name].open(path, **options)
+    recording = LOADERS[name].open(path, **options)
+    if isinstance(recording, RosRecording) and recording.loader != name:
+        raise RecordingError(
+            f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {recording.loader!r}"
+        )
+    return recording
 
 
 def guess_loader(path: Path) -> str:

@@ -52,7 +52,7 @@ def decode_depth_png(data: bytes, source: object) -> npt.NDArray[np.uint16]:
         raise RecordingError(
             f"{source}: expected a 16-bit single-channel PNG, found shape {image.shape} of {image.dtype}"
         )
-    return image
+    return image.astype(np.uint16, copy=False)
 
 
 def decode_color(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArray[np.uint8]:

@@ -41,7 +41,8 @@ class Reference:
 
     def __repr__(self) -> str:
         """One line with the counts."""
-        return f"Reference({len(self.stamps)} stamps, {len(self.names)} joints, {'exact' if self.exact else 'estimated'})"
+        kind = "exact" if self.exact else "estimated"
+        return f"Reference({len(self.stamps)} stamps, {len(self.names)} joints, {kind})"
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading
 from voodoo.recordings.measurements import (
@@ -19,6 +21,7 @@ from voodoo.recordings.measurements import (
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, reference_words
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
+    Message,
     camera_of,
     cloud_points,
     color_image,
@@ -74,9 +77,9 @@ class RosRecording(Recording):
         metres_per_unit: float = 0.001,
         tf_max_age: float = 0.5,
     ) -> None:
-        use = (use,) if isinstance(use, str) else tuple(use)
-        if not use or not set(use) <= set(KINDS):
-            raise RecordingError(f"use: expected some of {', '.join(KINDS)}, found {use!r}")
+        """Survey topics and transforms; see the class."""
+        if isinstance(use, str) or not use or not set(use) <= set(KINDS):
+            raise RecordingError(f"use: expected a tuple of some of {', '.join(KINDS)}, found {use!r}")
         if not metres_per_unit > 0.0 or not tf_max_age >= 0.0:
             raise RecordingError(
                 f"expected metres_per_unit > 0 and tf_max_age >= 0, found {metres_per_unit!r} and {tf_max_age!r}"
@@ -84,6 +87,7 @@ class RosRecording(Recording):
         self.path = path
         self._metres_per_unit = metres_per_unit
         self._bag = Bag(path)
+        self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices: dict[Kind, TopicChoice] = {
             "depth": depth_topic,
             "points": points_topic,
@@ -99,8 +103,7 @@ class RosRecording(Recording):
         self._sources = {s.topic: s for s in sources if self._connected(s, optional=color_topic is None)}
 
         place = path if path.suffix == ".zip" else self._bag.file
-        folder = place.parent if place.is_file() or place.name == "bag" else place
-        self.name = place.stem if place.is_file() and find_beside(place, "truth.csv") is None else folder.name
+        self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         truth, start = find_beside(place, "truth.csv"), find_beside(place, "init.json")
         self.reference = None if truth is None else read_truth(truth, self._root_from_truth)
         self.start = None if start is None else read_start(start, self._root_from_truth(self._driver.first_stamp))
@@ -131,22 +134,27 @@ class RosRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize; reads the first and last message of every topic in use."""
-        ends = {s.topic: stamp_of(self._bag.last(s.topic), f"{self.path}, topic {s.topic}") for s in self._sources.values()}
-        sensors = tuple(
-            SensorInfo(s.topic, s.kind, s.frame, s.messages, mean_rate(s.messages, ends[s.topic] - s.first_stamp), s.detail)
-            for s in self._sources.values()
-        )
-        duration = ends[self._driver.topic] - self._driver.first_stamp
+        sensors = []
+        duration = 0.0
+        for source in self._sources.values():
+            where = f"{self.path}, topic {source.topic}"
+            last = self._bag.last(source.topic)
+            with reading(where, "a readable message"):
+                span = stamp_of(last, where) - source.first_stamp
+            if source is self._driver:
+                duration = span
+            rate = mean_rate(source.messages, span)
+            sensors.append(SensorInfo(source.topic, source.kind, source.frame, source.messages, rate, source.detail))
         return RecordingInfo(
             name=self.name,
             path=self.path,
-            loader="ros2" if self._bag.is_ros2 else "ros1",
+            loader=self.loader,
             frames=len(self),
             start_stamp=self._driver.first_stamp,
             duration=duration,
             rate_hz=mean_rate(len(self), duration),
             root_frame=self.root_frame,
-            sensors=sensors,
+            sensors=tuple(sensors),
             unused=tuple(self._unused),
             reference=reference_words(self.reference),
         )
@@ -176,7 +184,8 @@ class RosRecording(Recording):
         return True
 
     def _connected(self, source: Source, *, optional: bool) -> bool:
-        if optional and source.kind == "color" and source is not self._driver and not self._reaches(self.root_frame, source.frame):
+        optional = optional and source.kind == "color" and source is not self._driver
+        if optional and not self._reaches(self.root_frame, source.frame):
             self._unused.append((source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
             return False
         self._tree.path(self.root_frame, source.frame)
@@ -185,7 +194,7 @@ class RosRecording(Recording):
     def _root_from_truth(self, stamp: float) -> FloatArray:
         return self._tree.lookup(self.root_frame, TRUTH_FRAME, stamp)
 
-    def _check_calibration(self, topic: str, message: Any) -> None:
+    def _check_calibration(self, topic: str, message: Message) -> None:
         for source in self._sources.values():
             if source.info_topic == topic:
                 camera = camera_of(message, source.topic, f"{self.path}, topic {topic}")
@@ -194,7 +203,7 @@ class RosRecording(Recording):
                         f"{self.path}, topic {topic}: expected one calibration, found {camera} after {source.camera}"
                     )
 
-    def _measurement(self, source: Source, message: Any, stamp: float, where: str) -> Measurement:
+    def _measurement(self, source: Source, message: Message, stamp: float, where: str) -> Measurement:
         root_from_sensor = self._tree.lookup(self.root_frame, frame_of(message), stamp)
         camera, compressed = source.camera, source.type == COMPRESSED
         if source.kind == "scan":
@@ -208,7 +217,7 @@ class RosRecording(Recording):
             scale = self._metres_per_unit if image.dtype.kind == "u" else 1.0
             return DepthImage(source.topic, stamp, image, scale, camera, root_from_sensor)
 
-        def decode() -> Any:
+        def decode() -> npt.NDArray[np.uint8]:
             with reading(where, "a readable picture"):
                 return (compressed_color_image if compressed else color_image)(message, camera, where)
 

@@ -11,12 +11,13 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
 from voodoo.errors import RecordingError, reading
+from voodoo.recordings.ros_messages import Message
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -44,6 +45,7 @@ class Bag:
     """
 
     def __init__(self, path: Path) -> None:
+        """Unpack if need be, and read the index."""
         self.path = path
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
         folder = path
@@ -56,14 +58,15 @@ class Bag:
             if part.suffix == ".mcap":
                 check_mcap(part)
         with self._open() as reader:
-            self.is_ros2: bool = reader.is2
-            self.topics = tuple(
-                Topic(name, str(item.msgtype), item.msgcount) for name, item in sorted(reader.topics.items())
-            )
-            self.start_time: int = reader.start_time
-            self.end_time: int = reader.end_time
+            with reading(self.path, "the index of a ROS bag"):
+                self.is_ros2: bool = reader.is2
+                self.topics = _topics(reader)
+                self.start_time: int = reader.start_time
+                self.end_time: int = reader.end_time
+        if self.file.is_dir():
+            self._check_metadata()
 
-    def read(self, topics: Collection[str]) -> Iterator[tuple[str, Any]]:
+    def read(self, topics: Collection[str]) -> Iterator[tuple[str, Message]]:
         """Messages of `topics` in the order they were recorded, as (topic, message).
 
         Raises:
@@ -79,10 +82,9 @@ class Bag:
             if count != announced[name]:
                 raise RecordingError(
                     f"{self.path}: expected {announced[name]} messages on {name} as the bag's index says, found {count}"
-                    " (metadata.yaml and storage file may disagree; opening the storage file itself skips the former)"
                 )
 
-    def first(self, topic: str) -> Any:
+    def first(self, topic: str) -> Message:
         """The first message of `topic`.
 
         Raises:
@@ -93,30 +95,47 @@ class Bag:
                 return message
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
 
-    def last(self, topic: str) -> Any:
+    def last(self, topic: str) -> Message:
         """The last message of `topic`; looks at the end of the bag first."""
         found = None
         with self._open() as reader:
             for seconds in (1, 10, None):
                 start = None if seconds is None else self.end_time - seconds * 1_000_000_000
-                for _, found in self._messages(reader, [topic], start):
-                    pass
+                for _, message in self._messages(reader, [topic], start):
+                    found = message
                 if found is not None:
                     return found
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
 
+    def _check_metadata(self) -> None:
+        """Compare metadata.yaml with the storage files: what only one of them knows would be left out in silence."""
+        stored: dict[tuple[str, str], int] = {}
+        for part in sorted(self.file.iterdir()):
+            if part.suffix in (".mcap", ".db3"):
+                with reading(part, "a complete ROS bag"), AnyReader([part], default_typestore=_typestore()) as reader:
+                    for topic in _topics(reader):
+                        key = (topic.name, topic.type)
+                        stored[key] = stored.get(key, 0) + topic.messages
+        announced = {(topic.name, topic.type): topic.messages for topic in self.topics}
+        for name, kind in sorted(stored.keys() | announced.keys()) if stored else ():
+            expected, found = announced.get((name, kind), 0), stored.get((name, kind), 0)
+            if expected != found:
+                raise RecordingError(
+                    f"{self.file / 'metadata.yaml'}: expected {found} messages on {name} ({kind}) as in the storage file, "
+                    f"found {expected} (`ros2 bag reindex` repairs it, or open the storage file itself)"
+                )
+
     @contextmanager
     def _open(self) -> Iterator[AnyReader]:
         with reading(self.path, "a complete ROS bag"):
-            # Bags of older ROS 2 releases carry no message definitions; those used here are the same in all of them.
-            reader = AnyReader([self.file], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            reader = AnyReader([self.file], default_typestore=_typestore())
             reader.open()
         try:
             yield reader
         finally:
             reader.close()
 
-    def _messages(self, reader: AnyReader, topics: Collection[str], start: int | None) -> Iterator[tuple[str, Any]]:
+    def _messages(self, reader: AnyReader, topics: Collection[str], start: int | None) -> Iterator[tuple[str, Message]]:
         connections = [connection for connection in reader.connections if connection.topic in topics]
         if not connections:
             return
@@ -130,6 +149,15 @@ class Bag:
             with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
                 message = reader.deserialize(raw, connection.msgtype)
             yield connection.topic, message
+
+
+def _typestore() -> Typestore:
+    """Bags of older ROS 2 releases carry no message definitions; those used here are the same in all releases."""
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def _topics(reader: AnyReader) -> tuple[Topic, ...]:
+    return tuple(Topic(name, str(item.msgtype), item.msgcount) for name, item in sorted(reader.topics.items()))
 
 
 def find_bag(folder: Path) -> Path:

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.camera import Camera
-from voodoo.errors import RecordingError
+from voodoo.errors import CameraError, RecordingError
 from voodoo.recordings.measurements import FloatArray
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 
-DEPTH_ENCODINGS = {"16UC1": np.dtype(np.uint16), "mono16": np.dtype(np.uint16), "32FC1": np.dtype(np.float32)}
+Message: TypeAlias = Any
+"""A message as rosbags gives it; its class is generated from the definition in the bag."""
+
+DEPTH_ENCODINGS: dict[str, np.dtype[Any]] = {
+    "16UC1": np.dtype(np.uint16),
+    "mono16": np.dtype(np.uint16),
+    "32FC1": np.dtype(np.float32),
+}
 """16-bit depth counts millimetres (REP-118), 32-bit float depth metres."""
 COLOR_CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "8UC3": 3, "8UC4": 4, "mono8": 1, "8UC1": 1}
 
@@ -21,7 +28,7 @@ COLOR_CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "8UC3": 3, "8UC4
 _POINT_FIELDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
-def stamp_of(message: Any, source: str) -> float:
+def stamp_of(message: Message, source: str) -> float:
     """Header stamp in seconds; double precision keeps about 0.2 microseconds of a Unix time's nanoseconds.
 
     Raises:
@@ -35,7 +42,7 @@ def stamp_of(message: Any, source: str) -> float:
     return float(stamp.sec) + float(stamp.nanosec) * 1e-9
 
 
-def frame_of(message: Any) -> str:
+def frame_of(message: Message) -> str:
     """frame_id of the header, without the leading slash ROS 1 sometimes writes."""
     return str(message.header.frame_id).lstrip("/")
 
@@ -45,14 +52,14 @@ def base_topic(topic: str) -> str:
     return topic.removesuffix("/compressedDepth").removesuffix("/compressed")
 
 
-def camera_of(info: Any, topic: str, source: str) -> Camera:
+def camera_of(info: Message, topic: str, source: str) -> Camera:
     """Camera of a CameraInfo message, for the images on `topic`.
 
     image_rect and the like are rectified images: there P counts, not K and D.
 
     Raises:
-        RecordingError: binning or a region of interest, which are not supported.
-        CameraError: uncalibrated, or numbers that make no camera.
+        RecordingError: uncalibrated, numbers that make no camera, or binning or a region of interest, which are not
+            supported.
     """
     names = ("K", "D", "P") if hasattr(info, "K") else ("k", "d", "p")
     k, d, p = (getattr(info, name) for name in names)
@@ -63,12 +70,15 @@ def camera_of(info: Any, topic: str, source: str) -> Camera:
             f"and a region of interest at ({region.x_offset}, {region.y_offset})"
         )
     rectified = "rect" in base_topic(topic).rsplit("/", 1)[-1]
-    return Camera.from_camera_info(
-        width=info.width, height=info.height, k=k, d=d, model=info.distortion_model, p=p, rectified=rectified
-    )
+    try:
+        return Camera.from_camera_info(
+            width=info.width, height=info.height, k=k, d=d, model=info.distortion_model, p=p, rectified=rectified
+        )
+    except CameraError as error:
+        raise RecordingError(f"{source}: {error}") from error
 
 
-def depth_image(message: Any, camera: Camera, source: str) -> npt.NDArray[Any]:
+def depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[Any]:
     """(H, W) uint16 or float32 of a raw sensor_msgs/Image.
 
     Raises:
@@ -81,11 +91,12 @@ def depth_image(message: Any, camera: Camera, source: str) -> npt.NDArray[Any]:
         )
     rows = _rows(message, dtype.itemsize, source)
     _check_size(message.width, message.height, camera, source)
-    order = ">" if message.is_bigendian else "<"
-    return np.ascontiguousarray(rows).view(dtype.newbyteorder(order)).astype(dtype, copy=False)
+    order: Literal["<", ">"] = ">" if message.is_bigendian else "<"
+    image: npt.NDArray[Any] = np.ascontiguousarray(rows).view(dtype.newbyteorder(order)).astype(dtype, copy=False)
+    return image
 
 
-def compressed_depth_image(message: Any, camera: Camera, source: str) -> npt.NDArray[Any]:
+def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[Any]:
     """(H, W) uint16 or float32 of a sensor_msgs/CompressedImage written by compressed_depth_image_transport.
 
     The PNG follows a header of 12 bytes (a format number and two floats A, B); 32FC1 images are stored as
@@ -112,7 +123,7 @@ def compressed_depth_image(message: Any, camera: Camera, source: str) -> npt.NDA
     return image
 
 
-def color_image(message: Any, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+def color_image(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image.
 
     Raises:
@@ -130,12 +141,12 @@ def color_image(message: Any, camera: Camera, source: str) -> npt.NDArray[np.uin
     return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
 
 
-def compressed_color_image(message: Any, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+def compressed_color_image(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
     """(H, W, 3) BGR uint8 of a JPEG or PNG sensor_msgs/CompressedImage."""
     return decode_color(message.data.tobytes(), source, (camera.width, camera.height))
 
 
-def cloud_points(message: Any, source: str) -> FloatArray:
+def cloud_points(message: Message, source: str) -> FloatArray:
     """(N, 3) of a sensor_msgs/PointCloud2 with any field layout; rows that are not finite are dropped.
 
     Raises:
@@ -168,10 +179,11 @@ def cloud_points(message: Any, source: str) -> FloatArray:
     )
     view = np.ndarray((height, width), layout, buffer=message.data.tobytes(), strides=(row_step, step))
     points = np.stack([view[name].astype(np.float64).ravel() for name in "xyz"], axis=1)
-    return points[np.isfinite(points).all(axis=1)]
+    kept: FloatArray = points[np.isfinite(points).all(axis=1)]
+    return kept
 
 
-def scan_fields(message: Any, source: str) -> dict[str, Any]:
+def scan_fields(message: Message, source: str) -> dict[str, Any]:
     """Ranges and geometry of a sensor_msgs/LaserScan, as keyword arguments of LaserScan.
 
     Raises:
@@ -190,7 +202,7 @@ def scan_fields(message: Any, source: str) -> dict[str, Any]:
     return {"ranges": message.ranges.astype(np.float32), **numbers}
 
 
-def _rows(message: Any, pixel_bytes: int, source: str) -> npt.NDArray[np.uint8]:
+def _rows(message: Message, pixel_bytes: int, source: str) -> npt.NDArray[np.uint8]:
     """(H, W * pixel_bytes) bytes without the padding at the end of the rows."""
     height, width, step = int(message.height), int(message.width), int(message.step)
     wanted = width * pixel_bytes

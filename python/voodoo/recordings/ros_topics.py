@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 from voodoo.camera import Camera
 from voodoo.errors import RecordingError, reading
 from voodoo.recordings.ros_bag import Bag
-from voodoo.recordings.ros_messages import COLOR_CHANNELS, DEPTH_ENCODINGS, base_topic, camera_of, frame_of, stamp_of
+from voodoo.recordings.ros_messages import (
+    COLOR_CHANNELS,
+    DEPTH_ENCODINGS,
+    Message,
+    base_topic,
+    camera_of,
+    frame_of,
+    stamp_of,
+)
 
 Kind: TypeAlias = Literal["depth", "points", "scan", "color"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -55,12 +63,13 @@ class TopicFinder:
     """
 
     def __init__(self, bag: Bag, *, choices: dict[Kind, TopicChoice], camera_info_topic: str | None) -> None:
+        """Look at nothing yet."""
         self.bag = bag
         self.unused: list[tuple[str, str]] = []
         self._choices = choices
         self._camera_info_topic = camera_info_topic
         self._topics = {topic.name: topic for topic in bag.topics}
-        self._first: dict[str, Any] = {}
+        self._first: dict[str, Message] = {}
 
     def find(self, use: Sequence[Kind]) -> list[Source]:
         """Sources of the kinds in `use`, the first one making the frames.
@@ -97,7 +106,8 @@ class TopicFinder:
                 fit = [item.name for item in self.bag.topics if item.type in _TYPES[kind] and item.messages]
                 found = "no such topic" if topic is None else f"{topic.messages} messages of type {topic.type}"
                 raise RecordingError(
-                    f"{self.bag.path}: {kind}_topic {name!r}: expected one of {fit or 'none in this bag'}, found {found}"
+                    f"{self.bag.path}: {kind}_topic {name!r}: expected one of {', '.join(fit) or 'none in this bag'}, "
+                    f"found {found}"
                 )
         return names
 
@@ -164,7 +174,8 @@ class TopicFinder:
                 words = message.format if topic.type == COMPRESSED else message.encoding
                 detail = f"{camera.width}x{camera.height} {words}"
             elif kind == "points":
-                detail = f"cloud of {message.height * message.width} points ({'/'.join(f.name for f in message.fields)})"
+                fields = "/".join(field.name for field in message.fields)
+                detail = f"cloud of {message.height * message.width} points ({fields})"
             else:
                 detail = f"scan of {len(message.ranges)} rays"
             stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), frame_of(message)
@@ -184,7 +195,7 @@ class TopicFinder:
             )
         return expected, camera_of(self._message(expected), name, f"{self.bag.path}, topic {expected}")
 
-    def _message(self, name: str) -> Any:
+    def _message(self, name: str) -> Message:
         if name not in self._first:
             self._first[name] = self.bag.first(name)
         return self._first[name]

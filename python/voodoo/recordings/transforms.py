@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import deque
-from typing import Any
+from itertools import pairwise
 
 import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.recordings.measurements import FloatArray
+from voodoo.recordings.ros_messages import Message
 
 
-def matrix(translation: Any, rotation: Any, source: object) -> FloatArray:
+def matrix(translation: Message, rotation: Message, source: object) -> FloatArray:
     """(4, 4) of a geometry_msgs translation and quaternion (x, y, z, w).
 
     Raises:
@@ -75,6 +76,7 @@ class TransformTree:
     """
 
     def __init__(self, source: object, *, max_age: float) -> None:
+        """Start without frames."""
         self.source = source
         self.max_age = max_age
         self._edges: dict[tuple[str, str], _Edge] = {}
@@ -85,7 +87,7 @@ class TransformTree:
         """Names of all frames, sorted."""
         return tuple(sorted(self._neighbours))
 
-    def add(self, message: Any, *, static: bool) -> None:
+    def add(self, message: Message, *, static: bool) -> None:
         """Take up a tf2_msgs/TFMessage."""
         for item in message.transforms:
             parent, child = str(item.header.frame_id).lstrip("/"), str(item.child_frame_id).lstrip("/")
@@ -128,7 +130,7 @@ class TransformTree:
     def constant(self, root: str, frame: str) -> bool:
         """Whether root_from_frame is the same at all times."""
         path = self.path(root, frame)
-        return all(self._edge(a, b)[0].constant for a, b in zip(path, path[1:], strict=False))
+        return all(self._edge(a, b)[0].constant for a, b in pairwise(path))
 
     def lookup(self, root: str, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) at `stamp`.
@@ -138,7 +140,7 @@ class TransformTree:
         """
         result = np.eye(4)
         path = self.path(root, frame)
-        for a, b in zip(path, path[1:], strict=False):
+        for a, b in pairwise(path):
             edge, forward = self._edge(a, b)
             transform = self._at(edge, stamp, a, b)
             result = result @ (transform if forward else inverse(transform))

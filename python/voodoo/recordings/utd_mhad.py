@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.io
+import scipy.io  # type: ignore[import-untyped]
 
 from voodoo.camera import Camera
 from voodoo.errors import RecordingError, reading
@@ -27,8 +27,9 @@ from voodoo.recordings.recording import (
     reference_words,
 )
 
-CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=159.0, cy=120.0)
-"""Nominal Kinect v1 at 320x240. The data's u = 160 + f X/Z holds for the mirrored image; u -> 319 - u makes it 159."""
+CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=160.5, cy=119.0)
+"""Kinect v1 at 320x240, for the un-mirrored image. The nominal centre of the mirrored one is (160, 120), hence
+(159, 120) after u -> 319 - u; the skeleton lies on the silhouettes best with (158.5, 119), hence (160.5, 119)."""
 
 FRAME = "kinect_depth_optical_frame"
 RATE_HZ = 30.0
@@ -63,6 +64,7 @@ class UtdMhadRecording(Recording):
     """
 
     def __init__(self, path: Path) -> None:
+        """Read depth and skeleton; see the class."""
         self.path = path
         self.name = path.name.removesuffix("_depth.mat").removesuffix(".mat")
         self.root_frame = FRAME
