@@ -107,7 +107,7 @@ fn agrees_with_the_exact_path() {
 
 /// The long run: `cargo test --release -- --ignored`.
 #[test]
-#[ignore = "a minute in release"]
+#[ignore = "half a minute in release"]
 fn agrees_with_the_exact_path_on_very_many_shapes() {
     let mut random = Random(13);
     let mut worst = (0f64, 0f64);

@@ -93,7 +93,7 @@ fn agrees_with_a_dense_search_on_random_shapes() {
 
 /// The long run: `cargo test --release -- --ignored`.
 #[test]
-#[ignore = "two minutes in release"]
+#[ignore = "half a minute in release"]
 fn agrees_with_a_dense_search_on_very_many_shapes() {
     let mut random = Random(4);
     for _ in 0..20_000 {
