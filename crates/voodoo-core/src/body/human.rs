@@ -35,16 +35,16 @@ const HEEL: f64 = 0.035;
 // ANSUR II (Gordon et al., "2012 Anthropometric Survey of U.S. Army Personnel", 2014), both sexes, over stature.
 const TORSO: [f64; 4] = [0.068, 0.098, 0.064, 0.096];
 const PELVIS: [f64; 4] = [0.068, 0.098, 0.064, 0.088];
-const THORAX: [f64; 4] = [0.064, 0.088, 0.060, 0.098];
+const THORAX: [f64; 4] = [0.064, 0.090, 0.060, 0.092];
 const PAPERS_HEAD: [f64; 4] = [0.046, 0.040, 0.050, 0.042];
 const NECK: [f64; 4] = [0.036, 0.035, 0.034, 0.033];
 const HEAD: [f64; 4] = [0.050, 0.040, 0.050, 0.042];
 const UPPER_ARM_AXES: [f64; 4] = [0.031, 0.029, 0.025, 0.025];
-const FOREARM_AXES: [f64; 4] = [0.026, 0.025, 0.017, 0.019];
-const HAND_AXES: [f64; 4] = [0.022, 0.013, 0.020, 0.010];
+const FOREARM_AXES: [f64; 4] = [0.026, 0.025, 0.018, 0.018];
+const HAND_AXES: [f64; 4] = [0.022, 0.012, 0.019, 0.010];
 const THIGH_AXES: [f64; 4] = [0.053, 0.051, 0.036, 0.036];
 const CALF_AXES: [f64; 4] = [0.034, 0.034, 0.022, 0.022];
-const FOOT_AXES: [f64; 4] = [0.022, 0.019, 0.012, 0.026];
+const FOOT_AXES: [f64; 4] = [0.020, 0.022, 0.014, 0.017];
 
 /// One limb in the standing frame: x forward, y left, z up, origin on the floor between the feet; stature 1.
 struct Part {
