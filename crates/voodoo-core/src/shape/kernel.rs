@@ -20,7 +20,11 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub const ZERO: Self = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+    pub const ZERO: Self = Self {
+        x: [0.0; BLOCK],
+        y: [0.0; BLOCK],
+        z: [0.0; BLOCK],
+    };
 }
 
 /// The results of one block, in the frame of the queries.
@@ -79,7 +83,11 @@ impl Constants {
             shape.a1.max(shape.b1) / shape.a1.min(shape.b1),
         );
         Self {
-            columns: [single(rotation.x_axis), single(rotation.y_axis), single(rotation.z_axis)],
+            columns: [
+                single(rotation.x_axis),
+                single(rotation.y_axis),
+                single(rotation.z_axis),
+            ],
             origin: origin.to_array(),
             rest: single(rest),
             second_order: (size * aspect) as f32,
@@ -154,10 +162,6 @@ fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) 
     // P_θ · D + e · D_θ, with D_θ = (-a' s, b' c, 0).
     let turned = fma::<FMA>(-k.da * s, e[0], (k.db * c) * e[1]);
     let mixed = fma::<FMA>(tx, dx, fma::<FMA>(ty, dy, turned));
-<<<<<<< HEAD
-    let coupling = select(t == free, mixed * mixed * inverse, 0.0);
-    Foot { t, a, b, e, slope, bend: tangent - curved - coupling, tangent }
-=======
     let drift = -mixed * inverse;
     let coupling = select(t == free, mixed * drift, 0.0);
     Foot {
@@ -167,7 +171,6 @@ fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) 
         bend: tangent - curved + coupling,
         tangent,
     }
->>>>>>> shape
 }
 
 #[inline(always)]
@@ -208,42 +211,31 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
     let mut limb = Block::ZERO;
     let (mut cosine, mut sine) = ([0f32; BLOCK], [0f32; BLOCK]);
     for i in 0..BLOCK {
-        let (wx, wy, wz) = (queries.x[i] - k.origin[0], queries.y[i] - k.origin[1], queries.z[i] - k.origin[2]);
+        let (wx, wy, wz) = (
+            queries.x[i] - k.origin[0],
+            queries.y[i] - k.origin[1],
+            queries.z[i] - k.origin[2],
+        );
         let turn = |axis: usize| {
             let [cx, cy, cz] = k.columns[axis];
-            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])))
+            fma::<FMA>(
+                cx,
+                wx,
+                fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])),
+            )
         };
         let (qx, qy, z) = (turn(0), turn(1), turn(2));
         (limb.x[i], limb.y[i], limb.z[i]) = (qx, qy, z);
         // Start: the direction (x/a, y/b) in the slice, then one step over the evolute of the slice.
-<<<<<<< HEAD
-        let height = max(min(z * k.inverse_length, 1.0), 0.0);
-        let (a, b) = (fma::<FMA>(k.da, height, k.a0), fma::<FMA>(k.db, height, k.b0));
-        let tiny = 1e-20;
-=======
         let (x, y) = (qx.abs(), qy.abs());
         let (a, b) = k.slice::<FMA>(z);
         let tiny = 1e-18;
->>>>>>> shape
         let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
         let focus = fma::<FMA>(a, a, -(b * b));
         (cosine[i], sine[i]) = unit::<FMA>(
             max(fma::<FMA>(a, x, -(focus * c) * (c * c)), tiny),
             max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny),
         );
-<<<<<<< HEAD
-        for _ in 0..STEPS {
-            let f = foot::<FMA>(k, c, s, x, y, z);
-            let step = -f.slope / max(f.bend, 0.1 * f.tangent + tiny);
-            let step = max(min(step, 1.0), -1.0);
-            (c, s) = unit::<FMA>(max(fma::<FMA>(-step, s, c), 0.0), max(fma::<FMA>(step, c, s), 0.0));
-        }
-        let f = foot::<FMA>(k, c, s, x, y, z);
-        let [ex, ey, ez] = f.e;
-        let side = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
-        let trusted = (f.slope * f.slope) * f.tangent <= (CONVERGED * f.bend) * (CONVERGED * f.bend)
-            && f.bend >= CONDITIONED * f.tangent;
-=======
     }
     for i in 0..BLOCK {
         let (c, s) = (cosine[i], sine[i]);
@@ -267,7 +259,6 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
         let error = k.second_order * select(crossed, step.abs(), step * step);
         let trusted = (error < CONVERGED) & (f.bend >= CONDITIONED * f.tangent);
->>>>>>> shape
 
         // Inside: between the caps and inside the slice.
         let (xx, yy) = (x * x, y * y);
@@ -310,7 +301,11 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
             fma::<FMA>(
                 k.columns[0][axis],
                 x,
-                fma::<FMA>(k.columns[1][axis], y, fma::<FMA>(k.columns[2][axis], z, base)),
+                fma::<FMA>(
+                    k.columns[1][axis],
+                    y,
+                    fma::<FMA>(k.columns[2][axis], z, base),
+                ),
             )
         };
         out.points.x[i] = world(0, ex, ey, ez, queries.x[i]);
@@ -320,20 +315,22 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         out.normals.y[i] = world(1, nx, ny, nz, 0.0);
         out.normals.z[i] = world(2, nx, ny, nz, 0.0);
         out.signed_distance[i] = sign * distance;
-<<<<<<< HEAD
-        let edge = if f.t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
-=======
         let edge = if t <= 0.0 {
             Region::ProximalRim as u8
         } else {
             Region::DistalRim as u8
         };
->>>>>>> shape
         let lateral = if rim { edge } else { Region::Side as u8 };
-        let flat = if distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
+        let flat = if distal {
+            Region::DistalCap as u8
+        } else {
+            Region::ProximalCap as u8
+        };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere is doubtful.
-        let clear = trusted & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        let clear = trusted
+            & (cap | (norm > 1e-12))
+            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
         out.doubtful[i] = u8::from(!clear);
     }
 }
