@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -76,7 +77,7 @@ def test_the_recording_fits_the_package():
 
 
 def test_each_measurement_keeps_its_own_stamp(frames):
-    for before, frame in zip(frames, frames[1:], strict=False):
+    for before, frame in pairwise(frames):
         assert depth_of(frame).stamp == frame.stamp == frame.measurements[-1].stamp
         assert all(before.stamp < m.stamp <= frame.stamp for m in frame.measurements)
 

@@ -121,8 +121,8 @@ class Bag:
             expected, found = announced.get((name, kind), 0), stored.get((name, kind), 0)
             if expected != found:
                 raise RecordingError(
-                    f"{self.file / 'metadata.yaml'}: expected {found} messages on {name} ({kind}) as in the storage file, "
-                    f"found {expected} (`ros2 bag reindex` repairs it, or open the storage file itself)"
+                    f"{self.file / 'metadata.yaml'}: expected {found} messages on {name} ({kind}) as in the storage "
+                    f"file, found {expected} (`ros2 bag reindex` repairs it, or open the storage file itself)"
                 )
 
     @contextmanager
