@@ -1,5 +1,6 @@
 """ROS bags of every kind the readers claim, written for the purpose, and what is wrong with some."""
 
+import gc
 import struct
 import zipfile
 
@@ -387,6 +388,20 @@ def test_a_changed_byte_in_a_ros1_bag_never_ends_in_a_raw_error(tmp_path, seed):
         assert len(list(open_recording(path))) == 5
     except RecordingError as error:
         assert "b.bag" in str(error)
+
+
+def test_what_was_unpacked_goes_with_the_recording(tmp_path, monkeypatch):
+    path = ros1_bag(tmp_path)
+    with zipfile.ZipFile(tmp_path / "b.zip", "w") as archive:
+        archive.write(path, "b.bag")
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(place))
+    recording = open_recording(tmp_path / "b.zip")
+    assert len(list(place.iterdir())) == 1
+    del recording
+    gc.collect()
+    assert not list(place.iterdir())
 
 
 def test_a_zip_without_a_bag_is_refused(tmp_path):
