@@ -60,6 +60,20 @@ def test_bags_cut_off_are_refused(tmp_path, storage, fraction):
         list(open_recording(path))
 
 
+def test_fewer_messages_than_the_index_announces_are_not_taken_for_the_end(tmp_path):
+    """The count of the first channel in the MCAP statistics (opcode 0x0B) is raised by one."""
+    path = next(bag(tmp_path, depth_entry(), depth_entry(10.5), INFO).glob("*.mcap"))
+    data = bytearray(path.read_bytes())
+    channels = struct.pack("<IHQHQ", 20, 1, 2, 2, 1)
+    at = data.rindex(channels)
+    data[at : at + len(channels)] = struct.pack("<IHQHQ", 20, 1, 3, 2, 1)
+    path.write_bytes(data)
+    frames = iter(open_recording(path))
+    assert [next(frames).stamp, next(frames).stamp] == [10.0, 10.5]
+    with pytest.raises(RecordingError, match=r"expected 3 messages on /d/depth/image .* found 2"):
+        next(frames)
+
+
 @pytest.mark.parametrize("big", [False, True])
 @pytest.mark.parametrize("padding", [0, 6])
 @pytest.mark.parametrize("encoding", ["16UC1", "mono16", "32FC1"])

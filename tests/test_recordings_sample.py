@@ -207,6 +207,26 @@ def test_a_changed_byte_is_refused_or_changes_nothing(tmp_path, untouched, seed)
         assert found == untouched
 
 
+def test_a_renamed_topic_in_the_summary_breaks_its_checksum(tmp_path):
+    data = bytearray(MCAP.read_bytes())
+    at = data.rindex(b"/scan")
+    data[at : at + 5] = b"/scam"
+    path = tmp_path / "changed.mcap"
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="wrong checksum"):
+        open_recording(path)
+
+
+@pytest.mark.parametrize("length", [2**63, 2**64 - 1, 10_000_000])
+def test_a_record_that_leaves_the_file_is_named_by_its_place(tmp_path, length):
+    data = bytearray(MCAP.read_bytes())
+    data[9:17] = length.to_bytes(8, "little")
+    path = tmp_path / "changed.mcap"
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match=rf"record of {length} bytes at byte 8"):
+        open_recording(path)
+
+
 @pytest.fixture
 def copy(tmp_path):
     return Path(shutil.copytree(sample_path(), tmp_path / "copy"))
