@@ -1,10 +1,14 @@
 """Stand-ins for the compiled core, so that the code around it is tested on known poses."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from voodoo.camera import Camera
 from voodoo.errors import VoodooError
+from voodoo.recordings import DepthImage, LaserScan, RecordedFrame, Recording, RecordingInfo, Reference
+from voodoo.views import CameraView, silhouette
 
 BONES = {
     "torso": ("humanoid_root", "vc7", 0.16, 0.11, 0.19, 0.11),
@@ -148,6 +152,51 @@ class Tracker:
             local[:, 2] -= t * limb.shape.length
             best = np.minimum(best, np.linalg.norm(local, axis=1) - (a + b) / 2.0)
         return best.astype(np.float32)
+
+
+CAMERA = Camera(width=80, height=60, fx=60.0, fy=60.0, cx=39.5, cy=29.5)
+BASE_FROM_CAMERA = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
+"""One metre above base_link, looking along its x."""
+
+
+def depth_of(joints, stamp=0.0):
+    """The body as a flat depth image at its mean distance, nothing around it."""
+    body, estimate = pose(joints)
+    mask = silhouette(body, estimate, CameraView(CAMERA, BASE_FROM_CAMERA), width=80, height=60)
+    millimetres = round(1000.0 * float(np.mean([position[0] for position in joints.values()])))
+    image = np.where(mask, millimetres, 0).astype(np.uint16)
+    return DepthImage("depth", stamp, image, 0.001, CAMERA, BASE_FROM_CAMERA)
+
+
+def scan_at(stamp):
+    return LaserScan("scan", stamp, np.full(11, 3.0, np.float32), -0.5, 0.1, 0.1, 10.0, np.eye(4))
+
+
+class FakeRecording(Recording):
+    """A person who moves forward 1 cm a frame at 30 Hz, with or without depth, laser, start and truth."""
+
+    def __init__(self, path=Path("fake"), *, frames=40, exact=True, start=True, depth=True, loader="ros2"):
+        self.path, self.name, self.root_frame = Path(path), Path(path).name, "base_link"
+        self.stamps = 1700200000.0 + np.arange(frames) / 30.0
+        self.depth, self.loader = depth, loader
+        names = tuple(T_POSE)
+        positions = np.array(list(T_POSE.values()))[None] + np.arange(frames)[:, None, None] * (0.01, 0.0, 0.0)
+        self.reference = None if exact is None else Reference(self.stamps, names, positions, exact)
+        self.start = {"height_m": 1.76, "joints": dict(T_POSE)} if start else None
+
+    def __len__(self):
+        return len(self.stamps)
+
+    def __iter__(self):
+        for index, stamp in enumerate(self.stamps):
+            joints = {name: np.add(position, (0.01 * index, 0.0, 0.0)) for name, position in T_POSE.items()}
+            yield RecordedFrame(float(stamp), (depth_of(joints, stamp),) if self.depth else (scan_at(stamp),))
+
+    def info(self):
+        duration = float(self.stamps[-1] - self.stamps[0])
+        return RecordingInfo(
+            self.name, self.path, self.loader, len(self), float(self.stamps[0]), duration, 30.0, self.root_frame, ()
+        )
 
 
 def install(monkeypatch):

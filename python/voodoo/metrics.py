@@ -30,7 +30,7 @@ _STAMP_TOLERANCE_S = 1e-6
 def match_reference(
     stamps: FloatArray, reference_stamps: FloatArray, positions: FloatArray, *, tolerance: float
 ) -> FloatArray:
-    """Reference positions (F, J, 3) at `stamps` (F,): those of the nearest stamp, NaN where none is within `tolerance` [s].
+    """Reference positions (F, J, 3) at `stamps` (F,): of the nearest stamp, NaN where none is within `tolerance` [s].
 
     Nearest instead of interpolated, because a reference that runs at the frames' rate has one value for every frame.
     """
@@ -76,7 +76,9 @@ def best_lag(estimated: FloatArray, reference: FloatArray, *, max_lag: int = MAX
     return min(known, key=known.__getitem__) if known else 0
 
 
-def lost_frames(far: BoolArray, known: BoolArray, stamps: FloatArray, *, longer_than: float = LOST_AFTER_S) -> BoolArray:
+def lost_frames(
+    far: BoolArray, known: BoolArray, stamps: FloatArray, *, longer_than: float = LOST_AFTER_S
+) -> BoolArray:
     """Frames (F,) in which one joint counts as lost: runs of `far` that last longer than `longer_than` seconds.
 
     A run lasts from its first to its last frame plus one frame period (the median of the stamps' differences), so ten

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 import voodoo
 from voodoo.recordings import ColorImage, DepthImage, LaserScan, PointCloud, RecordedFrame, Recording
-from voodoo.views import CameraView, TopView, View, limb_outline, limb_rings, transform
+from voodoo.views import Axes, CameraView, TopView, View, limb_outline, limb_rings, transform
 
 Picture: TypeAlias = npt.NDArray[np.uint8]
 """(H, W, 3) BGR."""
@@ -37,13 +37,11 @@ class Overlay:
     def __init__(self, recording: Recording) -> None:
         """Remember what the frames have in common."""
         self._frames = len(recording)
-        self._axes: str = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
+        self._axes: Axes = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
         self._range: tuple[float, float] | None = None
         self._origin: float | None = None
 
-    def draw(
-        self, recorded: RecordedFrame, body: voodoo.Body, estimate: voodoo.Estimate, *, index: int
-    ) -> Picture:
+    def draw(self, recorded: RecordedFrame, body: voodoo.Body, estimate: voodoo.Estimate, *, index: int) -> Picture:
         """Draw one frame: over its depth image, else over its colour image, else as seen from above.
 
         Args:
@@ -64,8 +62,7 @@ class Overlay:
         else:
             joints = np.array(list(estimate.joints.values()))
             x, y, z = (float(value) for value in np.median(joints, axis=0))
-            axes = "optical" if self._axes == "optical" else "rep103"
-            view = TopView((x, y, z), _TOP_METRES / _TOP_SIZE, _TOP_SIZE, axes)
+            view = TopView((x, y, z), _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
             picture = _grid(view)
         canvas = np.asarray(picture, dtype=np.uint8)
         draw_points(canvas, recorded, view)
@@ -150,7 +147,7 @@ def _draw_sites(picture: Picture, estimate: voodoo.Estimate, view: View) -> None
     radius = max(3, round(picture.shape[0] / 160))
     for name, pixel in zip(estimate.joints, pixels, strict=True):
         if np.isfinite(pixel).all() and np.abs(pixel).max() < 1e5:
-            centre = _fixed(pixel)
+            centre = _point(pixel)
             cv2.circle(picture, centre, (radius + 2) << _SUBPIXEL, _PAPER, -1, cv2.LINE_AA, _SUBPIXEL)
             cv2.circle(picture, centre, (radius + 1) << _SUBPIXEL, side_color(name), -1, cv2.LINE_AA, _SUBPIXEL)
             cv2.circle(picture, centre, (radius - 1) << _SUBPIXEL, _INK, -1, cv2.LINE_AA, _SUBPIXEL)
@@ -170,7 +167,7 @@ def draw_points(picture: Picture, recorded: RecordedFrame, view: View) -> None:
         with np.errstate(invalid="ignore"):
             visible = ((pixels >= 0.0) & (pixels < (width, height))).all(axis=1)
         for pixel in pixels[visible]:
-            cv2.circle(picture, _fixed(pixel), radius << _SUBPIXEL, color, -1, cv2.LINE_AA, _SUBPIXEL)
+            cv2.circle(picture, _point(pixel), radius << _SUBPIXEL, color, -1, cv2.LINE_AA, _SUBPIXEL)
 
 
 def caption(picture: Picture, text: str, estimate: voodoo.Estimate) -> None:
@@ -225,7 +222,7 @@ def _grid(view: TopView) -> Picture:
             ends = np.repeat(centre[None], 2, axis=0)
             ends[:, along] = value
             ends[:, across] += (-half, half)
-            a, b = (_fixed(pixel) for pixel in view.project(ends)[0])
+            a, b = (_point(pixel) for pixel in view.project(ends)[0])
             cv2.line(picture, a, b, (62, 56, 52), 1, cv2.LINE_AA, _SUBPIXEL)
     return picture
 
@@ -233,3 +230,8 @@ def _grid(view: TopView) -> Picture:
 def _fixed(pixels: npt.NDArray[np.floating]) -> npt.NDArray[np.int32]:
     """Pixel coordinates as OpenCV's fixed-point numbers."""
     return np.round(pixels * (1 << _SUBPIXEL)).astype(np.int32)
+
+
+def _point(pixel: npt.NDArray[np.floating]) -> tuple[int, int]:
+    x, y = (int(value) for value in _fixed(pixel))
+    return x, y

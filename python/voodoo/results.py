@@ -57,8 +57,8 @@ class Track:
             if array.shape != shape:
                 raise VoodooError(f"{name}: expected shape {shape}, found {array.shape}")
             if not np.isfinite(array).all():
-                frame = int(np.argwhere(~np.isfinite(array))[0, 0])
-                raise VoodooError(f"{name}: expected finite numbers, found {array[frame].ravel()} in frame {frame}")
+                where = tuple(int(index) for index in np.argwhere(~np.isfinite(array))[0])
+                raise VoodooError(f"{name}: expected finite numbers, found {array[where]} in frame {where[0]}")
         if len(self.status) != frames:
             raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
 
@@ -147,7 +147,10 @@ class Track:
         """
         check_suffix(path)
         with reading(path, "a result of voodoo track"):
-            return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
+            try:
+                return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
+            except VoodooError as error:
+                raise VoodooError(f"{path}: {error}") from error
 
     @classmethod
     def _read_csv(cls, path: Path) -> Track:

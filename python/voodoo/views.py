@@ -13,6 +13,7 @@ import voodoo
 from voodoo.camera import Camera
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+Axes: TypeAlias = Literal["rep103", "optical"]
 
 _NEAREST_M = 0.05
 
@@ -61,7 +62,7 @@ class TopView:
     centre: tuple[float, float, float]
     metres_per_pixel: float
     size: int
-    axes: Literal["rep103", "optical"] = "rep103"
+    axes: Axes = "rep103"
 
     def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See View; depth counts downwards from the centre."""
