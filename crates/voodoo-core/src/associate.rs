@@ -21,7 +21,7 @@ pub struct Assignment {
 
 impl Assignment {
     /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
-    pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, config: &Config) {
+    pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, overlap: Overlap, box_margin: f64) {
         let count = candidates.len();
         self.distance.resize(count * poses.len(), OUTSIDE);
         self.members.resize_with(poses.len(), Vec::new);
@@ -31,11 +31,11 @@ impl Assignment {
             return;
         }
         for ((limb, pose), row) in body.limbs().iter().zip(poses).zip(self.distance.chunks_exact_mut(count)) {
-            BoxDistance::new(limb, pose, config.limb_box_margin).fill(candidates, row);
+            BoxDistance::new(limb, pose, box_margin).fill(candidates, row);
         }
         for index in 0..count {
             match candidates.limb[index] {
-                ANY_LIMB => self.share(body, index, count, config.overlap),
+                ANY_LIMB => self.share(body, index, count, overlap),
                 limb => self.members[usize::from(limb)].push(index as u32),
             }
         }
@@ -75,6 +75,7 @@ impl Assignment {
         pose: &Pose,
         candidates: &Candidates,
         config: &Config,
+        max_distance: f64,
         matches: &mut LimbMatches,
     ) {
         let members = &self.members[index];
@@ -91,7 +92,7 @@ impl Assignment {
         }
         limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
         let refused = refused_regions(limb);
-        let limit = config.max_distance as f32;
+        let limit = max_distance as f32;
         for ((weight, distance), region) in
             matches.weight.iter_mut().zip(&matches.surface.signed_distance).zip(&matches.surface.region)
         {
