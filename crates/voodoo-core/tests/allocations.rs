@@ -6,6 +6,7 @@ mod scene;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use voodoo_core::body::HumanModel;
 use voodoo_core::frame::{Frame, PositionRelation, RayRelation};
 use voodoo_core::geometry::Vec3;
 use voodoo_core::{Body, Config, Tracker};
@@ -42,7 +43,7 @@ const COUNTED: usize = 60;
 
 /// Allocations inside `step` in the frames after the warm-up.
 fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
-    let body = Body::human(1.75).unwrap();
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let camera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };
     let wrist = body.site_index("l_wrist").unwrap();
     let knee = body.site_index("r_knee").unwrap();
@@ -79,7 +80,7 @@ fn a_warm_step_allocates_nothing() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(100)));
     assert!(COUNT.load(Ordering::Relaxed) > before, "the counter counts nothing");
 
-    let mut frames = scene::swaying(&Body::human(1.75).unwrap(), 4);
+    let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);
     // To and fro, so that the frames after the warm-up need no more memory than those before.
     frames.extend(frames.clone().into_iter().rev());
     for config in scene::every_solver() {

@@ -3,12 +3,13 @@
 
 mod scene;
 
+use voodoo_core::body::HumanModel;
 use voodoo_core::config::Overlap;
 use voodoo_core::frame::Frame;
 use voodoo_core::{Body, Config, Tracker};
 
 fn run(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> Vec<Vec<u64>> {
-    let body = Body::human(1.75).unwrap();
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let camera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };
     let mut tracker = Tracker::new(body.clone(), config).unwrap();
     tracker.reset_pose(&scene::standing(&body)).unwrap();
@@ -24,7 +25,7 @@ fn run(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> Vec<Vec<u64>> {
 
 #[test]
 fn estimates_are_equal_bit_by_bit_for_any_number_of_threads() {
-    let frames = scene::swaying(&Body::human(1.75).unwrap(), 4);
+    let frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);
     for config in scene::every_solver() {
         for overlap in [Overlap::Exclusive, Overlap::Adjacent, Overlap::Shared] {
             let config = Config { overlap, ..config.clone() };
@@ -39,7 +40,7 @@ fn estimates_are_equal_bit_by_bit_for_any_number_of_threads() {
 
 #[test]
 fn a_different_input_gives_a_different_estimate() {
-    let mut frames = scene::swaying(&Body::human(1.75).unwrap(), 2);
+    let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 2);
     let first = run(Config::default(), &frames);
     frames[1].1[0][1] += 0.001;
     let second = run(Config::default(), &frames);

@@ -4,20 +4,20 @@
 mod scene;
 
 use proptest::prelude::*;
-use voodoo_core::body::Joint;
+use voodoo_core::body::{HumanModel, Joint};
 use voodoo_core::config::SolverKind;
 use voodoo_core::frame::{Cloud, Frame, PositionRelation, RayRelation, Scope};
 use voodoo_core::geometry::{Pose, Quat, Vec3};
 use voodoo_core::{Body, Config, Status, TaperedEllipticCylinder, Tracker};
 
 fn human() -> Body {
-    Body::human(1.75).unwrap()
+    Body::human(1.75, HumanModel::Papers).unwrap()
 }
 
 /// The published solver with steps enough to settle and no sampling.
 fn settled() -> Config {
     let solver = SolverKind::Limbwise;
-    Config { solver, max_steps: 60, min_improvement: 0.0, max_limb_points: 100_000, ..Config::default() }
+    Config { solver, max_steps: 60, min_change: 0.0, max_limb_points: 100_000, ..Config::default() }
 }
 
 fn tracker(config: Config, poses: &[Pose]) -> Tracker {
@@ -55,7 +55,7 @@ proptest! {
     #[test]
     fn a_fit_reproduces_positions_and_sizes(seed: u64, stature in 1.2..2.1_f64) {
         let mut noise = scene::Noise(seed);
-        let truth = Body::human(stature).unwrap();
+        let truth = Body::human(stature, HumanModel::Papers).unwrap();
         let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
         let poses = scene::bent(&truth, root, 0.5, &mut noise);
         let wanted = sites(&truth, &poses);
@@ -224,6 +224,8 @@ proptest! {
             limb_from_joint: Pose::identity(),
             semi_axes: [0.05, 0.05],
             weight: 1.0,
+            limits: None,
+            motion: 0.3,
         };
         tracker.add_limb("box", "l_forearm", held, joint, vec![("box_end".into(), Vec3::Z * 0.2)]).unwrap();
         let end = tracker.body().site_index("box_end").unwrap();

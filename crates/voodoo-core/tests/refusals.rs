@@ -3,14 +3,14 @@
 
 mod scene;
 
-use voodoo_core::body::{Joint, JointKind, Limb, Site};
+use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
 use voodoo_core::config::{RawValue, Value};
 use voodoo_core::frame::{Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 use voodoo_core::geometry::{Pose, Quat, Vec3};
 use voodoo_core::{Body, BodyError, Config, ConfigError, TaperedEllipticCylinder, TrackError, Tracker};
 
 fn started() -> (Tracker, Vec<[f64; 3]>) {
-    let body = Body::human(1.75).unwrap();
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
     tracker.reset_pose(&scene::standing(&body)).unwrap();
     (tracker, scene::surface_points(&body, &scene::standing(&body), 400, 0.01, &mut scene::Noise(1)))
@@ -102,7 +102,7 @@ fn bad_images_are_refused() {
 
 #[test]
 fn bad_sites_and_floors_are_refused() {
-    let sites = Body::human(1.75).unwrap().sites().len();
+    let sites = Body::human(1.75, HumanModel::Papers).unwrap().sites().len();
     let position = PositionRelation { site: 0, position: Vec3::ZERO, weight: 1.0, source: 0 };
     for (bad, what) in [
         (PositionRelation { site: sites, ..position }, "positions[0].site"),
@@ -128,7 +128,7 @@ fn bad_sites_and_floors_are_refused() {
 
 #[test]
 fn a_tracker_without_a_pose_refuses_every_frame() {
-    let mut tracker = Tracker::new(Body::human(1.75).unwrap(), Config::default()).unwrap();
+    let mut tracker = Tracker::new(Body::human(1.75, HumanModel::Papers).unwrap(), Config::default()).unwrap();
     assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
 }
 
@@ -157,6 +157,8 @@ fn limb(name: &str, parent: Option<usize>) -> Limb {
         limb_from_joint: Pose::identity(),
         semi_axes: [0.0; 2],
         weight: 1.0,
+        limits: None,
+        motion: 0.3,
     };
     Limb {
         name: name.into(),
@@ -198,7 +200,7 @@ fn bad_bodies_are_refused_by_key() {
     refused(with_joint(|_| {}), vec![site("s", 0, Vec3::NAN)], "sites.s.position");
     refused(with_joint(|_| {}), vec![site("s", 0, Vec3::ZERO), site("s", 1, Vec3::ZERO)], "sites.s");
     for stature in [0.29, 3.01, f64::NAN, -1.7] {
-        assert!(Body::human(stature).unwrap_err().to_string().contains("stature"));
+        assert!(Body::human(stature, HumanModel::Papers).unwrap_err().to_string().contains("stature"));
     }
 }
 
@@ -220,7 +222,7 @@ fn joints_have_the_bands_of_their_kind() {
             assert!([a, b] == [0.0; 2] || [a, 0.0] == [semi_axes[0], b] || [0.0, b] == [a, semi_axes[1]]);
         }
     }
-    let human = Body::human(1.75).unwrap();
+    let human = Body::human(1.75, HumanModel::Papers).unwrap();
     let bands: usize = human.limbs().iter().filter_map(|limb| Some(limb.parent.as_ref()?.1.band_count())).sum();
     assert_eq!((human.limbs().len(), bands), (10, 4 + 2 + 3 * 4), "neck, two shoulders, elbows, hips and knees");
 }
