@@ -18,7 +18,7 @@ pub struct Moments {
 }
 
 impl Default for Moments {
-    /// No pairs. Not derived: the default of a matrix is the identity, not zero.
+    /// No pairs. (The default of a glam matrix is the identity, so this cannot be derived.)
     fn default() -> Self {
         Self { weight: 0.0, x: Vec3::ZERO, p: Vec3::ZERO, px: Mat3::ZERO }
     }
