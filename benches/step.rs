@@ -153,8 +153,7 @@ fn weights(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("frame of 2000 points, by weight");
     let [first, second] = two_clouds(2000);
     for weight in [1.0, 1000.0] {
-        let (first, second) =
-            ([Cloud { weight, ..scene::cloud(&first) }], [Cloud { weight, ..scene::cloud(&second) }]);
+        let (first, second) = ([Cloud { weight, ..scene::cloud(&first) }], [Cloud { weight, ..scene::cloud(&second) }]);
         let instants: [(&[_], &[_]); 2] = [(&first, &[]), (&second, &[])];
         let mut bench = Bench { tracker: tracker(6, 1), instants, frames: 0 };
         let (time, steps) = bench.median(401);

@@ -1,5 +1,10 @@
 //! Synthetic measurements of a posed body, the same on every run: noisy surface points and ray-cast depth images.
-#![allow(dead_code, missing_docs, clippy::unwrap_used, reason = "shared by several tests and benches, none of which uses all of it")]
+#![allow(
+    dead_code,
+    missing_docs,
+    clippy::unwrap_used,
+    reason = "shared by several tests and benches, none of which uses all of it"
+)]
 
 use std::f64::consts::{PI, TAU};
 
