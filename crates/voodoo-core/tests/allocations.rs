@@ -49,8 +49,7 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     let knee = body.site_index("r_knee").unwrap();
     let mut tracker = Tracker::new(body.clone(), config).unwrap();
     let estimate = tracker.reset_pose(&scene::standing(&body)).unwrap();
-    let positions =
-        [PositionRelation { site: wrist, position: estimate.sites[wrist], weight: 20.0, source: 1 }];
+    let positions = [PositionRelation { site: wrist, position: estimate.sites[wrist], weight: 20.0, source: 1 }];
     let rays = [RayRelation {
         site: knee,
         origin: Vec3::Z,
@@ -62,8 +61,13 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     for index in 0..WARM_UP + COUNTED {
         let (pixels, points) = &frames[index % frames.len()];
         let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);
-        let frame =
-            Frame { clouds: &clouds, images: &images, positions: &positions, rays: &rays, ..Frame::empty(index as f64) };
+        let frame = Frame {
+            clouds: &clouds,
+            images: &images,
+            positions: &positions,
+            rays: &rays,
+            ..Frame::empty(index as f64)
+        };
         let before = COUNT.load(Ordering::Relaxed);
         tracker.step(&frame).unwrap();
         if index >= WARM_UP {

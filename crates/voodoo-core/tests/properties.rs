@@ -117,34 +117,37 @@ proptest! {
         let after = moved(&before, &motion);
         let mut noise = scene::Noise(seed);
         let (forearm, calf) = (human().limb_index("l_forearm").unwrap(), human().limb_index("r_calf").unwrap());
-        let hidden = |point: &[f64; 3]| {
-            [forearm, calf].iter().any(|limb| {
-                let local = after[*limb].inverse_transform_point(Vec3::from_array(*point));
-                human().limbs()[*limb].shape.closest_point(local).signed_distance < 0.03
-            })
-        };
-        let mut points = scene::surface_points(&human(), &after, 900, 0.005, &mut noise);
-        points.retain(|point| !hidden(point));
-        // One point on an arm that shows nothing else: its limb must not spin or fly.
+        // Every point is known to be on its limb; two limbs have none.
+        let points = scene::surface_points(&human(), &after, 900, 0.005, &mut noise);
+        let mut by_limb = vec![Vec::new(); 10];
+        for point in points {
+            let distance = |limb: &usize| {
+                let local = after[*limb].inverse_transform_point(Vec3::from_array(point));
+                human().limbs()[*limb].shape.closest_point(local).signed_distance.abs()
+            };
+            let nearest = (0..10).min_by(|first, second| distance(first).total_cmp(&distance(second))).unwrap();
+            by_limb[nearest].push(point);
+        }
+        by_limb[forearm].clear();
+        by_limb[calf].clear();
+        let on_limb = |limb: usize| Cloud { scope: Scope::Limb(limb), ..scene::cloud(&by_limb[limb]) };
+        let mut clouds: Vec<Cloud> = (0..10).map(on_limb).collect();
         let lonely = [(after[forearm] * Vec3::new(0.03, 0.0, 0.1)).to_array()];
-        let lonely = Cloud { scope: Scope::Limb(forearm), ..scene::cloud(&lonely) };
-        for clouds in [&[scene::cloud(&points)][..], &[scene::cloud(&points), lonely][..]] {
+        for count in [0, 1] {
+            clouds[forearm] = Cloud { scope: Scope::Limb(forearm), ..scene::cloud(&lonely[..count]) };
             let mut tracker = tracker(settled(), &before);
             for stamp in 0..3 {
-                tracker.step(&scene::with_cloud(f64::from(stamp), clouds)).unwrap();
+                tracker.step(&scene::with_cloud(f64::from(stamp), &clouds)).unwrap();
             }
             let estimate = tracker.estimate();
-            prop_assert!(estimate.limb_points[calf] < 25, "the calf was to have no data");
+            prop_assert_eq!([estimate.limb_points[forearm], estimate.limb_points[calf]], [count, 0]);
             for limb in [forearm, calf] {
-                prop_assert!(estimate.joint_gaps[limb] < 0.02, "gap {} m", estimate.joint_gaps[limb]);
+                prop_assert!(estimate.joint_gaps[limb] < 0.01, "gap {} m", estimate.joint_gaps[limb]);
                 let turned = estimate.world_from_limb[limb].rotation.angle_between(after[limb].rotation);
-                prop_assert!(turned < 1.0, "turned by {turned} rad");
+                prop_assert!(turned < [0.4, 1.2][count], "{} turned by {turned} rad with {count} points", human().limbs()[limb].name);
             }
-            let wanted = sites(&human(), &after);
-            for (index, site) in human().sites().iter().enumerate() {
-                let off = (estimate.sites[index] - wanted[index]).length();
-                prop_assert!(off < if [forearm, calf].contains(&site.limb) { 0.3 } else { 0.08 }, "{} is {off} m off", site.name);
-            }
+            let off = largest_distance(&estimate.sites, &sites(&human(), &after));
+            prop_assert!(off < 0.2, "a site is {off} m off");
         }
     }
 
