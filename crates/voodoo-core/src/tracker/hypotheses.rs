@@ -33,6 +33,7 @@ pub(super) struct Hypotheses {
     near: Points,
     near_weight: Vec<f64>,
     best: Vec<f32>,
+    others: Vec<f32>,
     surface: SurfaceBatch,
     trial: Vec<Pose>,
     kept: Vec<Pose>,
@@ -114,11 +115,21 @@ impl Tracker {
                 }
             }
         }
+        let targets = targets(&work.near, open_count, root);
         thin(&mut work.near, &mut work.near_weight, SAMPLE);
+        // What the other limbs explain anyway is no merit of this one.
+        work.others.clear();
+        work.others.resize(work.near.len(), f32::INFINITY);
+        for limb in (0..self.poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
+            self.body.limbs()[limb].shape.closest_points(&self.poses[limb], &work.near, &mut work.surface);
+            for (least, distance) in work.others.iter_mut().zip(&work.surface.signed_distance) {
+                *least = least.min(distance.abs());
+            }
+        }
+        let others = std::mem::take(&mut work.others);
         let score =
             |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, surface: &mut SurfaceBatch| {
-                best.clear();
-                best.resize(near.len(), f32::INFINITY);
+                best.clone_from(&others);
                 for limb in chain.limbs() {
                     self.body.limbs()[limb].shape.closest_points(&poses[limb], near, surface);
                     for (best, distance) in best.iter_mut().zip(&surface.signed_distance) {
@@ -132,7 +143,6 @@ impl Tracker {
         let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
         let mut least = current - GAIN;
         let mut found = false;
-        let targets = targets(&work.near, open_count.min(work.near.len()), root);
         for target in targets.into_iter().flatten() {
             for swivel in 0..TwoBone::swivels() {
                 work.trial.clone_from(&self.poses);
@@ -155,6 +165,7 @@ impl Tracker {
                 work.kept.clone_from(&work.trial);
             }
         }
+        work.others = others;
         if !found {
             return 0;
         }
