@@ -13,6 +13,8 @@ use crate::terms::ShortestAxis;
 const SUSPICIOUS: f64 = 25.0;
 /// So large a share of its visible surface contradicted makes it suspect.
 const CONTRADICTED: f64 = 0.35;
+/// A limb of whose visible surface this share is seen where it is, is not suspect.
+const SUPPORTED: f64 = 0.4;
 /// A hypothesis must explain so many patches more than the current pose.
 const GAIN: f64 = 8.0;
 /// ICP steps that refine the best hypothesis.
@@ -101,7 +103,10 @@ impl Tracker {
             sum
         };
         let now = look(&self.poses);
-        if open < SUSPICIOUS && now.contradicted < CONTRADICTED * now.facing.max(1.0) {
+        // A limb that is seen where it is needs no other place, whatever lies near it unexplained.
+        let lost = now.seen < SUPPORTED * now.facing.max(1.0);
+        let contradicted = now.contradicted > CONTRADICTED * now.facing.max(1.0);
+        if open < SUSPICIOUS || !(lost || contradicted) {
             return 0;
         }
         // The points the chain explains now must stay explained.
