@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -184,22 +185,22 @@ class Body:
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
         name, limbs, sites = self._core.parts()
-        lines = [f'name = "{name}"']
+        lines = [f"name = {_text(name)}"]
         for limb, parent, shape, joint, match_caps in limbs:
-            lines += ["", "[[limbs]]", f'name = "{limb}"']
-            lines += [f'parent = "{parent}"'] if parent is not None else []
+            lines += ["", "[[limbs]]", f"name = {_text(limb)}"]
+            lines += [f"parent = {_text(parent)}"] if parent is not None else []
             sizes = {key: getattr(shape, key) for key in ("length", "a0", "b0", "a1", "b1")}
             lines.append("shape = { " + ", ".join(f"{key} = {_number(value)}" for key, value in sizes.items()) + " }")
             lines.append(f"match_caps = [{', '.join(str(flag).lower() for flag in match_caps)}]")
             if joint is not None:
                 joint_name, on_parent, on_limb, semi_axes, weight, limits, motion = joint
-                lines += ["[limbs.joint]", f'name = "{joint_name}"', f"on_parent = {_place(on_parent)}"]
+                lines += ["[limbs.joint]", f"name = {_text(joint_name)}", f"on_parent = {_place(on_parent)}"]
                 lines += [f"on_limb = {_place(on_limb)}", f"semi_axes = {_vector(semi_axes)}"]
                 lines += [f"weight = {_number(weight)}", f"motion = {_number(motion)}"]
                 if limits is not None:
                     lines.append(f"limits = [{', '.join(_vector(pair) for pair in limits)}]")
         for site, limb, position in sites:
-            lines += ["", "[[sites]]", f'name = "{site}"', f'limb = "{limb}"', f"position = {_vector(position)}"]
+            lines += ["", "[[sites]]", f"name = {_text(site)}", f"limb = {_text(limb)}", f"position = {_vector(position)}"]
         return "\n".join(lines) + "\n"
 
     def __eq__(self, other: object) -> bool:
@@ -252,6 +253,11 @@ def _has(node: dict[str, Any] | list[Any], part: str | int) -> bool:
 def _short(value: object) -> str:
     text = repr(value)
     return text if len(text) < 80 else text[:77] + "..."
+
+
+def _text(value: str) -> str:
+    """A TOML string; JSON's escapes are TOML's, but for DEL, which TOML wants escaped."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _number(value: float) -> str:
