@@ -27,13 +27,13 @@ pub struct Assignment {
 
 impl Assignment {
     /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
-    pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, config: &Config) {
+    pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, overlap: Overlap, box_margin: f64) {
         self.members.resize_with(poses.len(), Vec::new);
         self.members.iter_mut().for_each(Vec::clear);
         self.squares.resize(poses.len(), [OUTSIDE; BLOCK]);
         self.boxes.clear();
         let limbs = body.limbs().iter().zip(poses);
-        self.boxes.extend(limbs.map(|(limb, pose)| LimbBox::new(limb, pose, config.limb_box_margin)));
+        self.boxes.extend(limbs.map(|(limb, pose)| LimbBox::new(limb, pose, box_margin)));
         for start in (0..candidates.len()).step_by(BLOCK) {
             let count = BLOCK.min(candidates.len() - start);
             let block = Block::load(&candidates.points, start, count);
@@ -44,7 +44,7 @@ impl Assignment {
             );
             for (offset, limb) in candidates.limb[start..start + count].iter().enumerate() {
                 match *limb {
-                    ANY_LIMB => self.share(body, offset, start + offset, closest[offset], config.overlap),
+                    ANY_LIMB => self.share(body, offset, start + offset, closest[offset], overlap),
                     limb => self.members[usize::from(limb)].push((start + offset) as u32),
                 }
             }
@@ -79,6 +79,7 @@ impl Assignment {
         pose: &Pose,
         candidates: &Candidates,
         config: &Config,
+        max_distance: f64,
         matches: &mut LimbMatches,
     ) {
         let members = &self.members[index];
@@ -99,7 +100,7 @@ impl Assignment {
         pick(&candidates.weight, &mut matches.weight);
         limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
         let refused = refused_regions(limb);
-        let limit = config.max_distance as f32;
+        let limit = max_distance as f32;
         for ((weight, distance), region) in
             matches.weight.iter_mut().zip(&matches.surface.signed_distance).zip(&matches.surface.region)
         {
