@@ -63,7 +63,7 @@ def test_an_estimate_cannot_be_changed(tracker, cloud):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
     before = estimate.joint_positions.copy()
-    tracker.step(frame_of(cloud + [0.05, 0.0, 0.0], stamp=1.0))
+    tracker.step(frame_of(cloud + np.array([0.05, 0.0, 0.0]), stamp=1.0))
     np.testing.assert_array_equal(estimate.joint_positions, before)
     assert "tracking" in repr(estimate) and "steps=" in repr(estimate)
 
@@ -213,7 +213,7 @@ def test_a_reset_needs_positions_that_fix_the_pose(body):
 
 def test_a_reset_reproduces_positions_and_sizes(body):
     tall = voodoo.Body.human(height=1.9)
-    wanted = {name: position + [3.0, -1.0, 0.5] for name, position in standing_joints(tall).items()}
+    wanted = {name: position + np.array([3.0, -1.0, 0.5]) for name, position in standing_joints(tall).items()}
     tracker = voodoo.Tracker(body)
     estimate = tracker.reset(joints=wanted)
     for name, position in wanted.items():

@@ -1,5 +1,4 @@
 import math
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -156,7 +155,6 @@ def test_any_damage_to_a_body_is_found_or_harmless(start, length, filling):
     text = THING[:start] + filling + THING[start + length :]
     bodies = []
     if usable(lambda: bodies.append(voodoo.Body.from_toml(text))):
-        tomllib.loads(text)
         assert voodoo.Body.from_toml(bodies[0].to_toml()).limb_names == bodies[0].limb_names
         assert all(np.isfinite(pose).all() for pose in rest_pose(bodies[0]).values())
 

@@ -67,7 +67,7 @@ class Joint(_Strict):
     limits: tuple[_Range, _Range, _Range] | None = None
     motion: _Number = 0.3
 
-    def parts(self) -> Any:
+    def parts(self) -> tuple[Any, ...]:
         """The joint as the core takes it."""
         places = [(place.position, place.rotation) for place in (self.on_parent, self.on_limb)]
         return (self.name, *places, self.semi_axes, self.weight, self.limits, self.motion)
@@ -132,7 +132,7 @@ class Body:
 
         Args:
             height: stature [m], 0.3 to 3.0.
-            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen limbs, with a waist, neck, hands and feet.
+            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen, with waist, neck, hands and feet.
 
         Raises:
             BodyError: the stature is out of range, or the model unknown.
@@ -200,7 +200,8 @@ class Body:
                 if limits is not None:
                     lines.append(f"limits = [{', '.join(_vector(pair) for pair in limits)}]")
         for site, limb, position in sites:
-            lines += ["", "[[sites]]", f"name = {_text(site)}", f"limb = {_text(limb)}", f"position = {_vector(position)}"]
+            lines += ["", "[[sites]]", f"name = {_text(site)}", f"limb = {_text(limb)}"]
+            lines.append(f"position = {_vector(position)}")
         return "\n".join(lines) + "\n"
 
     def __eq__(self, other: object) -> bool:
@@ -214,7 +215,9 @@ class Body:
         return f"Body(name={self.name!r}, limbs={len(self.limbs)}, sites={len(self.site_names)})"
 
 
-def checked_joints(joints: Mapping[str, Sequence[float]], *, what: str = "joints") -> dict[str, tuple[float, float, float]]:
+def checked_joints(
+    joints: Mapping[str, Sequence[float]], *, what: str = "joints"
+) -> dict[str, tuple[float, float, float]]:
     """Positions by name as plain numbers.
 
     Raises:
@@ -235,9 +238,9 @@ def checked_joints(joints: Mapping[str, Sequence[float]], *, what: str = "joints
 def _problems(values: dict[str, Any], error: ValidationError) -> str:
     def key(location: tuple[str | int, ...]) -> str:
         parts: list[str] = []
-        node: Any = values
+        node: object = values
         for part in location:
-            node = node[part] if isinstance(node, (dict, list)) and _has(node, part) else None
+            node = _child(node, part)
             name = node.get("name") if isinstance(part, int) and isinstance(node, dict) else None
             parts.append(str(name if isinstance(name, str) else part))
         return ".".join(parts)
@@ -246,8 +249,10 @@ def _problems(values: dict[str, Any], error: ValidationError) -> str:
     return "; ".join(found)
 
 
-def _has(node: dict[str, Any] | list[Any], part: str | int) -> bool:
-    return part in node if isinstance(node, dict) else isinstance(part, int) and part < len(node)
+def _child(node: object, part: str | int) -> object:
+    if isinstance(node, dict):
+        return node.get(part)
+    return node[part] if isinstance(node, list) and isinstance(part, int) and part < len(node) else None
 
 
 def _short(value: object) -> str:
