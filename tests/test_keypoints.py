@@ -151,6 +151,8 @@ def test_openpose_json(tmp_path):
     path.write_text('{"people": [')
     with pytest.raises(RecordingError, match="OpenPose JSON"):
         read_openpose_json(path, layout="body25")
+    path.write_text('{"people": [{}]}')
+    assert read_openpose_json(path, layout="body25b") == []
     path.write_text('{"people": []}')
     assert read_openpose_json(path, layout="body25") == []
 
