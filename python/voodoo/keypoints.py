@@ -20,6 +20,7 @@ from voodoo.keypoint_layouts import LAYOUTS, Layout
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
 from voodoo.sensors.pixels import in_sensor, rigid, world_rays
+from voodoo.sensors.rays import SiteRay, add_rays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
@@ -147,20 +148,50 @@ class KeypointSensor:
         depth: DepthArray | None = None,
         metres_per_unit: float = 0.001,
     ) -> KeypointReport:
-        """Add the keypoints of one person to a frame.
+        """Add the keypoints of one person in one image to a frame; for several cameras see `observe`.
+
+        Raises:
+            MeasurementError: wrong shapes, or an unknown layout.
+        """
+        report, rays, points = self.observe(
+            keypoints,
+            stamp=frame.stamp,
+            predicted=predicted,
+            gate=gate,
+            depth=depth,
+            metres_per_unit=metres_per_unit,
+        )
+        add_rays(frame, rays, model=self.model)
+        for site, (position, sigma) in points.items():
+            frame.add_position(site, position, weight=self.model.weight(sigma), source=self.source)
+        return report
+
+    def observe(
+        self,
+        keypoints: npt.ArrayLike,
+        *,
+        stamp: float,
+        predicted: Mapping[str, npt.NDArray[np.float64]],
+        gate: SiteGate | None = None,
+        depth: DepthArray | None = None,
+        metres_per_unit: float = 0.001,
+    ) -> tuple[KeypointReport, list[SiteRay], dict[str, tuple[FloatArray, float]]]:
+        """What the keypoints of one person say: rays, and with depth points.
 
         Without depth each site becomes a ray. With a registered depth image (same camera, same size) it becomes a 3-D
-        point: the median depth of the nearest surface in a 5 x 5 window, moved behind the surface by
-            BEHIND_SURFACE_M; where the
-        image has no return, or the point is refused by the gate (the site is hidden behind something), it stays a ray.
+        point: the median depth of the nearest surface in a 5 x 5 window, moved behind the surface by BEHIND_SURFACE_M;
+        where the image has no return, or the point is refused by the gate (the site is hidden), it stays a ray.
 
         Args:
-            frame: gets the measurements.
             keypoints: (K, 3), see site_pixels.
+            stamp: [s], for the gate.
             predicted: site name -> (3,) in the world, e.g. `tracker.estimate.joints`; sites not in it are not used.
             gate: drops what is too far from the prediction; None takes everything.
             depth: (H, W) uint16 or float32.
             metres_per_unit: of `depth`.
+
+        Returns:
+            The report, the rays, and site name -> (position (3,) in the world, standard deviation) [m].
 
         Raises:
             MeasurementError: wrong shapes, or an unknown layout.
@@ -171,11 +202,11 @@ class KeypointSensor:
             raise MeasurementError(f"depth: expected the camera's shape {expected}, found {depth.shape}")
         seen, unseen = site_pixels(keypoints, layout=self.layout, min_confidence=self.min_confidence)
         seen = [item for item in seen if item.site in predicted and (self.sites is None or item.site in self.sites)]
-        rays: list[str] = []
-        points: list[str] = []
+        rays: list[SiteRay] = []
+        points: dict[str, tuple[FloatArray, float]] = {}
         dropped: list[str] = []
         if not seen:
-            return KeypointReport(unseen=tuple(unseen))
+            return KeypointReport(unseen=tuple(unseen)), rays, points
         origin, directions = world_rays(self.camera, pose, [item.pixel for item in seen])
         depths = in_sensor(pose, [predicted[item.site] for item in seen])[:, 2]
         for item, direction, z in zip(seen, directions, depths, strict=True):
@@ -186,20 +217,15 @@ class KeypointSensor:
             sigma = self._sigma(item, float(z))
             if depth is not None:
                 point = self._point(item, direction, pose, depth, metres_per_unit)
-                if point is not None and (gate is None or gate.accepts_point(item.site, site, point, frame.stamp)):
-                    sigma = max(sigma, POINT_SIGMA_M)
-                    weight = self.model.weight(sigma)
-                    frame.add_position(item.site, point, weight=weight, source=self.source)
-                    points.append(item.site)
+                if point is not None and (gate is None or gate.accepts_point(item.site, site, point, stamp)):
+                    points[item.site] = (point, max(sigma, POINT_SIGMA_M))
                     continue
-            if gate is not None and not gate.accepts_ray(item.site, site, origin, direction, frame.stamp, self.source):
+            if gate is None or gate.accepts_ray(item.site, site, origin, direction, stamp, self.source):
+                rays.append(SiteRay(item.site, origin, direction, sigma, self.source))
+            else:
                 dropped.append(item.site)
-                continue
-            frame.add_ray(
-                item.site, origin=origin, direction=direction, weight=self.model.weight(sigma), source=self.source
-            )
-            rays.append(item.site)
-        return KeypointReport(tuple(rays), tuple(points), tuple(unseen), tuple(dropped))
+        report = KeypointReport(tuple(ray.site for ray in rays), tuple(points), tuple(unseen), tuple(dropped))
+        return report, rays, points
 
     def _sigma(self, item: SitePixel, z: float) -> float:
         focal = math.sqrt(self.camera.fx * self.camera.fy)
