@@ -8,10 +8,11 @@ import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 ROS2 = get_typestore(Stores.ROS2_HUMBLE)
 ROS1 = get_typestore(Stores.ROS1_NOETIC)
+ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
 
 
 class Messages:
@@ -22,8 +23,8 @@ class Messages:
         self.store = ROS2 if ros == 2 else ROS1
         self.types = self.store.types
 
-    def new(self, name: str, **fields: object) -> object:
-        return self.types[name](**fields)
+    def new(self, kind: str, /, **fields: object) -> object:
+        return self.types[kind](**fields)
 
     def header(self, stamp: float, frame: str) -> object:
         sec = int(stamp)

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -76,7 +77,7 @@ def test_the_recording_fits_the_package():
 
 
 def test_each_measurement_keeps_its_own_stamp(frames):
-    for before, frame in zip(frames, frames[1:], strict=False):
+    for before, frame in pairwise(frames):
         assert depth_of(frame).stamp == frame.stamp == frame.measurements[-1].stamp
         assert all(before.stamp < m.stamp <= frame.stamp for m in frame.measurements)
 
@@ -204,6 +205,26 @@ def test_a_changed_byte_is_refused_or_changes_nothing(tmp_path, untouched, seed)
         assert "changed.mcap" in str(error)
     else:
         assert found == untouched
+
+
+def test_a_renamed_topic_in_the_summary_breaks_its_checksum(tmp_path):
+    data = bytearray(MCAP.read_bytes())
+    at = data.rindex(b"/scan")
+    data[at : at + 5] = b"/scam"
+    path = tmp_path / "changed.mcap"
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="wrong checksum"):
+        open_recording(path)
+
+
+@pytest.mark.parametrize("length", [2**63, 2**64 - 1, 10_000_000])
+def test_a_record_that_leaves_the_file_is_named_by_its_place(tmp_path, length):
+    data = bytearray(MCAP.read_bytes())
+    data[9:17] = length.to_bytes(8, "little")
+    path = tmp_path / "changed.mcap"
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match=rf"record of {length} bytes at byte 8"):
+        open_recording(path)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -23,6 +23,7 @@ else:
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 _Vector = tuple[_Number, _Number, _Number]
+_Range = tuple[_Number, _Number]
 _ZERO = (0.0, 0.0, 0.0)
 
 
@@ -53,6 +54,8 @@ class Joint(_Strict):
         semi_axes: semi-axes of the ellipse along the joint frame's x and y [m]: (0, 0) universal, one positive: hinge
             about that axis, both positive: elliptic.
         weight: strength relative to the other joints of a limb.
+        limits: least and greatest value of each component of the joint's rotation vector [rad]; None: free.
+        motion: standard deviation of the joint's unexpected turn in 1/30 s [rad].
     """
 
     name: str
@@ -60,11 +63,13 @@ class Joint(_Strict):
     on_limb: _PlaceSpec = _PlaceSpec()
     semi_axes: tuple[_Number, _Number] = (0.0, 0.0)
     weight: _Number = 1.0
+    limits: tuple[_Range, _Range, _Range] | None = None
+    motion: _Number = 0.3
 
     def parts(self) -> Any:
         """The joint as the core takes it."""
         places = [(place.position, place.rotation) for place in (self.on_parent, self.on_limb)]
-        return (self.name, *places, self.semi_axes, self.weight)
+        return (self.name, *places, self.semi_axes, self.weight, self.limits, self.motion)
 
 
 class _LimbSpec(_Strict):
@@ -121,16 +126,17 @@ class Body:
         return tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height: float = 1.75) -> Body:
-        """The default human of ten limbs and nine joints (K06 III-C).
+    def human(cls, height: float = 1.75, *, model: Literal["papers", "full"] = "papers") -> Body:
+        """The default human.
 
         Args:
             height: stature [m], 0.3 to 3.0.
+            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen limbs, with a waist, neck, hands and feet.
 
         Raises:
-            BodyError: the stature is out of range.
+            BodyError: the stature is out of range, or the model unknown.
         """
-        return cls(_core.Body.human(height))
+        return cls(_core.Body.human(height, model))
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = "body") -> Body:
@@ -186,10 +192,12 @@ class Body:
             lines.append("shape = { " + ", ".join(f"{key} = {_number(value)}" for key, value in sizes.items()) + " }")
             lines.append(f"match_caps = [{', '.join(str(flag).lower() for flag in match_caps)}]")
             if joint is not None:
-                joint_name, on_parent, on_limb, semi_axes, weight = joint
+                joint_name, on_parent, on_limb, semi_axes, weight, limits, motion = joint
                 lines += ["[limbs.joint]", f'name = "{joint_name}"', f"on_parent = {_place(on_parent)}"]
                 lines += [f"on_limb = {_place(on_limb)}", f"semi_axes = {_vector(semi_axes)}"]
-                lines.append(f"weight = {_number(weight)}")
+                lines += [f"weight = {_number(weight)}", f"motion = {_number(motion)}"]
+                if limits is not None:
+                    lines.append(f"limits = [{', '.join(_vector(pair) for pair in limits)}]")
         for site, limb, position in sites:
             lines += ["", "[[sites]]", f'name = "{site}"', f'limb = "{limb}"', f"position = {_vector(position)}"]
         return "\n".join(lines) + "\n"

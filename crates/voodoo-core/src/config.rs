@@ -202,6 +202,8 @@ words! {
     SolverKind {
         /// Each limb alone, by weighted absolute orientation (K06, K07).
         Limbwise = "limbwise",
+        /// All limbs at once with exact joints, by damped Gauss-Newton on robust terms (R07, method section 4.3).
+        Chain = "chain",
     }
 }
 
@@ -210,8 +212,8 @@ config! {
     solver: SolverKind = SolverKind::Limbwise, "";
     /// Greatest number of ICP steps in a frame (K07 section 7: 6 is a good compromise).
     max_steps: usize = 6, "", 1 ..= 100;
-    /// The steps end when the mean squared distance improves by less than this (K06 III-B step 6).
-    min_improvement: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
+    /// The steps end when the mean squared distance changes by less than this (K06 III-B step 6).
+    min_change: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
     /// Enlargement of the box around the whole body; free points outside are background (K06 IV-B.1).
     body_box_margin: f64 = 0.20, "m", 0.0 ..= 10.0;
     /// Enlargement of the box of each limb: how far a limb may move between two frames (K06 IV-B.2).
@@ -228,6 +230,20 @@ config! {
     max_distance: f64 = 0.15, "m", 0.001 ..= 10.0;
     /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7).
     band_ratio: f64 = 0.5, "", 0.0 ..= 100.0;
+    /// Standard deviation of a surface point of weight one, for the whole-body solvers.
+    point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
+    /// Scale of the robust kernel in the first step of a frame; it narrows from step to step.
+    kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
+    /// Scale at which the robust kernel stops narrowing.
+    kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
+    /// Share of the last motion that is expected to go on (0: the body is expected to stand still).
+    prediction: f64 = 0.6, "", 0.0 ..= 1.0;
+    /// Standard deviation of the root's unexpected turn in 1/30 s.
+    root_turn_sigma: f64 = 0.12, "rad", 0.0001 ..= 10.0;
+    /// Standard deviation of the root's unexpected shift in 1/30 s.
+    root_shift_sigma: f64 = 0.04, "m", 0.0001 ..= 10.0;
+    /// Multiplies the standard deviations of all unexpected motion: smaller is smoother and slower.
+    motion_scale: f64 = 1.0, "", 0.01 ..= 100.0;
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.

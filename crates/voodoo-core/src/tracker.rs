@@ -12,11 +12,14 @@ use crate::error::{BodyError, TrackError};
 use crate::estimate::{Estimate, Status};
 use crate::frame::{Frame, PointSlice};
 use crate::geometry::{Points, Pose, Vec3};
+use crate::predict::predict;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Solver, solver};
+use crate::solver::{Problem, Solver, solver};
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
+/// A motion is taken to go on for at most this many of its own intervals.
+const LONGEST_PREDICTION: f64 = 2.0;
 
 /// Follows one body through frames.
 #[derive(Debug)]
@@ -31,6 +34,10 @@ pub struct Tracker {
     girths_open: bool,
     /// Current poses in the working frame, whose origin lies at `origin` in the world.
     poses: Vec<Pose>,
+    /// The poses of the frame before and the stamp difference that led to the current ones; none after a reset.
+    previous: Vec<Pose>,
+    interval: Option<f64>,
+    predicted: Vec<Pose>,
     origin: Vec3,
     candidates: Candidates,
     assignment: Assignment,
@@ -57,6 +64,9 @@ impl Tracker {
             started: false,
             girths_open: false,
             poses: Vec::new(),
+            previous: Vec::new(),
+            interval: None,
+            predicted: Vec::new(),
             origin: Vec3::ZERO,
             candidates: Candidates::default(),
             assignment: Assignment::default(),
@@ -112,6 +122,8 @@ impl Tracker {
         self.poses = world_from_limb;
         self.origin = Vec3::ZERO;
         self.stamp = None;
+        self.interval = None;
+        self.previous.clear();
         self.started = true;
         self.girths_open = false;
         self.correspondences.limbs.clear();
@@ -129,6 +141,7 @@ impl Tracker {
         }
         frame.check(&self.body, self.stamp)?;
         self.move_origin();
+        let pace = self.predict(frame.stamp);
         // 1 Prefilter the free points by the enlarged box of the whole body.
         let bounds = body_box(&self.body, &self.poses, self.config.body_box_margin);
         self.candidates.gather(frame, self.origin, &bounds, self.config.ground_clearance);
@@ -143,18 +156,27 @@ impl Tracker {
             // 4 Point-to-point relations, 5 closest points on rays.
             self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
-            if previous - distance < self.config.min_improvement && steps > 0 {
+            if (previous - distance).abs() < self.config.min_change {
                 break;
             }
             previous = distance;
             // 6 Elastic bands on both limbs.
             self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
             // 7 Fit the model.
-            self.solver.solve(&self.body, &self.correspondences, &mut self.poses);
+            let problem = Problem {
+                body: &self.body,
+                correspondences: &self.correspondences,
+                predicted: &self.predicted,
+                step: steps,
+                pace,
+                config: &self.config,
+            };
+            self.solver.solve(&problem, &mut self.poses);
             steps += 1;
         }
         self.match_points();
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+        self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);
         Ok(&self.estimate)
@@ -188,9 +210,28 @@ impl Tracker {
     fn move_origin(&mut self) {
         let shift = self.poses[0].translation;
         self.origin += shift;
-        for pose in &mut self.poses {
+        for pose in self.poses.iter_mut().chain(&mut self.previous) {
             *pose = shifted(pose, shift);
         }
+    }
+
+    /// Sets the predicted poses, and the current ones to them where the solver wants it; the current ones become the previous.
+    /// Returns the time since the last frame in units of 1/30 s, held to what a motion model can say.
+    fn predict(&mut self, stamp: f64) -> f64 {
+        let step = self.stamp.map(|last| stamp - last);
+        let ratio = match (step, self.interval) {
+            (Some(step), Some(interval)) => (step / interval).min(LONGEST_PREDICTION),
+            _ => 0.0,
+        };
+        if self.previous.len() != self.poses.len() {
+            self.previous.clone_from(&self.poses);
+        }
+        predict(&self.body, &self.previous, &self.poses, ratio * self.config.prediction, &mut self.predicted);
+        self.previous.clone_from(&self.poses);
+        if self.solver.starts_from_prediction() {
+            self.poses.clone_from(&self.predicted);
+        }
+        step.map_or(1.0, |step| (step * 30.0).clamp(0.1, 10.0))
     }
 
     /// Fits the girths to the first frame after a reset, whose pose is known.
@@ -276,6 +317,9 @@ impl Tracker {
     /// Takes a changed body and closes its joints from the root outwards, orientations kept.
     fn adopt(&mut self, body: Body) {
         self.body = body;
+        // The motion starts anew: the poses before belong to another body.
+        self.previous.clear();
+        self.interval = None;
         if !self.started {
             return;
         }

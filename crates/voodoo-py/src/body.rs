@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use voodoo_core::Body;
-use voodoo_core::body::{Joint, Limb, Site};
+use voodoo_core::body::{HumanModel, Joint, Limb, Site};
 use voodoo_core::geometry::{Pose, Quat, Vec3};
 
 use crate::errors::{IntoPy, exception};
@@ -10,8 +10,8 @@ use crate::shape::PyShape;
 
 /// Position and rotation vector (radians) of a joint's ellipse.
 type Frame = ([f64; 3], [f64; 3]);
-/// name, ellipse on the parent, ellipse on the limb, semi-axes, weight
-pub type JointParts = (String, Frame, Frame, [f64; 2], f64);
+/// name, ellipse on the parent, ellipse on the limb, semi-axes, weight, limits, motion
+pub type JointParts = (String, Frame, Frame, [f64; 2], f64, Option<[[f64; 2]; 3]>, f64);
 /// name, parent, shape, joint, match_caps
 type LimbParts = (String, Option<String>, PyShape, Option<JointParts>, [bool; 2]);
 /// name, limb, position
@@ -29,8 +29,16 @@ fn frame(pose: &Pose) -> Frame {
     (pose.translation.to_array(), pose.rotation.to_scaled_axis().to_array())
 }
 
-pub fn joint((name, on_parent, on_limb, semi_axes, weight): JointParts) -> Joint {
-    Joint { name, parent_from_joint: pose(on_parent), limb_from_joint: pose(on_limb), semi_axes, weight }
+pub fn joint((name, on_parent, on_limb, semi_axes, weight, limits, motion): JointParts) -> Joint {
+    Joint {
+        name,
+        parent_from_joint: pose(on_parent),
+        limb_from_joint: pose(on_limb),
+        semi_axes,
+        weight,
+        limits,
+        motion,
+    }
 }
 
 #[pymethods]
@@ -76,8 +84,19 @@ impl PyBody {
     }
 
     #[staticmethod]
-    fn human(py: Python<'_>, stature: f64) -> PyResult<Self> {
-        Body::human(stature).map(Self).map_err(|error| error.into_py(py))
+    fn human(py: Python<'_>, stature: f64, model: &str) -> PyResult<Self> {
+        let model = match model {
+            "papers" => HumanModel::Papers,
+            "full" => HumanModel::Full,
+            _ => {
+                return Err(exception(
+                    py,
+                    "BodyError",
+                    format!("model: expected \"full\" or \"papers\", found {model:?}"),
+                ));
+            }
+        };
+        Body::human(stature, model).map(Self).map_err(|error| error.into_py(py))
     }
 
     fn scaled(&self, py: Python<'_>, factor: f64) -> PyResult<Self> {
@@ -100,6 +119,8 @@ impl PyBody {
                             frame(&joint.limb_from_joint),
                             joint.semi_axes,
                             joint.weight,
+                            joint.limits,
+                            joint.motion,
                         );
                         (limbs[*parent].name.clone(), parts)
                     })

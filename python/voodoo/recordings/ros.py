@@ -44,8 +44,9 @@ class RosRecording(Recording):
 
     There is one frame for each depth image (without depth: for each cloud, else each scan, else each colour image);
     it also holds what was recorded since the previous one. What comes after the last one is not yielded. Stamps are
-    header stamps. Messages are read while iterating and colour is decoded on access. A bag that was cut off is refused
-    (`ros2 bag reindex` or `mcap recover` repair it), as is one whose index announces more messages than it holds.
+    header stamps in seconds; double precision keeps them to about 0.2 microseconds. Messages are read while iterating
+    and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover` repair
+    it), as is one whose index announces other messages than it holds.
 
     truth.csv and init.json in the bag's folder or the one above become `reference` and `start`.
 

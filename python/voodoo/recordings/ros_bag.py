@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import struct
 import tempfile
+import weakref
 import zipfile
 import zlib
 from collections.abc import Collection, Iterator
@@ -47,11 +48,10 @@ class Bag:
     def __init__(self, path: Path) -> None:
         """Unpack if need be, and read the index."""
         self.path = path
-        self._temporary: tempfile.TemporaryDirectory[str] | None = None
         folder = path
         if path.suffix == ".zip":
-            self._temporary = tempfile.TemporaryDirectory(prefix="voodoo-")
-            folder = Path(self._temporary.name)
+            folder = Path(tempfile.mkdtemp(prefix="voodoo-"))
+            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
             _unpack(path, folder)
         self.file = find_bag(folder) if folder.is_dir() else folder
         for part in [self.file] if self.file.is_file() else sorted(self.file.iterdir()):
@@ -121,8 +121,8 @@ class Bag:
             expected, found = announced.get((name, kind), 0), stored.get((name, kind), 0)
             if expected != found:
                 raise RecordingError(
-                    f"{self.file / 'metadata.yaml'}: expected {found} messages on {name} ({kind}) as in the storage file, "
-                    f"found {expected} (`ros2 bag reindex` repairs it, or open the storage file itself)"
+                    f"{self.file / 'metadata.yaml'}: expected {found} messages on {name} ({kind}) as in the storage "
+                    f"file, found {expected} (`ros2 bag reindex` repairs it, or open the storage file itself)"
                 )
 
     @contextmanager

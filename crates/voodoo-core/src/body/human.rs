@@ -1,71 +1,315 @@
-//! The default human: ten limbs, nine joints (K06 III-C), from stature.
+//! The default humans: proportions as shares of the stature, standing with hanging arms at rest.
 
 use super::{Body, Joint, Limb, Site};
 use crate::error::BodyError;
 use crate::geometry::{Mat3, Pose, Quat, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Landmarks and half-breadths of an adult as shares of the stature.
-///
-/// Heights of joint centres and segment lengths: Drillis and Contini as tabulated in Winter, "Biomechanics and Motor Control
-/// of Human Movement", 4th ed., fig. 4.1 (shoulder 0.818, hip 0.530, knee 0.285, ankle 0.039, upper arm 0.186,
-/// forearm 0.146, hand 0.108). Breadths and girths: means of ANSUR II (Gordon et al., "2012 Anthropometric Survey of U.S.
-/// Army Personnel", 2014), both sexes, divided by stature. Hip joint centres: Bell, Pedersen and Brand, 1990.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HumanProportions;
-
-impl HumanProportions {
-    const HIP: [f64; 2] = [0.052, 0.530];
-    const KNEE: f64 = 0.285;
-    const ANKLE: f64 = 0.039;
-    const SHOULDER: [f64; 2] = [0.112, 0.818];
-    const UPPER_ARM: f64 = 0.186;
-    const FOREARM: f64 = 0.146;
-    const VC7: f64 = 0.860;
-    const SKULLBASE: f64 = 0.912;
-    /// Length, and the semi-axes to the front and to the side at the proximal and the distal end.
-    const TORSO: [f64; 5] = [0.345, 0.068, 0.098, 0.064, 0.096];
-    const HEAD: [f64; 5] = [0.135, 0.046, 0.040, 0.050, 0.042];
-    /// The forearm ends at the knuckles: the ten-limb model has no hand.
-    const UPPER_ARM_GIRTH: [f64; 4] = [0.031, 0.029, 0.025, 0.025];
-    const FOREARM_GIRTH: [f64; 4] = [0.026, 0.025, 0.017, 0.019];
-    const THIGH_GIRTH: [f64; 4] = [0.053, 0.051, 0.036, 0.036];
-    const CALF_GIRTH: [f64; 4] = [0.034, 0.034, 0.022, 0.022];
-    const TORSO_BOTTOM: f64 = 0.490;
-    const HAND_CENTRE: f64 = 0.045;
-    const HAND_END: f64 = 0.075;
-    /// Half-lengths of the hinges and semi-axes of the neck's ellipse.
-    const ELBOW_HINGE: f64 = 0.020;
-    const KNEE_HINGE: f64 = 0.028;
-    const HIP_HINGE: f64 = 0.020;
-    const NECK: f64 = 0.020;
+/// How finely the human is divided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HumanModel {
+    /// Ten limbs and nine joints, as the papers have it (K06 III-C): torso, head, two limbs each arm and leg.
+    Papers,
+    /// Sixteen limbs: the torso split at the waist, neck, hands and feet besides.
+    #[default]
+    Full,
 }
 
+// Heights of joint centres and segment lengths as shares of the stature: Drillis and Contini as tabulated in Winter,
+// "Biomechanics and Motor Control of Human Movement", 4th ed., fig. 4.1. Hip joint centres: Bell, Pedersen and Brand, 1990.
+const HIP: [f64; 2] = [0.052, 0.530];
+const KNEE: f64 = 0.285;
+const ANKLE: f64 = 0.039;
+const SHOULDER: [f64; 2] = [0.112, 0.818];
+const UPPER_ARM: f64 = 0.186;
+const FOREARM: f64 = 0.146;
+const HAND: f64 = 0.095;
+const HAND_CENTRE: f64 = 0.045;
+const WAIST: f64 = 0.630;
+const VC7: f64 = 0.860;
+const SKULLBASE: f64 = 0.912;
+const TOE: f64 = 0.115;
+const HEEL: f64 = 0.035;
+
+// Semi-axes [front, side] at the proximal and the distal end: half of the mean breadths and depths, and girths over 2 pi, of
+// ANSUR II (Gordon et al., "2012 Anthropometric Survey of U.S. Army Personnel", 2014), both sexes, over stature.
+const TORSO: [f64; 4] = [0.068, 0.098, 0.064, 0.096];
+const PELVIS: [f64; 4] = [0.068, 0.098, 0.064, 0.088];
+const THORAX: [f64; 4] = [0.064, 0.090, 0.060, 0.092];
+const PAPERS_HEAD: [f64; 4] = [0.046, 0.040, 0.050, 0.042];
+const NECK: [f64; 4] = [0.036, 0.035, 0.034, 0.033];
+const HEAD: [f64; 4] = [0.050, 0.040, 0.050, 0.042];
+const UPPER_ARM_AXES: [f64; 4] = [0.031, 0.029, 0.025, 0.025];
+const FOREARM_AXES: [f64; 4] = [0.026, 0.025, 0.018, 0.018];
+const HAND_AXES: [f64; 4] = [0.022, 0.012, 0.019, 0.010];
+const THIGH_AXES: [f64; 4] = [0.053, 0.051, 0.036, 0.036];
+const CALF_AXES: [f64; 4] = [0.034, 0.034, 0.022, 0.022];
+const FOOT_AXES: [f64; 4] = [0.020, 0.022, 0.014, 0.017];
+
+/// One limb in the standing frame: x forward, y left, z up, origin on the floor between the feet; stature 1.
 struct Part {
     name: String,
-    /// Proximal end in the standing frame: x forward, y left, z up, origin on the floor.
-    start: Vec3,
-    upright: bool,
-    /// Length, semi-axes (front, side) proximal and distal.
-    shape: [f64; 5],
+    standing_from_limb: Pose,
+    length: f64,
+    axes: [f64; 4],
     parent: Option<(usize, Link)>,
     match_caps: [bool; 2],
 }
 
+/// A joint in the standing frame. Its frame has x along `flexion` and z along `along`; limits and motion in radians.
 struct Link {
     name: String,
     centre: Vec3,
+    flexion: Vec3,
+    along: Vec3,
     semi_axes: [f64; 2],
-    /// Positive rotation about the joint's x axis is flexion: the axis points left at the knee and the hip... see `human`.
-    flexion_axis: Vec3,
+    limits: [[f64; 2]; 3],
+    motion: f64,
+}
+
+#[derive(Default)]
+struct Builder {
+    parts: Vec<Part>,
+    sites: Vec<(String, usize, Vec3)>,
+}
+
+impl Builder {
+    fn limb(
+        &mut self,
+        name: impl Into<String>,
+        start: Vec3,
+        rotation: Quat,
+        length: f64,
+        axes: [f64; 4],
+        parent: Option<(usize, Link)>,
+        match_caps: [bool; 2],
+    ) -> usize {
+        let standing_from_limb = Pose::from_parts(start, rotation);
+        self.parts.push(Part { name: name.into(), standing_from_limb, length, axes, parent, match_caps });
+        self.parts.len() - 1
+    }
+
+    fn site(&mut self, name: impl Into<String>, limb: usize, position: Vec3) {
+        self.sites.push((name.into(), limb, position));
+    }
+
+    /// Pelvis or torso, and all above the shoulders. Returns the limbs that carry the legs and the arms.
+    fn trunk(&mut self, model: HumanModel) -> (usize, usize) {
+        let up = Quat::IDENTITY;
+        let link = |name: &str, height: f64, semi_axes: [f64; 2], limits, motion| Link {
+            name: name.into(),
+            centre: Vec3::Z * height,
+            flexion: Vec3::Y,
+            along: Vec3::Z,
+            semi_axes,
+            limits,
+            motion,
+        };
+        let neck = |semi_axis: f64| link("vc7", VC7, [semi_axis; 2], [[-0.9, 1.0], [-0.7, 0.7], [-1.2, 1.2]], 0.15);
+        let (legs, arms) = match model {
+            HumanModel::Papers => {
+                let torso = self.limb("torso", Vec3::Z * 0.490, up, 0.345, TORSO, None, [false; 2]);
+                (torso, torso)
+            }
+            HumanModel::Full => {
+                let pelvis = self.limb("pelvis", Vec3::Z * 0.485, up, WAIST - 0.485, PELVIS, None, [false; 2]);
+                let spine = link("vl3", WAIST, [0.04; 2], [[-0.5, 1.3], [-0.6, 0.6], [-0.8, 0.8]], 0.12);
+                let thorax =
+                    self.limb("thorax", Vec3::Z * WAIST, up, 0.830 - WAIST, THORAX, Some((pelvis, spine)), [false; 2]);
+                (pelvis, thorax)
+            }
+        };
+        let head = match model {
+            HumanModel::Papers => {
+                self.limb("head", Vec3::Z * VC7, up, 0.135, PAPERS_HEAD, Some((arms, neck(0.02))), [false, true])
+            }
+            HumanModel::Full => {
+                let bottom = self.limb("neck", Vec3::Z * 0.830, up, 0.080, NECK, Some((arms, neck(0.02))), [false; 2]);
+                let skull = link("skullbase", SKULLBASE, [0.015; 2], [[-0.6, 0.6], [-0.4, 0.4], [-0.8, 0.8]], 0.10);
+                self.limb("head", Vec3::new(0.008, 0.0, 0.880), up, 0.115, HEAD, Some((bottom, skull)), [false, true])
+            }
+        };
+        self.site("humanoid_root", legs, Vec3::Z * 0.535);
+        self.site(
+            "vc7",
+            self.parts[head]
+                .parent
+                .as_ref()
+                .map_or(head, |(parent, _)| if model == HumanModel::Full { *parent } else { head }),
+            Vec3::Z * VC7,
+        );
+        self.site("skullbase", head, Vec3::Z * SKULLBASE);
+        self.site("head_center", head, Vec3::new(0.008, 0.0, 0.937));
+        self.site("skull_tip", head, Vec3::Z * 0.997);
+        (legs, arms)
+    }
+
+    fn arm(&mut self, model: HumanModel, prefix: &str, side: f64, thorax: usize) {
+        // x stays forward: limbs that hang are turned about it.
+        let down = Quat::from_axis_angle(Vec3::X, std::f64::consts::PI);
+        let named = |name: &str| format!("{prefix}_{name}");
+        let link = |name: &str, centre, semi_axes, limits, motion| Link {
+            name: named(name),
+            centre,
+            flexion: -Vec3::Y,
+            along: -Vec3::Z,
+            semi_axes,
+            limits,
+            motion,
+        };
+        let shoulder = Vec3::new(0.0, side * SHOULDER[0], SHOULDER[1]);
+        let elbow = shoulder - Vec3::Z * UPPER_ARM;
+        let wrist = elbow - Vec3::Z * FOREARM;
+        // The joint's y axis points backward: the left arm is raised sideways by negative turns about it.
+        let shoulder_limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
+        let upper = self.limb(
+            named("upperarm"),
+            shoulder,
+            down,
+            UPPER_ARM,
+            UPPER_ARM_AXES,
+            Some((thorax, link("shoulder", shoulder, [0.0; 2], shoulder_limits, 0.35))),
+            [false; 2],
+        );
+        let elbow_limits = [[-0.1, 2.7], [0.0; 2], [0.0; 2]];
+        let link_elbow = link("elbow", elbow, [0.02, 0.0], elbow_limits, 0.45);
+        self.site(named("shoulder"), upper, shoulder);
+        let carrier = match model {
+            // The ten-limb model has no hand: its forearm ends at the knuckles.
+            HumanModel::Papers => self.limb(
+                named("forearm"),
+                elbow,
+                down,
+                FOREARM + 0.075,
+                FOREARM_AXES,
+                Some((upper, link_elbow)),
+                [false, true],
+            ),
+            HumanModel::Full => {
+                let forearm = self.limb(
+                    named("forearm"),
+                    elbow,
+                    down,
+                    FOREARM,
+                    FOREARM_AXES,
+                    Some((upper, link_elbow)),
+                    [false; 2],
+                );
+                let wrist_limits = [[-1.2, 1.2], [-0.5, 0.5], [-1.5, 1.5]];
+                self.limb(
+                    named("hand"),
+                    wrist,
+                    down,
+                    HAND,
+                    HAND_AXES,
+                    Some((forearm, link("wrist", wrist, [0.012; 2], wrist_limits, 0.3))),
+                    [false, true],
+                )
+            }
+        };
+        self.site(named("elbow"), upper + 1, elbow);
+        self.site(named("wrist"), carrier, wrist);
+        self.site(named("hand"), carrier, wrist - Vec3::Z * HAND_CENTRE);
+    }
+
+    fn leg(&mut self, model: HumanModel, prefix: &str, side: f64, pelvis: usize) {
+        let down = Quat::from_axis_angle(Vec3::X, std::f64::consts::PI);
+        let named = |name: &str| format!("{prefix}_{name}");
+        let hip = Vec3::new(0.0, side * HIP[0], HIP[1]);
+        let knee = Vec3::new(0.0, hip.y, KNEE);
+        let ankle = Vec3::new(0.0, hip.y, ANKLE);
+        let hip_limits = [[-0.6, 2.3], mirrored([-1.0, 0.5], side), mirrored([-0.8, 0.8], side)];
+        let link_hip = Link {
+            name: named("hip"),
+            centre: hip,
+            flexion: -Vec3::Y,
+            along: -Vec3::Z,
+            semi_axes: [0.02, 0.005],
+            limits: hip_limits,
+            motion: 0.25,
+        };
+        let thigh =
+            self.limb(named("thigh"), hip, down, HIP[1] - KNEE, THIGH_AXES, Some((pelvis, link_hip)), [false; 2]);
+        // A hanging calf bends backward: about the axis to the left.
+        let link_knee = Link {
+            name: named("knee"),
+            centre: knee,
+            flexion: Vec3::Y,
+            along: -Vec3::Z,
+            semi_axes: [0.028, 0.0],
+            limits: [[-0.1, 2.6], [0.0; 2], [0.0; 2]],
+            motion: 0.30,
+        };
+        self.site(named("hip"), thigh, hip);
+        let (length, caps) = match model {
+            HumanModel::Papers => (KNEE, [false, true]),
+            HumanModel::Full => (KNEE - ANKLE, [false; 2]),
+        };
+        let calf = self.limb(named("calf"), knee, down, length, CALF_AXES, Some((thigh, link_knee)), caps);
+        self.site(named("knee"), calf, knee);
+        self.site(named("ankle"), calf, ankle);
+        if model == HumanModel::Full {
+            // z forward, x up.
+            let forward = Quat::from_mat3(&Mat3::from_cols(Vec3::Z, -Vec3::Y, Vec3::X));
+            let start = Vec3::new(-HEEL, hip.y, 0.022);
+            let link = Link {
+                name: named("ankle"),
+                centre: ankle,
+                flexion: -Vec3::Y,
+                along: -Vec3::Z,
+                semi_axes: [0.012; 2],
+                limits: [[-0.8, 0.6], [-0.4, 0.4], [-0.4, 0.4]],
+                motion: 0.20,
+            };
+            let foot =
+                self.limb(named("foot"), start, forward, HEEL + TOE, FOOT_AXES, Some((calf, link)), [true, true]);
+            self.site(named("toe"), foot, Vec3::new(TOE, hip.y, 0.012));
+        }
+    }
+
+    fn finish(self, name: &str) -> Result<Body, BodyError> {
+        let poses: Vec<Pose> = self.parts.iter().map(|part| part.standing_from_limb).collect();
+        let mut limbs = Vec::with_capacity(poses.len());
+        for (index, part) in self.parts.into_iter().enumerate() {
+            let [a0, b0, a1, b1] = part.axes;
+            let shape = TaperedEllipticCylinder::new(part.length, a0, b0, a1, b1)
+                .map_err(|source| BodyError::Shape { key: format!("limbs.{}", part.name), source })?;
+            let parent = part.parent.map(|(parent, link)| {
+                let axes = Mat3::from_cols(link.flexion, link.along.cross(link.flexion), link.along);
+                let standing_from_joint = Pose::from_parts(link.centre, Quat::from_mat3(&axes));
+                let joint = Joint {
+                    name: link.name,
+                    parent_from_joint: poses[parent].inv_mul(&standing_from_joint),
+                    limb_from_joint: poses[index].inv_mul(&standing_from_joint),
+                    semi_axes: link.semi_axes,
+                    weight: 1.0,
+                    limits: Some(link.limits),
+                    motion: link.motion,
+                };
+                (parent, joint)
+            });
+            limbs.push(Limb { name: part.name, shape, parent, match_caps: part.match_caps });
+        }
+        let sites = self
+            .sites
+            .into_iter()
+            .map(|(name, limb, point)| Site { name, limb, position: poses[limb].inverse_transform_point(point) })
+            .collect();
+        Body::new(name, limbs, sites)
+    }
+}
+
+/// A range for the left side (`side` = 1), mirrored for the right one.
+fn mirrored([low, high]: [f64; 2], side: f64) -> [f64; 2] {
+    if side > 0.0 { [low, high] } else { [-high, -low] }
 }
 
 impl Body {
-    /// The ten-limb human of the papers, standing with hanging arms at rest.
+    /// A human of a stature in metres, standing with hanging arms at rest.
     ///
-    /// `stature` in metres. Limb frames have z from the proximal to the distal end and x forward in the standing pose; the
-    /// hinges turn about the joint frame's x axis and a positive angle is flexion.
-    pub fn human(stature: f64) -> Result<Self, BodyError> {
+    /// Limb frames have z from the proximal to the distal end, x forward (feet: up) in the standing pose. Hinges turn about
+    /// the joint frame's x axis; a positive angle is flexion.
+    pub fn human(stature: f64, model: HumanModel) -> Result<Self, BodyError> {
         if !(0.3..=3.0).contains(&stature) {
             return Err(BodyError::Value {
                 key: "stature".into(),
@@ -73,146 +317,12 @@ impl Body {
                 found: stature.to_string(),
             });
         }
-        use HumanProportions as H;
-        let side_point = |side: f64, [y, z]: [f64; 2]| Vec3::new(0.0, side * y, z);
-        let part = |name: String, start, girth: [f64; 4], length, parent, match_caps| Part {
-            name,
-            start,
-            upright: false,
-            shape: [length, girth[0], girth[1], girth[2], girth[3]],
-            parent: Some(parent),
-            match_caps,
-        };
-        let mut parts = vec![
-            Part {
-                name: "torso".into(),
-                start: Vec3::Z * H::TORSO_BOTTOM,
-                upright: true,
-                shape: H::TORSO,
-                parent: None,
-                match_caps: [false, false],
-            },
-            Part {
-                name: "head".into(),
-                start: Vec3::Z * H::VC7,
-                upright: true,
-                shape: H::HEAD,
-                parent: Some((
-                    0,
-                    Link {
-                        name: "vc7".into(),
-                        centre: Vec3::Z * H::VC7,
-                        semi_axes: [H::NECK; 2],
-                        flexion_axis: Vec3::Y,
-                    },
-                )),
-                match_caps: [false, true],
-            },
-        ];
-        let mut sites = vec![
-            ("humanoid_root".to_owned(), 0, Vec3::Z * 0.535),
-            ("vc7".into(), 1, Vec3::Z * H::VC7),
-            ("skullbase".into(), 1, Vec3::Z * H::SKULLBASE),
-            ("head_center".into(), 1, Vec3::new(0.008, 0.0, 0.937)),
-            ("skull_tip".into(), 1, Vec3::Z * 0.997),
-        ];
+        let mut builder = Builder::default();
+        let (legs, arms) = builder.trunk(model);
         for (prefix, side) in [("l", 1.0), ("r", -1.0)] {
-            let named = |name: &str| format!("{prefix}_{name}");
-            let link = |name: &str, centre, semi_axis, flexion_axis| Link {
-                name: named(name),
-                centre,
-                semi_axes: [semi_axis, 0.0],
-                flexion_axis,
-            };
-            let shoulder = side_point(side, H::SHOULDER);
-            let elbow = shoulder - Vec3::Z * H::UPPER_ARM;
-            let wrist = elbow - Vec3::Z * H::FOREARM;
-            let hip = side_point(side, H::HIP);
-            let knee = Vec3::new(0.0, hip.y, H::KNEE);
-            let ankle = Vec3::new(0.0, hip.y, H::ANKLE);
-            let arm = parts.len();
-            // A hanging forearm turns forward about the axis to the right, a hanging calf backward about the one to the left.
-            let (to_right, to_left) = (-Vec3::Y, Vec3::Y);
-            parts.push(part(
-                named("upperarm"),
-                shoulder,
-                H::UPPER_ARM_GIRTH,
-                H::UPPER_ARM,
-                (0, link("shoulder", shoulder, 0.0, to_right)),
-                [false; 2],
-            ));
-            parts.push(part(
-                named("forearm"),
-                elbow,
-                H::FOREARM_GIRTH,
-                H::FOREARM + H::HAND_END,
-                (arm, link("elbow", elbow, H::ELBOW_HINGE, to_right)),
-                [false, true],
-            ));
-            parts.push(part(
-                named("thigh"),
-                hip,
-                H::THIGH_GIRTH,
-                H::HIP[1] - H::KNEE,
-                (0, link("hip", hip, H::HIP_HINGE, to_right)),
-                [false; 2],
-            ));
-            parts.push(part(
-                named("calf"),
-                knee,
-                H::CALF_GIRTH,
-                H::KNEE,
-                (arm + 2, link("knee", knee, H::KNEE_HINGE, to_left)),
-                [false, true],
-            ));
-            sites.extend([
-                (named("shoulder"), arm, shoulder),
-                (named("elbow"), arm + 1, elbow),
-                (named("wrist"), arm + 1, wrist),
-                (named("hand"), arm + 1, wrist - Vec3::Z * H::HAND_CENTRE),
-                (named("hip"), arm + 2, hip),
-                (named("knee"), arm + 3, knee),
-                (named("ankle"), arm + 3, ankle),
-            ]);
+            builder.arm(model, prefix, side, arms);
+            builder.leg(model, prefix, side, legs);
         }
-        assemble("human", parts, sites)?.scaled(stature)
+        builder.finish("human")?.scaled(stature)
     }
-}
-
-/// Limbs with their frames and joints from parts given in one standing frame.
-fn assemble(name: &str, parts: Vec<Part>, sites: Vec<(String, usize, Vec3)>) -> Result<Body, BodyError> {
-    let downward = Quat::from_axis_angle(Vec3::X, std::f64::consts::PI);
-    let standing_from_limb: Vec<Pose> = parts
-        .iter()
-        .map(|part| Pose::from_parts(part.start, if part.upright { Quat::IDENTITY } else { downward }))
-        .collect();
-    let mut limbs = Vec::with_capacity(parts.len());
-    for (index, part) in parts.into_iter().enumerate() {
-        let [length, a0, b0, a1, b1] = part.shape;
-        let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1)
-            .map_err(|source| BodyError::Shape { key: format!("limbs.{}", part.name), source })?;
-        let parent = part.parent.map(|(parent, link)| {
-            let z = standing_from_limb[index].rotation * Vec3::Z;
-            let axes = Mat3::from_cols(link.flexion_axis, z.cross(link.flexion_axis), z);
-            let standing_from_joint = Pose::from_parts(link.centre, Quat::from_mat3(&axes));
-            let joint = Joint {
-                name: link.name,
-                parent_from_joint: standing_from_limb[parent].inv_mul(&standing_from_joint),
-                limb_from_joint: standing_from_limb[index].inv_mul(&standing_from_joint),
-                semi_axes: link.semi_axes,
-                weight: 1.0,
-            };
-            (parent, joint)
-        });
-        limbs.push(Limb { name: part.name, shape, parent, match_caps: part.match_caps });
-    }
-    let sites = sites
-        .into_iter()
-        .map(|(name, limb, point)| Site {
-            name,
-            limb,
-            position: standing_from_limb[limb].inverse_transform_point(point),
-        })
-        .collect();
-    Body::new(name, limbs, sites)
 }

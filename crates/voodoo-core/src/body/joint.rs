@@ -19,6 +19,10 @@ pub struct Joint {
     pub semi_axes: [f64; 2],
     /// Strength relative to the other joints of a limb.
     pub weight: f64,
+    /// Least and greatest value of each component of the joint's rotation vector (joint frame, radians); `None`: free.
+    pub limits: Option<[[f64; 2]; 3]>,
+    /// Standard deviation of the joint's unexpected turn in 1/30 s, radians.
+    pub motion: f64,
 }
 
 /// The cases of K07 figure 3.

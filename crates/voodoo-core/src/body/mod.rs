@@ -5,7 +5,7 @@ mod fit;
 mod human;
 mod joint;
 
-pub use human::HumanProportions;
+pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 
 use crate::error::BodyError;
@@ -179,6 +179,15 @@ fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
     }
     if !joint.weight.is_finite() || joint.weight <= 0.0 {
         return wrong("weight", "a finite weight above zero", joint.weight.to_string());
+    }
+    if !joint.motion.is_finite() || joint.motion <= 0.0 {
+        return wrong("motion", "a finite angle above zero", joint.motion.to_string());
+    }
+    if let Some(limits) = joint
+        .limits
+        .filter(|limits| !limits.iter().all(|[low, high]| low <= high && low.is_finite() && high.is_finite()))
+    {
+        return wrong("limits", "three pairs (least, greatest) of radians", format!("{limits:?}"));
     }
     for (field, pose) in [("parent_from_joint", &joint.parent_from_joint), ("limb_from_joint", &joint.limb_from_joint)]
     {

@@ -8,7 +8,7 @@ impl TaperedEllipticCylinder {
     ///
     /// To the side it is the first-order distance `(ρ - 1) / |∇ρ|` of the level function `ρ = sqrt((x/a(z))² + (y/b(z))²)`,
     /// exact to about 1 mm (95 % of points within 5 cm of limb-like shapes); beyond a cap it is joined with the height above
-    /// the cap. About five times cheaper than [`Self::closest_point`]; only the order of limbs should depend on it.
+    /// the cap. No iteration; only the order of limbs should depend on it.
     pub fn approximate_distance(&self, q: Vec3) -> f64 {
         let (a, b) = self.semi_axes(q.z);
         let tiny = 1e-9;

@@ -34,7 +34,7 @@ impl TaperedEllipticCylinder {
     ///
     /// For a query folded to `x, y >= 0` the side asks for the least of `g(θ) = min_t |P(θ, t) - q|²` on a quadrant, where
     /// `g'(0) <= 0 <= g'(π/2)`: Newton's iteration, kept in a bracket by bisection, always ends in a minimum. `g` has only
-    /// one when `a0 b1 = a1 b0`; otherwise a scan finds the basins first. The caps compete where the query projects into
+    /// one when `a0 b1 = a1 b0` and no end is nearly a tip; otherwise a scan finds the basins first. The caps compete where the query projects into
     /// them. Where several points are equally near (on the medial axis) one of them is returned.
     ///
     /// A query that is not finite gives a point and a distance that are not a number.
@@ -93,12 +93,22 @@ impl TaperedEllipticCylinder {
         if first == second { 0.0 } else { (first - second).abs() / (first + second) }
     }
 
+    /// True when neither end is nearly a tip. All θ meet in a tip, so `g` has a plateau where it is nearest.
+    pub(super) fn is_blunt(&self) -> bool {
+        let (first, last) = (self.a0.max(self.b0), self.a1.max(self.b1));
+        first.min(last) > 0.2 * first.max(last)
+    }
+
     /// The closest point of the side with its rims, for a query with `x, y >= 0`.
     fn closest_on_side(&self, q: Vec3) -> Foot {
-        if self.aspect_change() < 1e-12 {
-            return self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q);
+        let guessed = self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q);
+        if self.aspect_change() < 1e-12 && self.is_blunt() {
+            return guessed;
         }
         let mut best = self.scan(Angle { c: 1.0, s: 1.0 }, q);
+        if guessed.squared < best.squared {
+            best = guessed;
+        }
         for (a, b) in [(self.a0, self.b0), (self.a1, self.b1)] {
             let ratio = a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
             if ratio < 0.5 {
@@ -138,7 +148,8 @@ impl TaperedEllipticCylinder {
 
     /// A starting angle: the direction `(x/a, y/b)` of the slice, then one step over the evolute of its ellipse.
     fn guess(&self, q: Vec3) -> Angle {
-        let (a, b) = self.semi_axes(q.z);
+        // Not the very ends: a tip has no ellipse.
+        let (a, b) = self.semi_axes(q.z.clamp(0.1 * self.length, 0.9 * self.length));
         let near = Angle::of(q.x * b, q.y * a).unwrap_or(Angle { c: 0.8, s: 0.6 });
         let focus = a * a - b * b;
         let x = a * q.x - focus * near.c.powi(3);

@@ -5,10 +5,8 @@ use crate::geometry::{Mat3, Pose, Vec3};
 
 /// Points a block. The loop over a block has no branch and no bounds check, so it becomes SIMD of the target's width.
 pub(super) const BLOCK: usize = 32;
-/// Newton steps after the start; what has not converged then is redone by the exact path.
-const STEPS: usize = 2;
-/// Largest estimated error of the foot point, metres, that passes as converged.
-const CONVERGED: f32 = 3e-7;
+/// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, metres, that passes.
+const CONVERGED: f32 = 3e-8;
 /// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned; it falls to 0 at the medial axis, and the error of the
 /// foot is that of the query divided by it.
 const CONDITIONED: f32 = 0.3;
@@ -22,7 +20,11 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub const ZERO: Self = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+    pub const ZERO: Self = Self {
+        x: [0.0; BLOCK],
+        y: [0.0; BLOCK],
+        z: [0.0; BLOCK],
+    };
 }
 
 /// The results of one block, in the frame of the queries.
@@ -54,6 +56,8 @@ pub(super) struct Constants {
     columns: [[f32; 3]; 3],
     origin: [f32; 3],
     rest: [f32; 3],
+    /// What the square of the last Newton step is multiplied with to bound the error it leaves, metres.
+    second_order: f32,
     length: f32,
     inverse_length: f32,
     a0: f32,
@@ -72,10 +76,21 @@ impl Constants {
         let origin = world_from_limb.translation.as_vec3();
         let rest = rotation.transpose() * (world_from_limb.translation - origin.as_dvec3());
         let cap = |a: f64, b: f64| [(a * a) as f32, (b * b) as f32, (a * a * b * b) as f32];
+        let size = shape.a0.max(shape.a1).max(shape.b0).max(shape.b1);
+        // The flatter an ellipse, the larger the third derivative of g at its tips.
+        let aspect = f64::max(
+            shape.a0.max(shape.b0) / shape.a0.min(shape.b0),
+            shape.a1.max(shape.b1) / shape.a1.min(shape.b1),
+        );
         Self {
-            columns: [single(rotation.x_axis), single(rotation.y_axis), single(rotation.z_axis)],
+            columns: [
+                single(rotation.x_axis),
+                single(rotation.y_axis),
+                single(rotation.z_axis),
+            ],
             origin: origin.to_array(),
             rest: single(rest),
+            second_order: (size * aspect) as f32,
             length: shape.length as f32,
             inverse_length: (1.0 / shape.length) as f32,
             a0: shape.a0 as f32,
@@ -85,6 +100,16 @@ impl Constants {
             proximal: cap(shape.a0, shape.b0),
             distal: cap(shape.a1, shape.b1),
         }
+    }
+
+    /// Semi-axes of the slice at height `z`, clamped to the ends.
+    #[inline(always)]
+    fn slice<const FMA: bool>(&self, z: f32) -> (f32, f32) {
+        let t = max(min(z * self.inverse_length, 1.0), 0.0);
+        (
+            fma::<FMA>(self.da, t, self.a0),
+            fma::<FMA>(self.db, t, self.b0),
+        )
     }
 }
 
@@ -111,10 +136,9 @@ fn select(condition: bool, yes: f32, no: f32) -> f32 {
 
 /// The foot on one ruling and the derivatives of `g`, as in `ruling`.
 struct Foot {
-    t: f32,
-    a: f32,
-    b: f32,
-    e: [f32; 3],
+    /// The parameter along the ruling before it is clamped to 0..1, and its derivative by θ.
+    free: f32,
+    drift: f32,
     slope: f32,
     bend: f32,
     tangent: f32,
@@ -138,8 +162,15 @@ fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) 
     // P_θ · D + e · D_θ, with D_θ = (-a' s, b' c, 0).
     let turned = fma::<FMA>(-k.da * s, e[0], (k.db * c) * e[1]);
     let mixed = fma::<FMA>(tx, dx, fma::<FMA>(ty, dy, turned));
-    let coupling = select(t == free, mixed * mixed * inverse, 0.0);
-    Foot { t, a, b, e, slope, bend: tangent - curved - coupling, tangent }
+    let drift = -mixed * inverse;
+    let coupling = select(t == free, mixed * drift, 0.0);
+    Foot {
+        free,
+        drift,
+        slope,
+        bend: tangent - curved + coupling,
+        tangent,
+    }
 }
 
 #[inline(always)]
@@ -148,52 +179,100 @@ fn unit<const FMA: bool>(x: f32, y: f32) -> (f32, f32) {
     (x * inverse, y * inverse)
 }
 
+/// The unit vector along a vector whose length is 1 but for a small step: `1/sqrt(1 + u) = 1 - u/2 + 3u²/8 - ...`.
+#[inline(always)]
+fn nearly_unit<const FMA: bool>(x: f32, y: f32) -> (f32, f32) {
+    let u = fma::<FMA>(x, x, fma::<FMA>(y, y, -1.0));
+    let factor = fma::<FMA>(u, fma::<FMA>(u, fma::<FMA>(u, -0.3125, 0.375), -0.5), 1.0);
+    (x * factor, y * factor)
+}
+
+/// The Newton step of `foot`, with `g''` kept positive and the step small enough for [`nearly_unit`].
+#[inline(always)]
+fn newton(foot: &Foot) -> f32 {
+    let step = -foot.slope / max(foot.bend, 0.1 * foot.tangent + 1e-20);
+    max(min(step, 0.2), -0.2)
+}
+
+/// The angle after a Newton step, kept in the quadrant.
+#[inline(always)]
+fn turned<const FMA: bool>(c: f32, s: f32, step: f32) -> (f32, f32) {
+    nearly_unit::<FMA>(
+        max(fma::<FMA>(-step, s, c), 0.0),
+        max(fma::<FMA>(step, c, s), 0.0),
+    )
+}
+
 /// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
+///
+/// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
 #[inline(always)]
 pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut Surface) {
+    let mut limb = Block::ZERO;
+    let (mut cosine, mut sine) = ([0f32; BLOCK], [0f32; BLOCK]);
     for i in 0..BLOCK {
-        let (wx, wy, wz) = (queries.x[i] - k.origin[0], queries.y[i] - k.origin[1], queries.z[i] - k.origin[2]);
+        let (wx, wy, wz) = (
+            queries.x[i] - k.origin[0],
+            queries.y[i] - k.origin[1],
+            queries.z[i] - k.origin[2],
+        );
         let turn = |axis: usize| {
             let [cx, cy, cz] = k.columns[axis];
-            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])))
+            fma::<FMA>(
+                cx,
+                wx,
+                fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])),
+            )
         };
         let (qx, qy, z) = (turn(0), turn(1), turn(2));
-        let (x, y) = (qx.abs(), qy.abs());
-
+        (limb.x[i], limb.y[i], limb.z[i]) = (qx, qy, z);
         // Start: the direction (x/a, y/b) in the slice, then one step over the evolute of the slice.
-        let height = max(min(z * k.inverse_length, 1.0), 0.0);
-        let (a, b) = (fma::<FMA>(k.da, height, k.a0), fma::<FMA>(k.db, height, k.b0));
-        let tiny = 1e-20;
+        let (x, y) = (qx.abs(), qy.abs());
+        let (a, b) = k.slice::<FMA>(z);
+        let tiny = 1e-18;
         let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
         let focus = fma::<FMA>(a, a, -(b * b));
-        let (mut c, mut s) = unit::<FMA>(
+        (cosine[i], sine[i]) = unit::<FMA>(
             max(fma::<FMA>(a, x, -(focus * c) * (c * c)), tiny),
             max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny),
         );
-        for _ in 0..STEPS {
-            let f = foot::<FMA>(k, c, s, x, y, z);
-            let step = -f.slope / max(f.bend, 0.1 * f.tangent + tiny);
-            let step = max(min(step, 1.0), -1.0);
-            (c, s) = unit::<FMA>(max(fma::<FMA>(-step, s, c), 0.0), max(fma::<FMA>(step, c, s), 0.0));
-        }
-        let f = foot::<FMA>(k, c, s, x, y, z);
-        let [ex, ey, ez] = f.e;
+    }
+    for i in 0..BLOCK {
+        let (c, s) = (cosine[i], sine[i]);
+        let f = foot::<FMA>(k, c, s, limb.x[i].abs(), limb.y[i].abs(), limb.z[i]);
+        (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
+    }
+    for i in 0..BLOCK {
+        let (qx, qy, z) = (limb.x[i], limb.y[i], limb.z[i]);
+        let (x, y) = (qx.abs(), qy.abs());
+        let f = foot::<FMA>(k, cosine[i], sine[i], x, y, z);
+        // The last step moves t along with the angle to first order; what it leaves is of second order in the step.
+        let step = newton(&f);
+        let (c, s) = turned::<FMA>(cosine[i], sine[i], step);
+        let free = fma::<FMA>(f.drift, step, f.free);
+        let t = max(min(free, 1.0), 0.0);
+        let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
+        let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
+        let ez = fma::<FMA>(k.length, t, -z);
         let side = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
-        let trusted = (f.slope * f.slope) * f.tangent <= (CONVERGED * f.bend) * (CONVERGED * f.bend)
-            && f.bend >= CONDITIONED * f.tangent;
+        // A step across a rim meets another g'' there, so its error is of first order.
+        let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
+        let error = k.second_order * select(crossed, step.abs(), step * step);
+        let trusted = (error < CONVERGED) & (f.bend >= CONDITIONED * f.tangent);
 
         // Inside: between the caps and inside the slice.
         let (xx, yy) = (x * x, y * y);
-        let (aa, bb) = (a * a, b * b);
+        let (aa, bb) = k.slice::<FMA>(z);
+        let (aa, bb) = (aa * aa, bb * bb);
         let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
         let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
 
-        // Caps, where the query projects into them.
+        // Caps, where the query projects into them. Beyond one it is the nearest face, whatever the rounding of `side`.
         let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
         let top = z - k.length;
-        let proximal = over(k.proximal) & (z * z < side);
+        let proximal = over(k.proximal) & ((z < 0.0) | (z * z < side));
         let squared = select(proximal, z * z, side);
-        let distal = over(k.distal) & (top * top < squared);
+        let distal = over(k.distal) & ((top > 0.0) | (top * top < squared));
         let squared = select(distal, top * top, squared);
         let proximal = proximal & !distal;
         let cap = proximal | distal;
@@ -207,10 +286,10 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         let ez = select(distal, -top, select(proximal, -z, ez));
 
         // Normal: P_θ × P_t on the side, the direction to the query on a rim.
-        let rim = (f.t <= 0.0) | (f.t >= 1.0);
-        let nx = select(rim, -ex * sign, f.b * c * k.length * sx);
-        let ny = select(rim, -ey * sign, f.a * s * k.length * sy);
-        let slant = fma::<FMA>(f.a * k.db, s * s, f.b * k.da * (c * c));
+        let rim = (t <= 0.0) | (t >= 1.0);
+        let nx = select(rim, -ex * sign, b * c * k.length * sx);
+        let ny = select(rim, -ey * sign, a * s * k.length * sy);
+        let slant = fma::<FMA>(a * k.db, s * s, b * k.da * (c * c));
         let nz = select(rim, -ez * sign, -slant);
         let norm = fma::<FMA>(nx, nx, fma::<FMA>(ny, ny, nz * nz));
         let inverse = 1.0 / norm.sqrt();
@@ -222,7 +301,11 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
             fma::<FMA>(
                 k.columns[0][axis],
                 x,
-                fma::<FMA>(k.columns[1][axis], y, fma::<FMA>(k.columns[2][axis], z, base)),
+                fma::<FMA>(
+                    k.columns[1][axis],
+                    y,
+                    fma::<FMA>(k.columns[2][axis], z, base),
+                ),
             )
         };
         out.points.x[i] = world(0, ex, ey, ez, queries.x[i]);
@@ -232,12 +315,22 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         out.normals.y[i] = world(1, nx, ny, nz, 0.0);
         out.normals.z[i] = world(2, nx, ny, nz, 0.0);
         out.signed_distance[i] = sign * distance;
-        let edge = if f.t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
+        let edge = if t <= 0.0 {
+            Region::ProximalRim as u8
+        } else {
+            Region::DistalRim as u8
+        };
         let lateral = if rim { edge } else { Region::Side as u8 };
-        let flat = if distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
+        let flat = if distal {
+            Region::DistalCap as u8
+        } else {
+            Region::ProximalCap as u8
+        };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere is doubtful.
-        let clear = trusted & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        let clear = trusted
+            & (cap | (norm > 1e-12))
+            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
         out.doubtful[i] = u8::from(!clear);
     }
 }

@@ -1,8 +1,7 @@
 //! The published solver: weighted absolute orientation, each limb alone (K06 IV-B.7, K07 3.2).
 
-use super::Solver;
-use crate::body::Body;
-use crate::correspondence::{Correspondences, LimbMatches};
+use super::{Problem, Solver};
+use crate::correspondence::LimbMatches;
 use crate::geometry::{Mat3, Pose, Vec3};
 use crate::rigid::Moments;
 
@@ -14,7 +13,8 @@ const STAY: f64 = 0.05;
 pub struct Limbwise;
 
 impl Solver for Limbwise {
-    fn solve(&mut self, _body: &Body, correspondences: &Correspondences, poses: &mut [Pose]) {
+    fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
+        let correspondences = problem.correspondences;
         for (limb, pose) in poses.iter_mut().enumerate() {
             // Moments about the limb's own position keep the sums well conditioned.
             let centre = pose.translation;
@@ -37,6 +37,10 @@ impl Solver for Limbwise {
                 *pose = Pose::from_parts(centre + motion.translation, rotation);
             }
         }
+    }
+
+    fn starts_from_prediction(&self) -> bool {
+        false
     }
 }
 

@@ -1,23 +1,49 @@
 //! Step 7: the pose that fits the correspondences. The solver is the one replaceable part of the step.
 
+mod chain;
+mod cholesky;
 mod limbwise;
+mod whole_body;
 
+pub use chain::ChainSolver;
 pub use limbwise::Limbwise;
+pub use whole_body::WholeBody;
 
 use crate::body::Body;
-use crate::config::SolverKind;
+use crate::config::{Config, SolverKind};
 use crate::correspondence::Correspondences;
 use crate::geometry::Pose;
 
+/// What a solver works on: one ICP step of one frame.
+#[derive(Debug)]
+pub struct Problem<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// What was matched at the current poses.
+    pub correspondences: &'a Correspondences,
+    /// The poses expected before the frame was seen.
+    pub predicted: &'a [Pose],
+    /// Index of the step in its frame.
+    pub step: usize,
+    /// Seconds since the last frame, as multiples of 1/30 s; the standard deviations of motion grow with it.
+    pub pace: f64,
+    /// Parameters.
+    pub config: &'a Config,
+}
+
 /// Moves the limbs towards their correspondences.
 pub trait Solver: std::fmt::Debug + Send + Sync {
-    /// One update of all poses (working frame) from one set of correspondences.
-    fn solve(&mut self, body: &Body, correspondences: &Correspondences, poses: &mut [Pose]);
+    /// One update of all poses (working frame).
+    fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
+
+    /// Whether a frame starts from the predicted poses; the published method starts from the last ones.
+    fn starts_from_prediction(&self) -> bool;
 }
 
 /// The solver of a configuration.
 pub fn solver(kind: SolverKind) -> Box<dyn Solver> {
     match kind {
         SolverKind::Limbwise => Box::new(Limbwise),
+        SolverKind::Chain => Box::new(WholeBody::default()),
     }
 }

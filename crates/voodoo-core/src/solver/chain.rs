@@ -1,0 +1,133 @@
+//! Gauss-Newton over the whole body with exact joints: `H = J^T H_limbs J` (R07 eq. 10, method section 4.3).
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::cholesky::solve_in_place;
+use crate::body::Body;
+use crate::chain::{Chain, exp, joint_axes, joint_turn, place, screw};
+use crate::geometry::{Pose, Quat, Vec3};
+use crate::normal::Normal;
+
+/// Largest turn of a joint in one step, radians.
+const LARGEST_TURN: f64 = 0.5;
+
+/// Working memory of the chain solver.
+#[derive(Debug, Default)]
+pub struct ChainSolver {
+    chain: Chain,
+    screws: Vec<Vector6<f64>>,
+    composite: Vec<(Matrix6<f64>, Vector6<f64>)>,
+    h: Vec<f64>,
+    step: Vec<f64>,
+}
+
+impl ChainSolver {
+    /// One damped step from the normal equations at `poses`; the joints come out exactly closed.
+    pub fn step(&mut self, body: &Body, normal: &Normal, damping: f64, poses: &mut [Pose]) {
+        self.chain.layout(body);
+        self.assemble(body, normal, poses, damping);
+        if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {
+            self.apply(body, poses);
+        }
+    }
+
+    fn assemble(&mut self, body: &Body, normal: &Normal, poses: &[Pose], damping: f64) {
+        let Self { chain, screws, composite, h, step } = self;
+        let n = chain.freedoms;
+        screws.clear();
+        screws.extend((0..6).map(|i| Vector6::ith(i, 1.0)));
+        for limb in &body.limbs()[1..] {
+            if let Some((parent, joint)) = &limb.parent {
+                let centre = poses[*parent] * joint.parent_from_joint.translation;
+                let (axes, count) = joint_axes(joint, &poses[*parent]);
+                screws.extend(axes[..count].iter().map(|axis| screw(*axis, centre)));
+            }
+        }
+        // Blocks of a limb and all that hangs on it, leaf to root.
+        composite.clear();
+        composite.extend(normal.limbs.iter().map(|block| (block.h, block.g)));
+        for limb in (1..composite.len()).rev() {
+            let (h, g) = composite[limb];
+            let parent = &mut composite[chain.parent[limb]];
+            parent.0 += h;
+            parent.1 += g;
+        }
+        h.clear();
+        h.resize(n * n, 0.0);
+        step.clear();
+        step.resize(n, 0.0);
+        for limb in 0..composite.len() {
+            let (block, gradient) = &composite[limb];
+            for row in chain.start[limb]..chain.start[limb] + chain.count[limb] {
+                let force = block * screws[row];
+                step[row] = -screws[row].dot(gradient);
+                // Every ancestor's freedoms move this limb too.
+                let mut ancestor = limb;
+                loop {
+                    for column in chain.start[ancestor]..chain.start[ancestor] + chain.count[ancestor] {
+                        if column <= row {
+                            h[row * n + column] = force.dot(&screws[column]);
+                        }
+                    }
+                    if ancestor == 0 {
+                        break;
+                    }
+                    ancestor = chain.parent[ancestor];
+                }
+            }
+        }
+        for limb in 1..composite.len() {
+            let block = &normal.joints[limb];
+            let rows = chain.start[limb]..chain.start[limb] + chain.count[limb];
+            for row in rows.clone() {
+                let turn = screws[row].fixed_rows::<3>(0);
+                let force = block.h * turn;
+                step[row] -= turn.dot(&block.g);
+                for column in rows.start..=row {
+                    h[row * n + column] += force.dot(&screws[column].fixed_rows::<3>(0));
+                }
+            }
+        }
+        for row in 0..n {
+            h[row * n + row] += damping * h[row * n + row] + 1e-6;
+        }
+    }
+
+    fn apply(&mut self, body: &Body, poses: &mut [Pose]) {
+        let Self { chain, step, .. } = self;
+        let largest = step
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !(3..6).contains(i))
+            .fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
+        let shrink = (LARGEST_TURN / largest.max(LARGEST_TURN)).min(1.0);
+        let part = |index: usize| shrink * step[index];
+        let turns = |limb: usize| -> Vec3 {
+            let start = chain.start[limb];
+            Vec3::new(part(start), part(start + 1), part(start + 2))
+        };
+        let twist = Vector6::from_fn(|i, _| part(i));
+        // Turns are read from the old poses before their parents move: children stand behind parents, so walk backwards.
+        let limbs = body.limbs();
+        for index in (1..limbs.len()).rev() {
+            if let Some((parent, joint)) = &limbs[index].parent {
+                let turn = joint_turn(joint, &poses[*parent], &poses[index]);
+                let more = match chain.count[index] {
+                    1 => crate::chain::hinge_axis(joint) * part(chain.start[index]),
+                    _ => turns(index),
+                };
+                // The slot keeps the joint's new turn until the forward pass places the limb.
+                poses[index] = Pose::from_rotation((Quat::from_scaled_axis(more) * turn).normalize());
+            }
+        }
+        let motion = exp(&twist);
+        poses[0] = motion * poses[0];
+        poses[0].rotation = poses[0].rotation.normalize();
+        for (index, limb) in limbs.iter().enumerate() {
+            if let Some((parent, joint)) = &limb.parent {
+                poses[index] = place(joint, &poses[*parent], poses[index].rotation);
+                poses[index].rotation = poses[index].rotation.normalize();
+            }
+        }
+    }
+}

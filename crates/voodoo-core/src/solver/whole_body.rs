@@ -1,0 +1,52 @@
+//! All limbs at once: the terms are summed into one system, which the chain solves.
+
+use super::{ChainSolver, Problem, Solver};
+use crate::geometry::Pose;
+use crate::normal::Normal;
+use crate::terms::{Limits, Prior, Sites, Surface, Term};
+
+/// Share of a surface point's information across its normal (method section 1: 0.05 to 0.1 stops sliding).
+const SLIDE: f64 = 0.07;
+/// Standard deviation of a violated joint limit, radians: 3 degrees.
+const LIMIT_SIGMA: f64 = 0.05;
+/// Relative damping of the normal matrix.
+const DAMPING: f64 = 1e-3;
+
+/// Damped Gauss-Newton on robust terms.
+#[derive(Debug, Default)]
+pub struct WholeBody {
+    normal: Normal,
+    chain: ChainSolver,
+    joint_sigmas: Vec<f64>,
+}
+
+impl Solver for WholeBody {
+    fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
+        let Problem { body, correspondences, predicted, config, .. } = problem;
+        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        // The kernel narrows from step to step: far points pull while the pose is rough.
+        let narrowing = 0.6_f64.powi(problem.step as i32);
+        let scale = (config.kernel_start * narrowing).max(config.kernel_end);
+        self.joint_sigmas.clear();
+        self.joint_sigmas.extend(body.limbs().iter().map(|limb| {
+            limb.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * problem.pace * config.motion_scale
+        }));
+        let root =
+            [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
+        self.normal.clear(poses.len());
+        let terms: [&dyn Term; 4] = [
+            &Surface { correspondences, information, slide: SLIDE, scale },
+            &Sites { correspondences, information, scale: 3.0 * scale },
+            &Prior { predicted, root, joints: &self.joint_sigmas },
+            &Limits { sigma: LIMIT_SIGMA },
+        ];
+        for term in terms {
+            term.add(body, poses, &mut self.normal);
+        }
+        self.chain.step(body, &self.normal, DAMPING, poses);
+    }
+
+    fn starts_from_prediction(&self) -> bool {
+        true
+    }
+}

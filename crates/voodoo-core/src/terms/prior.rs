@@ -1,0 +1,58 @@
+//! Prediction and smoothness (R07 eq. 16-18, 26): the root's twist and every joint's turn are drawn to the predicted ones.
+
+use super::Term;
+use crate::body::Body;
+use crate::geometry::{Pose, Quat, Vec3};
+use crate::normal::Normal;
+
+/// Deviation from a predicted pose.
+#[derive(Debug)]
+pub struct Prior<'a> {
+    /// Predicted poses, working frame.
+    pub predicted: &'a [Pose],
+    /// Standard deviations of the root: radians, metres.
+    pub root: [f64; 2],
+    /// Standard deviation of each joint's turn, radians.
+    pub joints: &'a [f64],
+}
+
+impl Term for Prior<'_> {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
+        // Root: rotation and position apart, so that the lever to the working origin does not matter.
+        let [turn, shift] = self.root.map(|sigma| 1.0 / (sigma * sigma));
+        let r = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
+        let d = poses[0].translation - self.predicted[0].translation;
+        let block = &mut normal.limbs[0];
+        for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
+            block.h[(i, i)] += turn;
+            block.g[i] += turn * r[i];
+            block.add_row(shift, &crate::normal::line(poses[0].translation, axis), d[i]);
+        }
+        normal.cost += turn * r.length_squared() + shift * d.length_squared();
+        for (index, limb) in body.limbs().iter().enumerate() {
+            let Some((parent, _)) = &limb.parent else { continue };
+            let weight = 1.0 / (self.joints[index] * self.joints[index]);
+            let relative = |poses: &[Pose]| poses[*parent].rotation.inverse() * poses[index].rotation;
+            // Deviation in the parent's frame, then in world axes: its derivative by the relative turn is one.
+            let turn = (relative(poses) * relative(self.predicted).inverse()).to_scaled_axis_shortest();
+            let r = poses[*parent].rotation * turn;
+            normal.joints[index].add_turn(weight, r);
+            normal.cost += weight * r.length_squared();
+        }
+    }
+}
+
+/// Rotation vector of the shorter way round.
+pub(crate) trait ShortestAxis {
+    /// At most pi long.
+    fn to_scaled_axis_shortest(self) -> Vec3;
+}
+
+impl ShortestAxis for Quat {
+    fn to_scaled_axis_shortest(self) -> Vec3 {
+        let q = if self.w < 0.0 { -self } else { self };
+        let v = Vec3::new(q.x, q.y, q.z);
+        let sine = v.length();
+        if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
+    }
+}

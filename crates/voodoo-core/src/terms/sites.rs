@@ -1,0 +1,29 @@
+//! Named sites with positions and rays (method section 1): `(x - p)^T W (x - p)` under a robust kernel.
+
+use super::{Term, surface::geman_mcclure};
+use crate::body::Body;
+use crate::correspondence::Correspondences;
+use crate::geometry::Pose;
+use crate::normal::Normal;
+
+/// All site pairs; `scale` is the kernel's, metres.
+#[derive(Debug)]
+pub struct Sites<'a> {
+    /// The pairs.
+    pub correspondences: &'a Correspondences,
+    /// Information of a pair of weight one, 1/m^2.
+    pub information: f64,
+    /// Scale of the kernel, metres.
+    pub scale: f64,
+}
+
+impl Term for Sites<'_> {
+    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut Normal) {
+        for pair in &self.correspondences.sites {
+            let r = pair.x - pair.p;
+            let (rho, kernel) = geman_mcclure(r.length(), self.scale);
+            normal.cost += pair.weight * self.information * rho;
+            normal.limbs[pair.limb].add_point(&(pair.information * (self.information * kernel)), pair.x, r);
+        }
+    }
+}

@@ -1,0 +1,303 @@
+"""The command line. Every command is a few calls of the package; nothing is computed here."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import voodoo
+from voodoo.errors import VoodooError
+from voodoo.overlay import Overlay, Picture, contact_sheet
+from voodoo.picture_writer import PictureWriter, save_picture
+from voodoo.recordings import LOADERS, Recording, open_recording, sample_path
+from voodoo.results import Track, check_suffix
+from voodoo.running import Init, start_tracker, track
+
+T = TypeVar("T")
+
+app = typer.Typer(
+    name="voodoo",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+_RecordingArgument = Annotated[
+    Path, typer.Argument(metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, or folder of depth PNGs.")
+]
+_LoaderOption = Annotated[
+    str | None, typer.Option("--loader", metavar="NAME", help=f"Instead of a guess: {', '.join(LOADERS)}.")
+]
+_ConfigOption = Annotated[
+    Path | None, typer.Option("--config", metavar="FILE", help="Settings as TOML; `voodoo config` prints all of them.")
+]
+_BodyOption = Annotated[
+    Path | None, typer.Option("--body", metavar="FILE", help="What to track, as TOML; `voodoo body` prints the human.")
+]
+_HeightOption = Annotated[
+    float | None,
+    typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in metres."),
+]
+_FrameOption = Annotated[
+    str | None,
+    typer.Option("--frame", metavar="NAME", help="Root frame of the result, instead of the recording's own."),
+]
+
+
+def main() -> None:
+    """Entry point of the `voodoo` command."""
+    app()
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        try:
+            typer.echo(f"voodoo {version('voodoo')}")
+        except PackageNotFoundError:
+            typer.echo("voodoo (not installed)")
+        raise typer.Exit
+
+
+@app.callback()
+def voodoo_command(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Follow a person's pose through depth, laser and point cloud recordings, on a plain CPU.
+
+    Try [bold]voodoo demo[/bold] first; then [bold]voodoo info RECORDING[/bold] and
+    [bold]voodoo track RECORDING --out pose.csv --overlay look.mp4[/bold].
+    """
+
+
+@app.command("track")
+def track_command(
+    recording: _RecordingArgument,
+    init: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
+    ] = None,
+    body: _BodyOption = None,
+    height: _HeightOption = None,
+    config: _ConfigOption = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Result, .csv or .npz; by default NAME.csv in this folder.")
+    ] = None,
+    overlay: Annotated[
+        Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
+    ] = None,
+    frame: _FrameOption = None,
+    loader: _LoaderOption = None,
+) -> None:
+    """Track the body through a recording and write one row a frame.
+
+    The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in metres for every joint and site, in the
+    recording's root frame (base_link if it has one). The .npz adds the pose of every limb.
+
+    --init gives the pose in the first frame, by any subset of names that fixes it:
+    [cyan]{"height_m": 1.76, "joints": {"l_shoulder": \\[3.1, -0.3, 1.4], "r_shoulder": \\[3.2, 0.1, 1.4], ...}}[/cyan]
+
+    [bold]Examples[/bold]
+
+    voodoo track walk_bag/ --init start.json --out walk.csv
+
+    voodoo track a1_s1_t1_depth.mat --height 1.80 --out pose.npz --overlay look.mp4
+    """
+    with _clear_errors():
+        if body is not None and height is not None:
+            raise typer.BadParameter("give --body or --height, not both")
+        source = _open(recording, loader, frame)
+        target = out if out is not None else Path(f"{source.name}.csv")
+        check_suffix(target)
+        tracker = start_tracker(
+            source,
+            init=None if init is None else Init.load(init),
+            body=None if body is None else voodoo.Body.load(body),
+            height=height,
+            config=_config(config),
+        )
+        result, _, _ = _run(source, tracker, overlay)
+        result.save(target)
+        typer.echo(f"{len(result)} frames, {_states(result)}; wrote {target}" + (f" and {overlay}" if overlay else ""))
+
+
+@app.command("demo")
+def demo_command(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for result and pictures.")] = Path("voodoo-demo"),
+) -> None:
+    """Run the main job on the bundled recording, a person who bends, scoops and reaches up.
+
+    Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the recording's exact truth.
+    """
+    from voodoo.evaluate import compare
+
+    with _clear_errors():
+        source = open_recording(sample_path())
+        tracker = start_tracker(source)
+        out.mkdir(parents=True, exist_ok=True)
+        result, seconds, sheet = _run(source, tracker, out / "overlay.mp4", sheet=6)
+        result.save(out / "pose.csv")
+        save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
+        errors = compare(source, result)
+        typer.echo(f"{source.name}: {len(result)} frames, {_states(result)}")
+        typer.echo(
+            f"time of a frame   {1e3 * np.mean(seconds):.2f} ms (mean), {1e3 * np.median(seconds):.2f} ms (median)"
+        )
+        typer.echo(f"mean joint error  {100 * np.nanmean(errors):.1f} cm against exact truth, twelve joints")
+        typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")
+
+
+@app.command("eval")
+def eval_command(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings, or folders that hold some.")
+    ],
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for tables and plot.")] = None,
+    config: _ConfigOption = None,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Recordings at the same time; by default one for each core.")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
+    ] = None,
+    loader: _LoaderOption = None,
+) -> None:
+    """Track recordings that bring a truth or a reference skeleton, and measure the result.
+
+    Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
+    summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end.
+
+    [bold]Examples[/bold]
+
+    voodoo eval rendered/ --only '*_cmu' --out report
+
+    voodoo eval utd-mhad/ --jobs 4 --out report
+    """
+    from voodoo.evaluate import evaluate_all, find_recordings
+    from voodoo.report import markdown, write_reports
+
+    with _clear_errors():
+        _config(config)  # a bad file is one error here instead of one for each recording
+        paths = find_recordings(recordings, only=only or ())
+        jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        done = evaluate_all(paths, config_file=config, loader=loader, jobs=jobs)
+        ordered = sorted(_progress(done, "evaluating", len(paths)), key=lambda item: item[0])
+        scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
+        typer.echo(markdown(scores))
+        if out is not None:
+            files = write_reports(out, scores, tables)
+            typer.echo("wrote " + ", ".join(str(file) for file in files))
+        failures = [score for score in scores if score.failure]
+        if failures:
+            raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
+
+
+@app.command("info")
+def info_command(recording: _RecordingArgument, frame: _FrameOption = None, loader: _LoaderOption = None) -> None:
+    """Say what is in a recording: sensors, topics, frames, rates, root frame and reference."""
+    with _clear_errors():
+        typer.echo(str(_open(recording, loader, frame).info()))
+
+
+@app.command("config")
+def config_command() -> None:
+    """Print the default configuration as commented TOML, to change and give back with --config.
+
+    [bold]Example[/bold]
+
+    voodoo config > fast.toml
+    """
+    typer.echo(voodoo.Config().to_toml(), nl=False)
+
+
+@app.command("body")
+def body_command(
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A body file to check and print.")] = None,
+    height: _HeightOption = None,
+) -> None:
+    """Print a body as TOML: the default human of a stature, or a file after checking it."""
+    with _clear_errors():
+        if file is not None and height is not None:
+            raise typer.BadParameter("give FILE or --height, not both")
+        if file is not None:
+            body = voodoo.Body.load(file)
+        else:
+            body = voodoo.Body.human() if height is None else voodoo.Body.human(height=height)
+        typer.echo(body.to_toml(), nl=False)
+
+
+def _open(path: Path, loader: str | None, frame: str | None) -> Recording:
+    options: dict[str, Any] = {} if frame is None else {"root_frame": frame}
+    return open_recording(path, loader=loader, **options)
+
+
+def _config(path: Path | None) -> voodoo.Config:
+    return voodoo.Config() if path is None else voodoo.Config.load(path)
+
+
+def _run(
+    source: Recording, tracker: voodoo.Tracker, overlay: Path | None, *, sheet: int = 0
+) -> tuple[Track, list[float], list[Picture]]:
+    """Track and draw: the result, the time of every frame [s] and `sheet` pictures spread over the recording."""
+    estimates, seconds, pictures = [], [], []
+    chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
+    rate = source.info().rate_hz
+    drawing = Overlay(source)
+    writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
+    with writer or _nothing():
+        for step in _progress(track(source, tracker), source.name, len(source)):
+            estimates.append(step.estimate)
+            seconds.append(step.seconds)
+            if writer is not None or step.index in chosen:
+                picture = drawing.draw(step.recorded, tracker.body, step.estimate, index=step.index)
+                if writer is not None:
+                    writer.write(picture)
+                if step.index in chosen:
+                    pictures.append(picture)
+    return Track.of(estimates), seconds, pictures
+
+
+@contextmanager
+def _nothing() -> Iterator[None]:
+    yield
+
+
+def _states(result: Track) -> str:
+    """How many frames the tracker itself called what, e.g. "88 tracking, 2 lost"."""
+    return ", ".join(f"{result.status.count(word)} {word}" for word in dict.fromkeys(result.status))
+
+
+def _progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
+    """Show a progress bar on stderr, if a person looks at it."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress:
+        yield from progress.track(items, total=total, description=words)
+
+
+@contextmanager
+def _clear_errors() -> Iterator[None]:
+    """Turn errors that have a clear message into that one line on stderr and exit code 1."""
+    try:
+        yield
+    except VoodooError as error:
+        _fail(str(error))
+    except OSError as error:
+        _fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
+
+
+def _fail(message: str) -> None:
+    typer.echo(f"voodoo: {' '.join(message.split())}", err=True)
+    raise typer.Exit(1)

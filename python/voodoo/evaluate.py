@@ -1,0 +1,309 @@
+"""Measuring the tracker on recordings with truth or a reference skeleton, one recording a process."""
+
+from __future__ import annotations
+
+import fnmatch
+import multiprocessing
+import os
+import re
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+import voodoo
+from voodoo import metrics
+from voodoo.errors import RecordingError, VoodooError
+from voodoo.recordings import Recording, open_recording
+from voodoo.recordings.loaders import guess_loader
+from voodoo.results import Track
+from voodoo.running import start_tracker, track
+from voodoo.witness import FrameWitness, Selection, witness
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
+"""How far a joint may be from exact truth, and from another tracker's skeleton, before it counts as lost [m]."""
+
+_SEGMENTED_LOADERS = ("utd-mhad",)
+_RECORDING_SUFFIXES = (".bag", ".mcap", ".db3", ".zip")
+
+
+@dataclass(frozen=True)
+class Score:
+    """How one recording was tracked; metres, seconds and shares in [0, 1], NaN where it cannot be known.
+
+    Args:
+        name: of the recording.
+        path: of the recording.
+        failure: why it could not be tracked to its end; "" when it was. Then all numbers are NaN.
+        frames: how many were tracked.
+        exact: compared with exact truth (else with another tracker's skeleton), None without any reference.
+        error_m: mean error of the twelve joints: at lag 0 against exact truth, at the best lag against a reference.
+        error_lag0_m, error_best_lag_m: both.
+        best_lag: constant lag [frames] with the least error; positive: the estimate is late.
+        within_5cm, within_10cm: share of joint errors, at the same lag as `error_m`.
+        joint_error_m: mean error of each of the twelve joints, at the same lag.
+        tracking_class: 2, 1 or 0 as in K06 Table I, see metrics.tracking_class, at the same lag.
+        lost_joints: the joints that were ever lost.
+        selection: how the person's depth points were found, see witness.
+        depth_within_5cm, depth_median_m, depth_p95_m: of their distances to the model.
+        silhouette_iou: mean over the frames.
+        jitter_m, reference_jitter_m: mean norm of the second difference of the twelve joints.
+        degraded_share, lost_share: frames in which the tracker itself said so.
+        step_s: mean time of a frame from measurements to estimate.
+    """
+
+    name: str
+    path: Path
+    failure: str = ""
+    frames: int = 0
+    exact: bool | None = None
+    error_m: float = np.nan
+    error_lag0_m: float = np.nan
+    error_best_lag_m: float = np.nan
+    best_lag: int | None = None
+    within_5cm: float = np.nan
+    within_10cm: float = np.nan
+    joint_error_m: dict[str, float] = field(default_factory=dict)
+    tracking_class: int | None = None
+    lost_joints: tuple[str, ...] = ()
+    selection: Selection | None = None
+    depth_within_5cm: float = np.nan
+    depth_median_m: float = np.nan
+    depth_p95_m: float = np.nan
+    silhouette_iou: float = np.nan
+    jitter_m: float = np.nan
+    reference_jitter_m: float = np.nan
+    degraded_share: float = np.nan
+    lost_share: float = np.nan
+    step_s: float = np.nan
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameTable:
+    """The same, frame by frame.
+
+    Args:
+        stamps: (F,) [s].
+        status: F words of the tracker.
+        errors: (F, 12) of metrics.JOINTS [m] at the lag of the score.
+        lost: (F, 12).
+        depth_within_5cm, silhouette_iou, step_s: (F,).
+    """
+
+    stamps: FloatArray
+    status: tuple[str, ...]
+    errors: FloatArray
+    lost: npt.NDArray[np.bool_]
+    depth_within_5cm: FloatArray
+    silhouette_iou: FloatArray
+    step_s: FloatArray
+
+
+def evaluate(path: Path, *, config: voodoo.Config | None = None, loader: str | None = None) -> tuple[Score, FrameTable]:
+    """Track a recording from its own start and measure the result.
+
+    Raises:
+        VoodooError: it cannot be read, has no start, or a frame was refused.
+    """
+    recording = open_recording(path, loader=loader)
+    tracker = start_tracker(recording, config=config)
+    selection = select_by(recording)
+    steps = []
+    for frame in track(recording, tracker):
+        estimate = frame.estimate
+        truth = _truth_at(recording, estimate.stamp)
+        joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
+        seen = witness(frame.recorded, tracker, estimate, truth, selection)
+        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, joints, seen))
+    if not steps:
+        raise RecordingError(f"{path}: expected at least one frame, found none")
+    return _score(recording, path, selection, steps)
+
+
+def compare(recording: Recording, result: Track) -> FloatArray:
+    """Errors (F, 12) [m] of metrics.JOINTS against the recording's reference at lag 0; NaN where it is missing."""
+    column = {name: index for index, name in enumerate(result.joint_names)}
+    positions = np.full((len(result), len(metrics.JOINTS), 3), np.nan)
+    for index, name in enumerate(metrics.JOINTS):
+        if name in column:
+            positions[:, index] = result.joints[:, column[name]]
+    return metrics.joint_errors(positions, _reference_positions(recording, result.stamps))
+
+
+def select_by(recording: Recording) -> Selection:
+    """How the person's points are told from the background in this recording, see witness."""
+    if recording.info().loader in _SEGMENTED_LOADERS:
+        return "segmented"
+    return "truth" if recording.reference is not None and recording.reference.exact else "model"
+
+
+def evaluate_all(
+    paths: Sequence[Path], *, config_file: Path | None = None, loader: str | None = None, jobs: int = 1
+) -> Iterator[tuple[int, Score, FrameTable | None]]:
+    """Evaluate recordings in parallel processes; (index in `paths`, score, frames) as each is done, in any order.
+
+    A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
+    """
+    tasks = [(str(path), None if config_file is None else str(config_file), loader) for path in paths]
+    if jobs == 1 or len(tasks) == 1:
+        for index, task in enumerate(tasks):
+            yield index, *_task(*task)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_one_thread) as pool:
+        futures = {pool.submit(_task, *task): index for index, task in enumerate(tasks)}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], *future.result()
+        except BrokenProcessPool as error:
+            raise VoodooError(f"evaluation: a worker process died ({error}); try fewer --jobs") from error
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def find_recordings(paths: Sequence[Path], *, only: Sequence[str] = ()) -> list[Path]:
+    """Recordings at `paths`, in that order; folders that are none are searched, their content in natural order.
+
+    Args:
+        paths: recordings, or folders that hold some, e.g. that of UTD-MHAD or of the rendered recordings.
+        only: patterns like "a0?_s1_*" or "*_cmu"; a recording is kept when its file or folder name fits one.
+
+    Raises:
+        RecordingError: nothing there, or nothing left.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if not path.exists():
+            raise RecordingError(f"{path}: expected a recording or a folder of recordings, found nothing there")
+        inside = [path] if _is_recording(path) else list(_search(path))
+        if not inside:
+            raise RecordingError(f"{path}: expected a recording or a folder of recordings, found none in it")
+        found += inside
+    kept = [path for path in found if not only or any(fnmatch.fnmatch(path.name, pattern) for pattern in only)]
+    if not kept:
+        raise RecordingError(f"expected recordings that fit {' or '.join(only)}, found none among {len(found)}")
+    return list(dict.fromkeys(kept))
+
+
+def _search(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        for path in sorted(folder.iterdir(), key=lambda path: _natural(path.name)):
+            if path.is_dir() or path.name.endswith("_depth.mat") or path.suffix in _RECORDING_SUFFIXES:
+                yield from [path] if _is_recording(path) else _search(path)
+
+
+def _is_recording(path: Path) -> bool:
+    try:
+        guess_loader(path)
+    except VoodooError:
+        return False
+    return True
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _one_thread() -> None:
+    """In a worker: the processes are the parallelism."""
+    os.environ["RAYON_NUM_THREADS"] = "1"
+    cv2.setNumThreads(1)
+
+
+def _task(path: str, config_file: str | None, loader: str | None) -> tuple[Score, FrameTable | None]:
+    try:
+        config = None if config_file is None else voodoo.Config.load(config_file)
+        return evaluate(Path(path), config=config, loader=loader)
+    except (VoodooError, OSError) as error:
+        return Score(Path(path).name, Path(path), failure=str(error)), None
+
+
+def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
+    """Reference positions at a stamp by linear interpolation; NaN outside of the reference."""
+    reference = recording.reference
+    if reference is None or not reference.stamps[0] - 0.1 <= stamp <= reference.stamps[-1] + 0.1:
+        return {}
+    after = int(np.clip(np.searchsorted(reference.stamps, stamp), 1, max(len(reference.stamps) - 1, 1)))
+    if after >= len(reference.stamps):
+        return dict(zip(reference.names, reference.positions[0], strict=True))
+    span = reference.stamps[after] - reference.stamps[after - 1]
+    t = float(np.clip((stamp - reference.stamps[after - 1]) / span, 0.0, 1.0))
+    positions = (1.0 - t) * reference.positions[after - 1] + t * reference.positions[after]
+    return dict(zip(reference.names, positions, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """What is kept of a frame; the images of a whole recording would fill the memory."""
+
+    stamp: float
+    status: str
+    seconds: float
+    joints: FloatArray
+    witness: FrameWitness
+
+
+def _score(recording: Recording, path: Path, selection: Selection, steps: Sequence[_Step]) -> tuple[Score, FrameTable]:
+    stamps = np.array([step.stamp for step in steps])
+    status = tuple(step.status for step in steps)
+    seconds = np.array([step.seconds for step in steps])
+    positions = np.array([step.joints for step in steps])
+    overlaps = np.array([step.witness.iou for step in steps])
+    reference = _reference_positions(recording, stamps)
+    lag = metrics.best_lag(positions, reference)
+    exact = None if recording.reference is None else recording.reference.exact
+    errors0 = metrics.joint_errors(positions, reference)
+    errors_best = metrics.joint_errors(positions, reference, lag=lag)
+    errors = errors_best if exact is False else errors0
+    limit = LIMIT_EXACT_M if exact else LIMIT_REFERENCE_M
+    class_, lost = metrics.tracking_class(errors, stamps, limit=limit)
+    distances = np.concatenate([step.witness.distances for step in steps])
+    score = Score(
+        name=recording.name,
+        path=path,
+        frames=len(steps),
+        exact=exact,
+        error_m=metrics.mean_or_nan(errors),
+        error_lag0_m=metrics.mean_or_nan(errors0),
+        error_best_lag_m=metrics.mean_or_nan(errors_best),
+        best_lag=None if class_ is None else lag,
+        within_5cm=metrics.share_within(errors, 0.05),
+        within_10cm=metrics.share_within(errors, 0.10),
+        joint_error_m={name: metrics.mean_or_nan(errors[:, index]) for index, name in enumerate(metrics.JOINTS)},
+        tracking_class=class_,
+        lost_joints=tuple(name for index, name in enumerate(metrics.JOINTS) if lost[:, index].any()),
+        selection=selection if distances.size else None,
+        depth_within_5cm=metrics.share_within(distances, 0.05),
+        depth_median_m=float(np.median(distances)) if distances.size else np.nan,
+        depth_p95_m=float(np.percentile(distances, 95.0)) if distances.size else np.nan,
+        silhouette_iou=metrics.mean_or_nan(overlaps),
+        jitter_m=metrics.jitter(positions),
+        reference_jitter_m=metrics.jitter(reference),
+        degraded_share=float(np.mean([word == "degraded" for word in status])),
+        lost_share=float(np.mean([word == "lost" for word in status])),
+        step_s=float(seconds.mean()),
+    )
+    within = np.array([step.witness.within for step in steps])
+    return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
+
+
+def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
+    """Reference of the twelve joints at the stamps, (F, 12, 3); NaN where there is none."""
+    reference = recording.reference
+    if reference is None:
+        return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
+    column = {name: index for index, name in enumerate(reference.names)}
+    table = np.full((len(reference.stamps), len(metrics.JOINTS), 3), np.nan)
+    for index, name in enumerate(metrics.JOINTS):
+        if name in column:
+            table[:, index] = reference.positions[:, column[name]]
+    period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / 30.0
+    return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)

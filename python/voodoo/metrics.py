@@ -1,0 +1,150 @@
+"""Measures of a trajectory against a reference: pure functions on arrays.
+
+Everywhere F frames, J joints, distances in metres, NaN = not known.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+
+JOINTS = tuple(
+    f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("l", "r")
+)
+"""The twelve joints that errors are averaged over."""
+
+LOST_AFTER_S = 0.3
+"""A joint is lost when it is too far from the reference for longer than this [s]."""
+
+MAX_LAG = 5
+"""Lags from -MAX_LAG to MAX_LAG frames are tried."""
+
+_STAMP_TOLERANCE_S = 1e-6
+
+
+def match_reference(
+    stamps: FloatArray, reference_stamps: FloatArray, positions: FloatArray, *, tolerance: float
+) -> FloatArray:
+    """Reference positions (F, J, 3) at `stamps` (F,): of the nearest stamp, NaN where none is within `tolerance` [s].
+
+    Nearest instead of interpolated, because a reference that runs at the frames' rate has one value for every frame.
+    """
+    after = np.clip(np.searchsorted(reference_stamps, stamps), 0, len(reference_stamps) - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.abs(reference_stamps[before] - stamps) <= np.abs(reference_stamps[after] - stamps)
+    index = np.where(nearer, before, after)
+    matched = positions[index].astype(np.float64)
+    matched[np.abs(reference_stamps[index] - stamps) > tolerance] = np.nan
+    return matched
+
+
+def joint_errors(estimated: FloatArray, reference: FloatArray, *, lag: int = 0) -> FloatArray:
+    """Distances (F, J) of estimated to reference positions, both (F, J, 3).
+
+    Args:
+        estimated: one position for each frame.
+        reference: the same frames.
+        lag: frame i of the estimate is compared with frame i - lag of the reference: positive means that the estimate
+            is late. Frames whose partner is outside are NaN.
+    """
+    frames = len(estimated)
+    shifted = np.full(reference.shape, np.nan)
+    source = np.arange(frames) - lag
+    inside = (source >= 0) & (source < frames)
+    shifted[inside] = reference[source[inside]]
+    return np.asarray(np.linalg.norm(estimated - shifted, axis=2))
+
+
+def best_lag(estimated: FloatArray, reference: FloatArray, *, max_lag: int = MAX_LAG) -> int:
+    """The constant lag [frames] in [-max_lag, max_lag] with the least mean joint error.
+
+    All lags are judged on the same frames, those that have a partner at every lag; a recording too short for that is
+    judged at the largest range that leaves half of it. Ties go to the smaller lag in size, then to the positive one.
+    """
+    reach = min(max_lag, len(estimated) // 4)
+    inner = slice(reach, len(estimated) - reach)
+    errors = {
+        lag: mean_or_nan(joint_errors(estimated, reference, lag=lag)[inner])
+        for lag in sorted(range(-reach, reach + 1), key=lambda lag: (abs(lag), -lag))
+    }
+    known = {lag: error for lag, error in errors.items() if np.isfinite(error)}
+    return min(known, key=known.__getitem__) if known else 0
+
+
+def lost_frames(
+    far: BoolArray, known: BoolArray, stamps: FloatArray, *, longer_than: float = LOST_AFTER_S
+) -> BoolArray:
+    """Frames (F,) in which one joint counts as lost: runs of `far` that last longer than `longer_than` seconds.
+
+    A run lasts from its first to its last frame plus one frame period (the median of the stamps' differences), so ten
+    frames of a 30 Hz recording last 1/3 s. Frames where the reference is not known neither end nor lengthen a run.
+    """
+    lost = np.zeros(len(far), dtype=bool)
+    seen = np.flatnonzero(known)
+    if len(seen) == 0:
+        return lost
+    period = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    flags = np.concatenate([[False], far[seen], [False]])
+    edges = np.flatnonzero(flags[1:] != flags[:-1])
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        run = seen[first:end]
+        if stamps[run[-1]] - stamps[run[0]] + period > longer_than + _STAMP_TOLERANCE_S:
+            lost[run] = True
+    return lost
+
+
+def tracking_class(
+    errors: FloatArray, stamps: FloatArray, *, limit: float, longer_than: float = LOST_AFTER_S
+) -> tuple[int | None, BoolArray]:
+    """The class of a sequence in K06 Table I, made automatic.
+
+    A joint is lost while it is farther than `limit` from the reference for longer than `longer_than` seconds.
+
+    Args:
+        errors: (F, J) distances; NaN where the reference is missing.
+        stamps: (F,) [s].
+        limit: [m].
+        longer_than: [s].
+
+    Returns:
+        2 when no joint was ever lost, 1 when some were but none is in the last frame it is known in, 0 when some
+        joint is still lost there, None when nothing is known; and which joints were lost when, (F, J).
+    """
+    known = np.isfinite(errors)
+    lost = np.zeros(errors.shape, dtype=bool)
+    at_end = False
+    for joint in range(errors.shape[1]):
+        lost[:, joint] = lost_frames(errors[:, joint] > limit, known[:, joint], stamps, longer_than=longer_than)
+        seen = np.flatnonzero(known[:, joint])
+        at_end |= len(seen) > 0 and bool(lost[seen[-1], joint])
+    if not known.any():
+        return None, lost
+    return (0 if at_end else 1 if lost.any() else 2), lost
+
+
+def jitter(positions: FloatArray) -> float:
+    """Mean norm [m] of the second difference of joint positions (F, J, 3) from frame to frame; NaN under three frames.
+
+    A body that stands still or moves uniformly has none; real acceleration counts too, so compare it with the
+    reference's own.
+    """
+    if len(positions) < 3:
+        return float("nan")
+    return mean_or_nan(np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2))
+
+
+def share_within(distances: FloatArray, limit: float) -> float:
+    """Share of the known distances that are at most `limit`; NaN when none is known."""
+    known = distances[np.isfinite(distances)]
+    return float(np.mean(known <= limit)) if known.size else float("nan")
+
+
+def mean_or_nan(values: FloatArray) -> float:
+    """Mean of the known values; NaN when none is known."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else float("nan")

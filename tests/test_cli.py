@@ -1,0 +1,220 @@
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from core_fakes import T_POSE, FakeRecording, install
+from voodoo import cli
+from voodoo import evaluate as evaluate_module
+from voodoo.errors import RecordingError
+from voodoo.results import Track
+from voodoo.running import Init, start_tracker, to_frame, track
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run the command line on fakes in an empty folder; set `run.recording` to what is opened."""
+    tracker = install(monkeypatch)
+    monkeypatch.chdir(tmp_path)
+
+    def opened(path, loader=None, **options):
+        call.options = options
+        if call.recording is None:
+            raise RecordingError(f"{path}: expected a recording, found\nno such file")
+        return call.recording
+
+    def call(*arguments):
+        return CliRunner().invoke(cli.app, [str(argument) for argument in arguments], env={"COLUMNS": "200"})
+
+    call.recording, call.tracker = FakeRecording(frames=12), tracker
+    tracker.reference = call.recording.reference
+    for module in (cli, evaluate_module):
+        monkeypatch.setattr(module, "open_recording", opened)
+    return call
+
+
+def assert_one_line(result, code, *words):
+    assert result.exit_code == code
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert result.stderr.startswith("voodoo: ")
+    for word in words:
+        assert word in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ((), ("track", "demo", "eval", "config", "info", "body", "--version")),
+        (
+            ("track",),
+            (
+                "--init",
+                "--body",
+                "--height",
+                "--config",
+                "--out",
+                "--overlay",
+                "--frame",
+                "--loader",
+                "l_shoulder",
+                "Examples",
+            ),
+        ),
+        (("eval",), ("--out", "--jobs", "--only", "--config", "sequences.csv")),
+        (("demo",), ("--out", "sheet.png")),
+    ],
+)
+def test_help_teaches(run, command, words):
+    result = run(*command, "--help")
+    assert result.exit_code == 0
+    for word in words:
+        assert word in result.stdout
+
+
+def test_track_writes_csv(run):
+    result = run("track", "somewhere", "--out", "pose.csv")
+    assert result.exit_code == 0, result.stderr
+    assert "12 frames, 12 tracking; wrote pose.csv" in result.stdout
+    assert result.stderr == ""
+    written = Track.load(Path("pose.csv"))
+    assert written.joints[-1, written.joint_names.index("l_wrist")] == pytest.approx(
+        np.add(T_POSE["l_wrist"], (0.11, 0.0, 0.0))
+    )
+
+
+def test_track_default_name_and_npz_and_overlay(run):
+    assert run("track", "somewhere").exit_code == 0
+    assert Path("fake.csv").is_file()
+    assert run("track", "somewhere", "--out", "pose.npz", "--overlay", "look.mp4").exit_code == 0
+    assert Track.load(Path("pose.npz")).world_from_limb.shape == (12, 10, 4, 4)
+    assert cv2.VideoCapture("look.mp4").get(cv2.CAP_PROP_FRAME_COUNT) == 12
+    assert run("track", "somewhere", "--overlay", "look").exit_code == 0
+    assert len(list(Path("look").glob("*.png"))) == 12
+
+
+def test_track_passes_frame_and_init(run):
+    moved = {name: [x, y, z + 0.5] for name, (x, y, z) in T_POSE.items()}
+    Path("start.json").write_text(json.dumps({"height_m": 1.6, "joints": moved}))
+    run.tracker.reference = None
+    result = run("track", "somewhere", "--init", "start.json", "--frame", "odom", "--out", "pose.csv")
+    assert result.exit_code == 0, result.stderr
+    assert run.options == {"root_frame": "odom"}
+    written = Track.load(Path("pose.csv"))
+    assert written.joints[0, written.joint_names.index("l_hip"), 2] == pytest.approx(T_POSE["l_hip"][2] + 0.5)
+
+
+def test_track_without_start_says_what_to_give(run):
+    run.recording = FakeRecording(frames=3, start=False)
+    assert_one_line(run("track", "somewhere"), 1, "--init FILE", "l_shoulder", "base_link")
+    assert not Path("fake.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("{", ("start.json", "JSON")),
+        ('{"joints": {}}', ("start.json", "joints")),
+        ('{"height_m": 1.7}', ("start.json", "joints", "required")),
+        ('{"joints": {"l_knee": [1, 2]}}', ("start.json", "joints.l_knee")),
+        ('{"joints": {"l_knee": [1, 2, "x"]}}', ("start.json", "joints.l_knee.2", "'x'")),
+        ('{"joints": {"l_knee": [1, 2, NaN]}}', ("start.json",)),
+        ('{"height_m": 176, "joints": {"l_knee": [1, 2, 3]}}', ("start.json", "height_m", "176")),
+        ('{"heigth_m": 1.7, "joints": {"l_knee": [1, 2, 3]}}', ("start.json", "heigth_m")),
+        ('{"joints": {"left_nose": [1, 2, 3]}}', ("left_nose",)),
+    ],
+)
+def test_bad_init_names_file_and_key(run, content, words):
+    Path("start.json").write_text(content)
+    assert_one_line(run("track", "somewhere", "--init", "start.json"), 1, *words)
+
+
+def test_missing_files(run):
+    assert_one_line(run("track", "somewhere", "--init", "none.json"), 1, "none.json")
+    run.recording = None
+    assert_one_line(run("track", "nowhere"), 1, "nowhere: expected a recording, found no such file")
+    assert_one_line(run("info", "nowhere"), 1, "nowhere")
+
+
+def test_usage_errors_end_with_2(run):
+    assert run("track").exit_code == 2
+    assert run("track", "x", "--bogus").exit_code == 2
+    assert run("track", "x", "--height", "17").exit_code == 2
+    result = run("track", "x", "--height", "1.7", "--body", "b.toml")
+    assert result.exit_code == 2
+    assert "not both" in result.stderr
+
+
+def test_bad_result_name_is_refused_before_the_work(run):
+    assert_one_line(run("track", "x", "--out", "pose.txt", "--overlay", "look"), 1, ".csv or .npz")
+    assert not Path("look").exists()
+
+
+def test_a_refused_frame_is_named_and_leaves_no_result(run):
+    run.tracker.refuse_at = 4
+    assert_one_line(run("track", "x", "--out", "pose.csv"), 1, "fake, frame 4", "finite")
+    assert not Path("pose.csv").exists()
+
+
+def test_demo(run, monkeypatch):
+    monkeypatch.setattr(cli, "sample_path", lambda: Path("sample"))
+    run.tracker.offset = (0.0, 0.03, 0.0)
+    result = run("demo", "--out", "here")
+    assert result.exit_code == 0, result.stderr
+    assert "mean joint error  3.0 cm" in result.stdout
+    assert sorted(path.name for path in Path("here").iterdir()) == ["overlay.mp4", "pose.csv", "sheet.png"]
+
+
+def test_eval_writes_reports_and_prints_the_table(run):
+    Path("a_depth.mat").touch()
+    Path("b_depth.mat").touch()
+    result = run("eval", ".", "--jobs", "1", "--out", "report")
+    assert result.exit_code == 0, result.stderr
+    assert "class 0 / 1 / 2 (K06 Table I) | 0 / 0 / 2" in result.stdout
+    assert {"sequences.csv", "summary.csv", "summary.md", "errors.png", "frames"} == {
+        p.name for p in Path("report").iterdir()
+    }
+
+
+def test_eval_with_a_failure_still_reports_and_ends_with_1(run):
+    Path("a_depth.mat").touch()
+    run.tracker.refuse_at = 2
+    result = run("eval", "a_depth.mat", "--jobs", "1", "--out", "report")
+    assert_one_line(result, 1, "1 of 1 recordings failed", "frame 2")
+    assert "frame 2" in Path("report/sequences.csv").read_text()
+
+
+def test_config_body_info_version(run):
+    assert run("config").stdout == "max_steps = 6\n"
+    assert run("body", "--height", "1.6").stdout == "height_m = 1.6\n"
+    assert "12 in 0.367 s" in run("info", "somewhere").stdout
+    assert run("--version").stdout.startswith("voodoo ")
+
+
+def test_measurements_reach_the_frame_with_pose_and_weight(run):
+    recording = FakeRecording(frames=1, depth=False)
+    frame = to_frame(next(iter(recording)), scan_weight=3.0)
+    ((kind, shape, options),) = frame.calls
+    assert (kind, shape, options["weight"], options["source"]) == ("points", (11, 3), 3.0, "scan")
+    assert np.array_equal(options["world_from_sensor"], np.eye(4))
+    frame = to_frame(next(iter(FakeRecording(frames=1))))
+    ((kind, shape, options),) = frame.calls
+    assert (kind, shape, options["metres_per_unit"]) == ("depth", (60, 80), 0.001)
+    assert frame.stamp == 1700200000.0
+
+
+def test_track_yields_one_estimate_a_frame_with_its_time(run):
+    recording = FakeRecording(frames=4)
+    steps = list(track(recording, start_tracker(recording)))
+    assert [step.index for step in steps] == [0, 1, 2, 3]
+    assert [step.estimate.stamp for step in steps] == recording.stamps.tolist()
+    assert all(step.seconds > 0.0 for step in steps)
+
+
+def test_height_option_wins_over_the_start(run):
+    recording = FakeRecording(frames=1)
+    assert start_tracker(recording).initial.height == 1.76
+    assert start_tracker(recording, height=1.6).initial.height == 1.6
+    assert start_tracker(recording, init=Init(height_m=1.5, joints=dict(T_POSE))).initial.height == 1.5

@@ -1,0 +1,139 @@
+import numpy as np
+import pytest
+
+from voodoo import metrics
+
+STAMPS = np.arange(60) / 30.0
+
+
+def errors_with(joint, start, count, error=0.2, frames=60):
+    errors = np.full((frames, 12), 0.01)
+    errors[start : start + count, joint] = error
+    return errors
+
+
+@pytest.mark.parametrize(
+    ("start", "count", "expected"),
+    [
+        (10, 9, 2),  # nine frames last exactly 0.3 s: not longer
+        (10, 10, 1),
+        (51, 9, 2),  # too far at the end, but not for longer than 0.3 s
+        (50, 10, 0),
+        (49, 10, 1),  # back in the last frame
+        (0, 60, 0),
+    ],
+)
+def test_class_borders(start, count, expected):
+    assert metrics.tracking_class(errors_with(3, start, count), STAMPS, limit=0.1)[0] == expected
+
+
+def test_class_limit_is_exclusive():
+    assert metrics.tracking_class(errors_with(0, 0, 60, error=0.1), STAMPS, limit=0.1)[0] == 2
+    assert metrics.tracking_class(errors_with(0, 0, 60, error=0.1001), STAMPS, limit=0.1)[0] == 0
+
+
+def test_two_short_runs_are_not_one_long_one():
+    errors = errors_with(2, 10, 9)
+    errors[20:29, 2] = 0.2
+    assert metrics.tracking_class(errors, STAMPS, limit=0.1)[0] == 2
+
+
+def test_different_joints_do_not_make_one_run():
+    errors = errors_with(2, 10, 9)
+    errors[19:28, 4] = 0.2
+    assert metrics.tracking_class(errors, STAMPS, limit=0.1)[0] == 2
+
+
+def test_class_says_which_joint_was_lost_when():
+    _, lost = metrics.tracking_class(errors_with(3, 10, 12), STAMPS, limit=0.1)
+    assert lost[10:22, 3].all()
+    assert lost.sum() == 12
+
+
+def test_missing_reference_neither_ends_nor_lengthens_a_run():
+    errors = errors_with(5, 10, 10)
+    errors[14:17, 5] = np.nan
+    assert metrics.tracking_class(errors, STAMPS, limit=0.1)[0] == 1
+    errors[17:20, 5] = 0.01  # what remains lasts from frame 10 to 13
+    assert metrics.tracking_class(errors, STAMPS, limit=0.1)[0] == 2
+
+
+def test_still_lost_in_the_last_known_frame():
+    errors = errors_with(5, 30, 20)
+    errors[50:, 5] = np.nan
+    assert metrics.tracking_class(errors, STAMPS, limit=0.1)[0] == 0
+
+
+def test_class_counts_seconds_not_frames():
+    assert metrics.tracking_class(errors_with(1, 10, 4), STAMPS * 3.0, limit=0.1)[0] == 1
+    assert metrics.tracking_class(errors_with(1, 10, 3), STAMPS * 3.0, limit=0.1)[0] == 2
+
+
+def test_class_of_nothing_known_is_none():
+    assert metrics.tracking_class(np.full((60, 12), np.nan), STAMPS, limit=0.1)[0] is None
+
+
+def walk(frames, shift=0, seed=0):
+    """Twelve joints on smooth paths, delayed by `shift` frames."""
+    phase = np.random.default_rng(seed).uniform(0.0, 6.0, (12, 3))
+    return 0.3 * np.sin(0.2 * (np.arange(frames) - shift)[:, None, None] + phase)
+
+
+@pytest.mark.parametrize("late", [-5, -2, 0, 1, 5])
+def test_best_lag_is_recovered(late):
+    reference = walk(60)
+    estimate = walk(60, late) + np.random.default_rng(1).normal(0.0, 0.005, (60, 12, 3))
+    assert metrics.best_lag(estimate, reference) == late
+    errors = metrics.joint_errors(estimate, reference, lag=late)
+    assert metrics.mean_or_nan(errors) < 0.01
+    assert np.isnan(errors).all(axis=1).sum() == abs(late)
+
+
+def test_lag_of_a_body_at_rest_is_zero():
+    still = np.zeros((30, 12, 3))
+    assert metrics.best_lag(still, still) == 0
+
+
+def test_lag_without_reference_is_zero():
+    assert metrics.best_lag(walk(30), np.full((30, 12, 3), np.nan)) == 0
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 9])
+def test_lag_of_short_recordings_stays_inside(frames):
+    assert abs(metrics.best_lag(walk(frames, 1), walk(frames))) <= frames // 4
+
+
+def test_joint_errors_are_distances():
+    estimate = np.zeros((2, 12, 3))
+    estimate[1, 4] = (0.03, 0.04, 0.12)
+    errors = metrics.joint_errors(estimate, np.zeros((2, 12, 3)))
+    assert errors[1, 4] == pytest.approx(0.13)
+    assert errors.sum() == pytest.approx(0.13)
+
+
+def test_jitter_of_uniform_motion_is_zero_and_of_a_known_zigzag_is_known():
+    line = np.arange(20)[:, None, None] * np.ones((1, 12, 3)) * 0.01
+    assert metrics.jitter(line) == pytest.approx(0.0, abs=1e-12)
+    zigzag = np.zeros((20, 12, 3))
+    zigzag[::2, :, 0] = 0.001
+    assert metrics.jitter(zigzag) == pytest.approx(0.002)
+    assert np.isnan(metrics.jitter(line[:2]))
+
+
+def test_share_within_includes_the_limit_and_skips_the_unknown():
+    assert metrics.share_within(np.array([0.05, 0.051, np.nan, 0.01, 0.2]), 0.05) == 0.5
+    assert np.isnan(metrics.share_within(np.array([np.nan]), 0.05))
+
+
+def test_match_takes_the_nearest_stamp_within_tolerance():
+    positions = np.arange(3.0)[:, None, None] * np.ones((1, 1, 3))
+    matched = metrics.match_reference(
+        np.array([-0.3, 0.04, 0.06, 0.19, 0.4]), np.array([0.0, 0.1, 0.2]), positions, tolerance=0.05
+    )
+    assert matched[:, 0, 0].tolist()[1:4] == [0.0, 1.0, 2.0]
+    assert np.isnan(matched[[0, 4]]).all()
+
+
+def test_twelve_joints():
+    assert len(set(metrics.JOINTS)) == 12
+    assert {"l_shoulder", "r_ankle"} <= set(metrics.JOINTS)

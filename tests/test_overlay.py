@@ -1,0 +1,116 @@
+import cv2
+import numpy as np
+import pytest
+
+from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, pose, scan_at
+from voodoo.errors import VoodooError
+from voodoo.overlay import Overlay, contact_sheet, side_color
+from voodoo.picture_writer import PictureWriter
+from voodoo.recordings import ColorImage, RecordedFrame
+from voodoo.views import CameraView, TopView, limb_outline
+
+STILL = RecordedFrame(0.0, (depth_of(T_POSE),))
+
+
+def draw(recorded=STILL, joints=T_POSE):
+    return Overlay(FakeRecording()).draw(recorded, *pose(joints), index=0)
+
+
+def scale_of(picture):
+    return picture.shape[0] // CAMERA.height
+
+
+def distance_to(color, pixel):
+    return float(np.abs(pixel.astype(float) - color).sum())
+
+
+def test_limbs_are_drawn_where_they_project_in_their_colours():
+    picture = draw()
+    scale = scale_of(picture)
+    for side in "lr":
+        middle = np.mean([T_POSE[f"{side}_knee"], T_POSE[f"{side}_hip"]], axis=0)
+        pixels, _ = CameraView(CAMERA, BASE_FROM_CAMERA, scale).project(middle[None])
+        column, row = pixels[0].round().astype(int)
+        colors = {name: distance_to(side_color(name), picture[row, column]) for name in ("l_thigh", "r_thigh")}
+        assert min(colors, key=colors.get) == f"{side}_thigh"
+
+
+def test_the_persons_left_is_on_the_right_of_the_picture():
+    pixels, _ = CameraView(CAMERA, BASE_FROM_CAMERA).project(np.array([T_POSE["l_wrist"], T_POSE["r_wrist"]]))
+    assert pixels[0, 0] > pixels[1, 0]
+
+
+def test_nothing_is_drawn_far_from_body_and_caption():
+    picture = draw()
+    bare = draw(joints={name: np.add(position, (-10.0, 0.0, 0.0)) for name, position in T_POSE.items()})
+    corner = (slice(-60, None), slice(-60, None))
+    assert np.array_equal(picture[corner], bare[corner])
+    assert not np.array_equal(picture, bare)
+
+
+def test_a_body_behind_the_camera_has_no_outline():
+    body, estimate = pose({name: np.add(position, (-3.0, 0.0, 0.0)) for name, position in T_POSE.items()})
+    torso = next(limb for limb in body.limbs if limb.name == "torso")
+    assert limb_outline(torso.shape, estimate.world_from_limb["torso"], CameraView(CAMERA, BASE_FROM_CAMERA)) is None
+
+
+def test_enlarging_keeps_pixel_centres():
+    point = np.array([[3.0, 0.2, 1.3]])
+    small, _ = CameraView(CAMERA, BASE_FROM_CAMERA, 1).project(point)
+    large, _ = CameraView(CAMERA, BASE_FROM_CAMERA, 4).project(point)
+    assert large == pytest.approx(4.0 * small + 1.5)
+
+
+def test_without_images_the_body_is_seen_from_above():
+    picture = draw(RecordedFrame(0.0, (scan_at(0.0),)))
+    assert picture.shape == (720, 720, 3)
+    view = TopView((3.0, 0.0, 1.0), 6.0 / 720, 720)
+    pixels, _ = view.project(np.array([[4.0, 0.0, 1.0], [3.0, 1.0, 1.0]]))
+    assert pixels[0] == pytest.approx([359.5, 359.5 - 120])  # forward is up
+    assert pixels[1] == pytest.approx([359.5 - 120, 359.5])  # left is left
+
+
+def test_colour_is_the_background_when_there_is_no_depth():
+    image = np.full((60, 80, 3), (10, 200, 30), np.uint8)
+    picture = draw(RecordedFrame(0.0, (ColorImage("color", 0.0, lambda: image, CAMERA, BASE_FROM_CAMERA),)))
+    assert picture[-1, -1].tolist() == [10, 200, 30]
+    assert image[0, 0].tolist() == [10, 200, 30]
+
+
+def test_film_can_be_read_back(tmp_path):
+    with PictureWriter(tmp_path / "look.mp4", rate_hz=30.0) as writer:
+        for _ in range(7):
+            writer.write(draw())
+    film = cv2.VideoCapture(str(tmp_path / "look.mp4"))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 7
+    assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(30.0)
+    readable, picture = film.read()
+    assert readable
+    assert np.abs(picture.astype(int) - draw()).mean() < 12
+
+
+def test_folder_of_pictures(tmp_path):
+    with PictureWriter(tmp_path / "new" / "look", rate_hz=30.0) as writer:
+        writer.write(draw())
+        writer.write(draw())
+    assert sorted(path.name for path in (tmp_path / "new" / "look").iterdir()) == [
+        "frame_000000.png",
+        "frame_000001.png",
+    ]
+    assert np.array_equal(cv2.imread(str(tmp_path / "new" / "look" / "frame_000001.png")), draw())
+
+
+def test_other_films_and_blocked_folders_are_refused(tmp_path):
+    with pytest.raises(VoodooError, match=r"\.mp4, found '\.avi'"):
+        PictureWriter(tmp_path / "look.avi", rate_hz=30.0)
+    (tmp_path / "file").touch()
+    with pytest.raises(VoodooError, match="expected a folder, found a file"):
+        PictureWriter(tmp_path / "file", rate_hz=30.0)
+
+
+def test_contact_sheet_places_pictures_row_by_row():
+    pictures = [np.full((30, 40, 3), value, np.uint8) for value in (10, 20, 30, 40)]
+    sheet = contact_sheet(pictures, columns=3, width=132, gap=6)
+    assert sheet.shape == (66, 132, 3)
+    assert [sheet[15, x, 0] for x in (20, 66, 112)] == [10, 20, 30]
+    assert sheet[50, 20, 0] == 40

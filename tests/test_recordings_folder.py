@@ -1,0 +1,178 @@
+"""Folders of images with a calibration file."""
+
+import cv2
+import numpy as np
+import pytest
+
+from voodoo.errors import RecordingError
+from voodoo.recordings import ColorImage, DepthImage, open_recording
+
+CALIBRATION = """\
+width = 4
+height = 3
+fx = 5.0
+fy = 5.5
+cx = 1.5
+cy = 1.0
+"""
+COLOR = "[color]\nwidth = 8\nheight = 6\nfx = 10.0\nfy = 11.0\ncx = 3.5\ncy = 2.5\n"
+MOUNT = "root_from_sensor = [[0, 0, 1, 0.1], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]]\n"
+STAMPS = ("1305031102.160407", "1305031102.194330", "1305031103.5")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    rng = np.random.default_rng(3)
+    (tmp_path / "depth").mkdir()
+    for index, stamp in enumerate(STAMPS):
+        image = rng.integers(1, 20000, (3, 4)).astype(np.uint16)
+        image[0, 0] = index
+        cv2.imwrite(str(tmp_path / "depth" / f"{stamp}.png"), image)
+    (tmp_path / "groundtruth.txt").write_text("# not used\n")
+    (tmp_path / "calibration.toml").write_text(CALIBRATION)
+    return tmp_path
+
+
+def add_color(folder, names=("1305031102.1", "1305031102.2", "1305031102.3", "1305031109.0")):
+    (folder / "rgb").mkdir()
+    for name in names:
+        cv2.imwrite(str(folder / "rgb" / f"{name}.png"), np.full((6, 8, 3), 7, np.uint8))
+    (folder / "calibration.toml").write_text(CALIBRATION + COLOR)
+
+
+def test_depth_images_in_the_order_of_their_names(folder):
+    recording = open_recording(folder)
+    frames = list(recording)
+    assert [frame.stamp for frame in frames] == [float(stamp) for stamp in STAMPS]
+    assert [frame.measurements[0].image[0, 0] for frame in frames] == [0, 1, 2]
+    depth = frames[0].measurements[0]
+    assert isinstance(depth, DepthImage) and depth.metres_per_unit == 1 / 5000 and depth.camera.fy == 5.5
+    np.testing.assert_array_equal(depth.root_from_sensor, np.eye(4))
+    assert recording.root_frame == "camera_depth_optical_frame"
+    assert recording.start is None and recording.reference is None
+    info = recording.info()
+    assert (info.loader, info.frames) == ("folder", 3) and info.duration == pytest.approx(1.339593)
+
+
+def test_the_list_file_counts_before_the_names(folder):
+    (folder / "depth.txt").write_text(f"# timestamp filename\n1.0 depth/{STAMPS[2]}.png\n\n2.0 depth/{STAMPS[0]}.png\n")
+    frames = list(open_recording(folder))
+    assert [(frame.stamp, frame.measurements[0].image[0, 0]) for frame in frames] == [(1.0, 2), (2.0, 0)]
+
+
+def test_colour_joins_the_next_depth_image(folder):
+    add_color(folder)
+    recording = open_recording(folder)
+    kinds = [[m.stamp for m in frame.measurements if isinstance(m, ColorImage)] for frame in recording]
+    assert kinds == [[1305031102.1], [], [1305031102.2, 1305031102.3]]
+    color = next(iter(recording)).measurements[0]
+    assert color.image.shape == (6, 8, 3) and color.camera.fx == 10.0
+    assert [sensor.kind for sensor in recording.info().sensors] == ["depth", "color"]
+
+
+def test_colour_without_calibration_is_left_out_and_said_so(folder):
+    add_color(folder)
+    (folder / "calibration.toml").write_text(CALIBRATION)
+    assert "no [color] table" in str(open_recording(folder).info())
+
+
+def test_the_calibration_file_says_where_the_camera_is(folder):
+    (folder / "calibration.toml").write_text(CALIBRATION + MOUNT + 'root_frame = "base_link"\ndepth_factor = 1000\n')
+    recording = open_recording(folder)
+    depth = next(iter(recording)).measurements[0]
+    np.testing.assert_array_equal(depth.root_from_sensor @ [0, 0, 2, 1], [2.1, 0, 1.2, 1])
+    assert recording.root_frame == "base_link" and depth.metres_per_unit == 0.001
+
+
+def test_the_calibration_file_may_lie_elsewhere(folder):
+    (folder / "calibration.toml").rename(folder / "mine.toml")
+    assert len(open_recording(folder, calibration=folder / "mine.toml")) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "missing .*width"),
+        (CALIBRATION + "fxx = 1\n", "unknown .*fxx"),
+        (CALIBRATION.replace("5.0", '"five"'), "fx: expected a number"),
+        (CALIBRATION.replace("5.0", "-5.0"), "focal length > 0"),
+        (CALIBRATION + "distortion = 0.1\n", "list of numbers"),
+        (CALIBRATION + "distortion = [0.1]\n", "0 or 4 or 5"),
+        (CALIBRATION + 'model = "x"\n', "plumb_bob"),
+        (CALIBRATION + "depth_factor = 0\n", "depth_factor"),
+        (CALIBRATION + "root_frame = 1\n", "root_frame"),
+        (CALIBRATION + MOUNT.replace("1.2", '"a"'), "root_from_sensor"),
+        (CALIBRATION + MOUNT.replace("-1, 0, 0, 0", "1, 0, 0, 0"), "rigid"),
+        (CALIBRATION + MOUNT.replace("[0, 0, 0, 1]", "[0, 0, 0, 2]"), "rigid"),
+        (CALIBRATION + "color = 3\n", "color: expected a table"),
+        (CALIBRATION + "[color]\nwidth = 3\n", r"\[color\].*missing"),
+        (CALIBRATION + "[[", "TOML"),
+    ],
+)
+def test_a_wrong_calibration_file_is_refused(folder, text, words):
+    (folder / "calibration.toml").write_text(text)
+    with pytest.raises(RecordingError, match=words) as caught:
+        open_recording(folder)
+    assert "calibration.toml" in str(caught.value)
+
+
+def test_a_missing_calibration_file_is_named(folder):
+    (folder / "calibration.toml").unlink()
+    with pytest.raises(RecordingError, match=r"calibration\.toml: expected a calibration file"):
+        open_recording(folder)
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda data: data[: len(data) // 2], "complete PNG"),
+        (lambda data: data[:-12], "complete PNG"),
+        (lambda data: data[:45] + bytes([data[45] ^ 1]) + data[46:], "checksum"),
+        (lambda data: b"", "expected a PNG"),
+        (lambda data: cv2.imencode(".png", np.zeros((3, 4), np.uint8))[1].tobytes(), "16-bit single-channel"),
+        (lambda data: cv2.imencode(".png", np.zeros((3, 4, 3), np.uint16))[1].tobytes(), "16-bit single-channel"),
+        (lambda data: cv2.imencode(".png", np.zeros((3, 5), np.uint16))[1].tobytes(), "expected 4x3 px"),
+    ],
+)
+def test_a_damaged_depth_image_is_refused_after_those_before_it(folder, damage, words):
+    path = folder / "depth" / f"{STAMPS[1]}.png"
+    path.write_bytes(damage(path.read_bytes()))
+    frames = iter(open_recording(folder))
+    assert next(frames).stamp == float(STAMPS[0])
+    with pytest.raises(RecordingError, match=words) as caught:
+        next(frames)
+    assert path.name in str(caught.value)
+
+
+def test_a_damaged_colour_image_is_refused_when_looked_at(folder):
+    add_color(folder)
+    path = folder / "rgb" / "1305031102.1.png"
+    path.write_bytes(path.read_bytes()[:50])
+    color = next(iter(open_recording(folder))).measurements[0]
+    with pytest.raises(RecordingError, match=r"1305031102\.1\.png: expected a complete PNG"):
+        color.image  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1.0\n", "line 1: expected 'stamp file'"),
+        ("one depth/a.png\n", "line 1: expected a stamp"),
+        ("nan depth/a.png\n", "line 1: expected a stamp"),
+        ("2.0 depth/a.png\n1.0 depth/b.png\n", "stamp after 2.0"),
+        ("# nothing\n", "found none"),
+    ],
+)
+def test_a_wrong_list_file_is_refused(folder, text, words):
+    (folder / "depth.txt").write_text(text)
+    with pytest.raises(RecordingError, match=words):
+        open_recording(folder)
+
+
+def test_names_that_are_no_stamps_and_files_that_are_gone_are_named(folder):
+    (folder / "depth" / "last.png").write_bytes(b"")
+    with pytest.raises(RecordingError, match=r"last\.png: expected a stamp"):
+        open_recording(folder)
+    (folder / "depth.txt").write_text("1.0 depth/gone.png\n")
+    with pytest.raises(RecordingError, match=r"gone\.png"):
+        list(open_recording(folder))

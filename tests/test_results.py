@@ -1,0 +1,98 @@
+import csv
+
+import numpy as np
+import pytest
+
+from core_fakes import T_POSE, pose
+from voodoo.errors import VoodooError
+from voodoo.results import Track
+
+
+def estimates(frames=5):
+    rng = np.random.default_rng(0)
+    for index in range(frames):
+        joints = {name: np.add(position, rng.normal(0.0, 0.02, 3)) for name, position in T_POSE.items()}
+        yield pose(joints, 1700201000.123456 + index / 30.0, status="lost" if index == 3 else "tracking")[1]
+
+
+def test_npz_round_trip_is_exact(tmp_path):
+    track = Track.of(list(estimates()))
+    track.save(tmp_path / "pose.npz")
+    again = Track.load(tmp_path / "pose.npz")
+    for name in ("stamps", "residual", "joints", "world_from_limb"):
+        assert np.array_equal(getattr(again, name), getattr(track, name))
+    for name in ("status", "joint_names", "limb_names"):
+        assert getattr(again, name) == getattr(track, name)
+    assert again.world_from_limb.shape == (5, 10, 4, 4)
+    assert again.status == ("tracking", "tracking", "tracking", "lost", "tracking")
+
+
+def test_csv_round_trip_keeps_stamps_exactly_and_positions_to_a_micrometre(tmp_path):
+    track = Track.of(list(estimates()))
+    track.save(tmp_path / "pose.csv")
+    again = Track.load(tmp_path / "pose.csv")
+    assert np.array_equal(again.stamps, track.stamps)
+    assert np.abs(again.joints - track.joints).max() <= 0.5001e-6
+    assert again.joint_names == track.joint_names
+    assert again.status == track.status
+    assert again.limb_names == ()
+
+
+def test_csv_columns(tmp_path):
+    track = Track.of(list(estimates(2)))
+    track.save(tmp_path / "new" / "pose.csv")
+    with (tmp_path / "new" / "pose.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:6] == [
+        "stamp_s",
+        "status",
+        "residual_m",
+        "humanoid_root_x",
+        "humanoid_root_y",
+        "humanoid_root_z",
+    ]
+    assert len(rows[0]) == 3 + 3 * len(T_POSE)
+    assert float(rows[1]["l_wrist_y"]) == pytest.approx(
+        track.joints[1, track.joint_names.index("l_wrist"), 1], abs=1e-6
+    )
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["pose.csv"]
+
+
+def test_nan_is_refused():
+    items = list(estimates(3))
+    items[1].joints["l_elbow"][2] = np.nan
+    with pytest.raises(VoodooError, match=r"joints: .* frame 1"):
+        Track.of(items)
+
+
+def test_no_frames_and_changing_bodies_are_refused():
+    with pytest.raises(VoodooError, match="at least one frame"):
+        Track.of([])
+    items = list(estimates(2))
+    del items[1].joints["l_wrist"]
+    with pytest.raises(VoodooError, match="estimate 1"):
+        Track.of(items)
+
+
+@pytest.mark.parametrize("content", [b"", b"stamp_s,status\n1,2\n", b"PK\x03\x04rubbish", b"\xff\xfe\x00"])
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_other_files_are_refused_by_name(tmp_path, content, suffix):
+    path = tmp_path / f"bad{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(VoodooError, match=r"bad\."):
+        Track.load(path)
+
+
+def test_truncated_npz_and_short_csv_row(tmp_path):
+    track = Track.of(list(estimates(3)))
+    for name in ("pose.npz", "pose.csv"):
+        track.save(tmp_path / name)
+        content = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(content[: len(content) * 2 // 3])
+        with pytest.raises(VoodooError, match="pose"):
+            Track.load(tmp_path / name)
+
+
+def test_other_suffixes_are_refused(tmp_path):
+    with pytest.raises(VoodooError, match=r"\.csv or \.npz, found '\.txt'"):
+        Track.of(list(estimates(1))).save(tmp_path / "pose.txt")
