@@ -131,7 +131,8 @@ class Body:
 
         Args:
             height: stature [m], 0.3 to 3.0.
-            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen limbs, with a waist, neck, hands and feet.
+            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen limbs, with a waist, neck, hands
+                and feet.
 
         Raises:
             BodyError: the stature is out of range, or the model unknown.
@@ -213,7 +214,9 @@ class Body:
         return f"Body(name={self.name!r}, limbs={len(self.limbs)}, sites={len(self.site_names)})"
 
 
-def checked_joints(joints: Mapping[str, Sequence[float]], *, what: str = "joints") -> dict[str, tuple[float, float, float]]:
+def checked_joints(
+    joints: Mapping[str, Sequence[float]], *, what: str = "joints"
+) -> dict[str, tuple[float, float, float]]:
     """Positions by name as plain numbers.
 
     Raises:

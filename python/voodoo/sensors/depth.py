@@ -1,0 +1,87 @@
+"""What is dropped from a depth image before it becomes points: flying pixels at depth edges, and what is out of
+range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import MeasurementError
+
+DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class DepthFilter:
+    """Drops pixels that are not surface.
+
+    A flying pixel of a time-of-flight camera mixes the light of two surfaces and hangs between them, so it has
+    neighbours clearly nearer AND clearly farther along one of the four lines through it. A pixel of a slanted surface
+    has that too, but with equal steps: it is kept when it lies near the middle of two neighbours that are less than
+    `slant` apart. A pixel that has no neighbour at its own depth at all is a flying one as well.
+
+    Args:
+        edge: depths that differ by more than this belong to different surfaces [m], at 1 m; it grows with the depth.
+        slant: two opposite neighbours farther apart than this are two surfaces [m], at 1 m; it grows with the depth.
+        nearest, farthest: range limits along the optical axis [m] (K06 III-A: 0.5 to 7.5 m).
+
+    Raises:
+        MeasurementError: limits that leave nothing, or an edge that is not above zero.
+    """
+
+    edge: float = 0.03
+    slant: float = 0.08
+    nearest: float = 0.3
+    farthest: float = 7.5
+
+    def __post_init__(self) -> None:
+        """Check the limits."""
+        if not (0.0 <= self.nearest < self.farthest and self.edge > 0.0 and self.slant >= 2.0 * self.edge):
+            raise MeasurementError(
+                "depth filter: expected 0 <= nearest < farthest and 0 < 2 edge <= slant, found nearest "
+                f"{self.nearest!r}, farthest {self.farthest!r}, edge {self.edge!r}, slant {self.slant!r}"
+            )
+
+    def apply(self, image: DepthArray, *, metres_per_unit: float = 0.001) -> DepthArray:
+        """A copy of the image (H, W) with 0 where a pixel is dropped.
+
+        Args:
+            image: uint16 or float32; 0 and NaN mean "no return".
+            metres_per_unit: of the image.
+        """
+        kept = image.copy()
+        kept[self.dropped(image, metres_per_unit=metres_per_unit)] = 0
+        return kept
+
+    def dropped(self, image: DepthArray, *, metres_per_unit: float = 0.001) -> npt.NDArray[np.bool_]:
+        """(H, W): True for pixels that returned something that is not used.
+
+        Raises:
+            MeasurementError: not a 2-D uint16 or float32 array.
+        """
+        if image.ndim != 2 or image.dtype not in (np.uint16, np.float32):
+            raise MeasurementError(f"depth: expected (H, W) uint16 or float32, found {image.dtype} of {image.shape}")
+        z = image.astype(np.float32) * np.float32(metres_per_unit)
+        returned = np.isfinite(z) & (z > 0.0)
+        z[~returned] = 0.0
+        outside = returned & ((z < self.nearest) | (z > self.farthest))
+        return outside | (returned & self._flying(z))
+
+    def _flying(self, z: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+        height, width = z.shape
+        # One ring of "no return" around, so that the borders need no special case.
+        framed = cv2.copyMakeBorder(z, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0.0)
+        edge, slant = self.edge * np.maximum(z, 1.0), self.slant * np.maximum(z, 1.0)
+        flying = np.zeros(z.shape, dtype=np.bool_)
+        lonely = np.ones(z.shape, dtype=np.bool_)
+        for dv, du in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            before = framed[1 - dv : 1 - dv + height, 1 - du : 1 - du + width]
+            after = framed[1 + dv : 1 + dv + height, 1 + du : 1 + du + width]
+            low, high = np.minimum(before, after), np.maximum(before, after)
+            flying |= (low > 0.0) & (z - low > edge) & (high - z > edge) & (high - low > slant)
+            lonely &= (np.abs(before - z) > edge) & (np.abs(after - z) > edge)
+        return flying | lonely
