@@ -23,18 +23,11 @@ fn points_near(shape: &TaperedEllipticCylinder, world_from_limb: &Pose) -> Point
     let mut state = 7;
     let mut points = Points::default();
     for _ in 0..POINTS {
-        let (angle, t) = (
-            std::f64::consts::TAU * uniform(&mut state),
-            uniform(&mut state),
-        );
+        let (angle, t) = (std::f64::consts::TAU * uniform(&mut state), uniform(&mut state));
         let a = shape.a0() + (shape.a1() - shape.a0()) * t;
         let b = shape.b0() + (shape.b1() - shape.b0()) * t;
         let off = 0.06 * uniform(&mut state) - 0.02;
-        let limb = Vec3::new(
-            (a + off) * angle.cos(),
-            (b + off) * angle.sin(),
-            t * shape.length(),
-        );
+        let limb = Vec3::new((a + off) * angle.cos(), (b + off) * angle.sin(), t * shape.length());
         points.push(world_from_limb.transform_point(limb).as_vec3().to_array());
     }
     points
@@ -61,12 +54,7 @@ fn bench(criterion: &mut Criterion) {
         group.bench_function(format!("exact/{name}"), |bencher| {
             bencher.iter(|| {
                 (0..points.len())
-                    .map(|i| {
-                        shape
-                            .closest_point(pose.inverse_transform_point(points.get(i)))
-                            .point
-                            .z
-                    })
+                    .map(|i| shape.closest_point(pose.inverse_transform_point(points.get(i))).point.z)
                     .sum::<f64>()
             });
         });

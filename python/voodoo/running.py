@@ -116,17 +116,24 @@ def start_tracker(
     return tracker
 
 
-def to_frame(recorded: RecordedFrame, *, scan_weight: float = 1.0) -> voodoo.Frame:
+LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
+"""Root frames whose z = 0 is the floor (REP-105)."""
+
+
+def to_frame(recorded: RecordedFrame, *, scan_weight: float = 1.0, root_frame: str = "") -> voodoo.Frame:
     """The tracker's view of a recorded frame: depth images, clouds and laser scans; colour is not a measurement yet.
 
     Args:
         recorded: one instant of a recording.
         scan_weight: weight of a laser return relative to a depth pixel.
+        root_frame: name of the root frame; in LEVEL_FRAMES the floor is known.
 
     Raises:
         VoodooError: a measurement the tracker does not accept.
     """
     frame = voodoo.Frame(stamp=recorded.stamp)
+    if root_frame in LEVEL_FRAMES:
+        frame.set_ground(normal=(0.0, 0.0, 1.0))
     for item in recorded.measurements:
         if isinstance(item, DepthImage):
             frame.add_depth(
@@ -161,7 +168,7 @@ def track(recording: Recording, tracker: voodoo.Tracker, *, scan_weight: float =
     for index, recorded in enumerate(recording):
         began = time.perf_counter()
         try:
-            estimate = tracker.step(to_frame(recorded, scan_weight=scan_weight))
+            estimate = tracker.step(to_frame(recorded, scan_weight=scan_weight, root_frame=recording.root_frame))
         except VoodooError as error:
             raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
         yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began)

@@ -209,7 +209,7 @@ words! {
 
 config! {
     /// How the pose is found from the correspondences.
-    solver: SolverKind = SolverKind::Limbwise, "";
+    solver: SolverKind = SolverKind::Chain, "";
     /// Greatest number of ICP steps in a frame (K07 section 7: 6 is a good compromise).
     max_steps: usize = 6, "", 1 ..= 100;
     /// The steps end when the mean squared distance changes by less than this (K06 III-B step 6).

@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, SymmetricEigen};
 use crate::geometry::{Mat3, Pose, Quat, Vec3};
 
 /// Weighted moments of point pairs `(x, p)`: everything absolute orientation needs. A multiplicity is one multiplication.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moments {
     /// Sum of the weights.
     pub weight: f64,
@@ -15,6 +15,13 @@ pub struct Moments {
     pub p: Vec3,
     /// Weighted sum of `p x^T`.
     pub px: Mat3,
+}
+
+impl Default for Moments {
+    /// No pairs. (The default of a glam matrix is the identity, so this cannot be derived.)
+    fn default() -> Self {
+        Self { weight: 0.0, x: Vec3::ZERO, p: Vec3::ZERO, px: Mat3::ZERO }
+    }
 }
 
 impl Moments {

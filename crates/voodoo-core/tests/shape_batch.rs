@@ -10,12 +10,7 @@ use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};
 const TOLERANCE: f64 = 1e-6;
 
 /// World queries around a shape.
-fn queries(
-    shape: &TaperedEllipticCylinder,
-    pose: &Pose,
-    count: usize,
-    random: &mut Random,
-) -> Points {
+fn queries(shape: &TaperedEllipticCylinder, pose: &Pose, count: usize, random: &mut Random) -> Points {
     let mut points = Points::default();
     for _ in 0..count {
         let world = pose.transform_point(random.query(shape));
@@ -34,12 +29,7 @@ fn check(shape: &TaperedEllipticCylinder, pose: &Pose, queries: &Points) -> (f64
         let q = pose.inverse_transform_point(queries.get(i));
         let exact = shape.closest_point(q);
         let (point, normal) = (out.points.get(i), out.normals.get(i));
-        let context = || {
-            format!(
-                "{shape:?} {q:?}: {exact:?}, batch {point:?} {normal:?} {}",
-                out.signed_distance[i]
-            )
-        };
+        let context = || format!("{shape:?} {q:?}: {exact:?}, batch {point:?} {normal:?} {}", out.signed_distance[i]);
         let distance = f64::from(out.signed_distance[i]);
         let error = (distance.abs() - exact.signed_distance.abs()).abs();
         assert!(error < TOLERANCE, "{}", context());
@@ -49,21 +39,11 @@ fn check(shape: &TaperedEllipticCylinder, pose: &Pose, queries: &Points) -> (f64
         }
         // The point is on the surface, at that distance, and the same where it is unique.
         let limb = pose.inverse_transform_point(point);
-        assert!(
-            (limb.distance(q) - distance.abs()).abs() < TOLERANCE,
-            "{}",
-            context()
-        );
-        assert!(
-            shape.signed_distance(limb).abs() < TOLERANCE,
-            "{}",
-            context()
-        );
+        assert!((limb.distance(q) - distance.abs()).abs() < TOLERANCE, "{}", context());
+        assert!(shape.signed_distance(limb).abs() < TOLERANCE, "{}", context());
         let apart = limb.distance(exact.point);
         worst.0 = worst.0.max(error);
-        let skew = shape
-            .closest_point(q + Vec3::new(3e-5, 2e-5, -2.5e-5))
-            .point;
+        let skew = shape.closest_point(q + Vec3::new(3e-5, 2e-5, -2.5e-5)).point;
         let steady = (exact.point - q).normalize_or_zero() * 1e-4;
         let deeper = shape.closest_point(q - steady).point;
         if skew.distance(exact.point) < 2e-4 && deeper.distance(exact.point) < 2e-4 {
@@ -99,10 +79,7 @@ fn agrees_with_the_exact_path() {
     for _ in 0..300 {
         run(&random_shape(&mut shapes), 60);
     }
-    println!(
-        "batch against exact: distance {:.1e}, point {:.1e} m",
-        worst.0, worst.1
-    );
+    println!("batch against exact: distance {:.1e}, point {:.1e} m", worst.0, worst.1);
 }
 
 /// The long run: `cargo test --release -- --ignored`.
@@ -126,10 +103,7 @@ fn agrees_with_the_exact_path_on_very_many_shapes() {
         let found = check(&shape, &pose, &queries);
         worst = (worst.0.max(found.0), worst.1.max(found.1));
     }
-    println!(
-        "batch against exact: distance {:.1e}, point {:.1e} m",
-        worst.0, worst.1
-    );
+    println!("batch against exact: distance {:.1e}, point {:.1e} m", worst.0, worst.1);
 }
 
 #[test]

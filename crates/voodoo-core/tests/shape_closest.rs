@@ -15,30 +15,13 @@ fn check(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) {
     let found = shape.closest_point(q);
     let (distance, point) = brute_force(shape, q, grid);
     let context = || format!("{shape:?} {q:?}: {found:?}, dense search {distance} at {point:?}");
-    assert!(
-        (found.signed_distance.abs() - distance).abs() < TOLERANCE,
-        "{}",
-        context()
-    );
-    assert!(
-        (found.point.distance(q) - distance).abs() < TOLERANCE,
-        "{}",
-        context()
-    );
+    assert!((found.signed_distance.abs() - distance).abs() < TOLERANCE, "{}", context());
+    assert!((found.point.distance(q) - distance).abs() < TOLERANCE, "{}", context());
     assert!((found.normal.length() - 1.0).abs() < 1e-9, "{}", context());
     // The point lies on the surface: its own distance to it, found without our code, is nothing.
-    assert!(
-        brute_force(shape, found.point, grid).0 < TOLERANCE,
-        "{}",
-        context()
-    );
+    assert!(brute_force(shape, found.point, grid).0 < TOLERANCE, "{}", context());
     if distance > TOLERANCE {
-        assert_eq!(
-            found.signed_distance < 0.0,
-            inside(shape, q),
-            "{}",
-            context()
-        );
+        assert_eq!(found.signed_distance < 0.0, inside(shape, q), "{}", context());
     }
     // Where a neighbour of the query has its foot elsewhere the point is not unique; otherwise it must be the same. The dense
     // search knows the angle only to the square root of the rounding of the distance, hence 2 µm.
@@ -128,10 +111,7 @@ fn gradient_of_the_distance_is_the_normal() {
     let mut random = Random(5);
     let step = 1e-5;
     let mut checked = 0;
-    for shape in limb_like()
-        .into_iter()
-        .chain(hostile().into_iter().take(13))
-    {
+    for shape in limb_like().into_iter().chain(hostile().into_iter().take(13)) {
         for _ in 0..300 {
             let q = random.query(&shape);
             let found = shape.closest_point(q);
@@ -142,26 +122,17 @@ fn gradient_of_the_distance_is_the_normal() {
             let mut gradient = Vec3::ZERO;
             let mut smooth = true;
             for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
-                let (ahead, behind) = (
-                    shape.closest_point(q + axis * step),
-                    shape.closest_point(q - axis * step),
-                );
+                let (ahead, behind) = (shape.closest_point(q + axis * step), shape.closest_point(q - axis * step));
                 smooth &= ahead.point.distance(behind.point) < 10.0 * step;
                 gradient += axis * (ahead.signed_distance - behind.signed_distance) / (2.0 * step);
             }
             if smooth {
                 checked += 1;
-                assert!(
-                    gradient.distance(found.normal) < 2e-3,
-                    "{shape:?} {q:?}: {gradient:?} {found:?}"
-                );
+                assert!(gradient.distance(found.normal) < 2e-3, "{shape:?} {q:?}: {gradient:?} {found:?}");
             }
         }
     }
-    assert!(
-        checked > 3000,
-        "only {checked} queries were off the medial axis"
-    );
+    assert!(checked > 3000, "only {checked} queries were off the medial axis");
 }
 
 #[test]
@@ -171,19 +142,10 @@ fn normal_is_defined_on_the_surface() {
         for _ in 0..200 {
             let q = shape_support::surface_point(&shape, &mut random);
             let found = shape.closest_point(q);
-            assert!(
-                found.signed_distance.abs() < 1e-9,
-                "{shape:?} {q:?} {found:?}"
-            );
-            assert!(
-                (found.normal.length() - 1.0).abs() < 1e-9,
-                "{shape:?} {q:?} {found:?}"
-            );
+            assert!(found.signed_distance.abs() < 1e-9, "{shape:?} {q:?} {found:?}");
+            assert!((found.normal.length() - 1.0).abs() < 1e-9, "{shape:?} {q:?} {found:?}");
             let outwards = found.normal.dot(q - Vec3::Z * 0.5 * shape.length());
-            assert!(
-                outwards > -1e-9 || shape.length() < 0.1 || shape.a0() != shape.a1(),
-                "{shape:?} {q:?} {found:?}"
-            );
+            assert!(outwards > -1e-9 || shape.length() < 0.1 || shape.a0() != shape.a1(), "{shape:?} {q:?} {found:?}");
         }
     }
 }
@@ -194,36 +156,13 @@ fn known_answers_on_a_circular_cylinder() {
     for (q, distance, region, normal) in [
         (Vec3::new(0.3, 0.0, 0.2), 0.2, Region::Side, Vec3::X),
         (Vec3::new(0.0, -0.05, 0.2), -0.05, Region::Side, Vec3::NEG_Y),
-        (
-            Vec3::new(0.02, 0.0, -0.1),
-            0.1,
-            Region::ProximalCap,
-            Vec3::NEG_Z,
-        ),
-        (
-            Vec3::new(0.02, 0.0, 0.39),
-            -0.01,
-            Region::DistalCap,
-            Vec3::Z,
-        ),
-        (
-            Vec3::new(0.13, 0.0, 0.44),
-            0.05,
-            Region::DistalRim,
-            Vec3::new(0.6, 0.0, 0.8),
-        ),
-        (
-            Vec3::new(0.0, 0.14, -0.03),
-            0.05,
-            Region::ProximalRim,
-            Vec3::new(0.0, 0.8, -0.6),
-        ),
+        (Vec3::new(0.02, 0.0, -0.1), 0.1, Region::ProximalCap, Vec3::NEG_Z),
+        (Vec3::new(0.02, 0.0, 0.39), -0.01, Region::DistalCap, Vec3::Z),
+        (Vec3::new(0.13, 0.0, 0.44), 0.05, Region::DistalRim, Vec3::new(0.6, 0.0, 0.8)),
+        (Vec3::new(0.0, 0.14, -0.03), 0.05, Region::ProximalRim, Vec3::new(0.0, 0.8, -0.6)),
     ] {
         let found = cylinder.closest_point(q);
-        assert!(
-            (found.signed_distance - distance).abs() < 1e-12,
-            "{found:?}"
-        );
+        assert!((found.signed_distance - distance).abs() < 1e-12, "{found:?}");
         assert_eq!(found.region, region);
         assert!(found.normal.distance(normal) < 1e-9, "{found:?}");
     }
@@ -235,19 +174,13 @@ fn approximate_distance_is_near_the_exact_one() {
     let mut errors = Vec::new();
     for shape in limb_like() {
         for _ in 0..1000 {
-            let q = shape_support::surface_point(&shape, &mut random)
-                + random.direction() * random.within(0.0, 0.05);
+            let q = shape_support::surface_point(&shape, &mut random) + random.direction() * random.within(0.0, 0.05);
             errors.push((shape.approximate_distance(q) - shape.signed_distance(q)).abs());
         }
     }
     errors.sort_by(f64::total_cmp);
     let at = |share: f64| errors[(share * (errors.len() - 1) as f64) as usize];
-    println!(
-        "approximate distance: median {:.2e}, 95 % {:.2e}, max {:.2e} m",
-        at(0.5),
-        at(0.95),
-        at(1.0)
-    );
+    println!("approximate distance: median {:.2e}, 95 % {:.2e}, max {:.2e} m", at(0.5), at(0.95), at(1.0));
     assert!(at(0.5) < 5e-4 && at(0.95) < 3e-3 && at(1.0) < 3e-2);
     for shape in hostile() {
         for _ in 0..200 {
@@ -277,9 +210,5 @@ fn bad_parameters_are_refused_by_name() {
     assert_eq!(limb.scaled(2.0), Ok(shape([0.6, 0.2, 0.2, 0.2, 0.2])));
     assert_eq!(limb.scaled(-1.0), Err(ShapeError::Scale { value: -1.0 }));
     assert!(limb.scaled(1e9).is_err());
-    assert!(
-        limb.closest_point(Vec3::new(f64::NAN, 0.0, 0.0))
-            .signed_distance
-            .is_nan()
-    );
+    assert!(limb.closest_point(Vec3::new(f64::NAN, 0.0, 0.0)).signed_distance.is_nan());
 }

@@ -3,20 +3,12 @@
 
 mod shape_support;
 
-use shape_support::{
-    Random, brute_force, hostile, inside, limb_like, random_shape, shape, surface_point,
-};
+use shape_support::{Random, brute_force, hostile, inside, limb_like, random_shape, shape, surface_point};
 use voodoo_core::geometry::{Pose, Vec3};
 use voodoo_core::shape::{Region, TaperedEllipticCylinder};
 
 /// The first stretch of a dense march that goes from outside to inside.
-fn march(
-    shape: &TaperedEllipticCylinder,
-    origin: Vec3,
-    direction: Vec3,
-    max: f64,
-    step: f64,
-) -> Option<f64> {
+fn march(shape: &TaperedEllipticCylinder, origin: Vec3, direction: Vec3, max: f64, step: f64) -> Option<f64> {
     let mut was_inside = inside(shape, origin);
     let mut distance = 0.0;
     while distance < max {
@@ -34,40 +26,23 @@ fn check(shape: &TaperedEllipticCylinder, random: &mut Random) {
     let step = 2e-4;
     let target = surface_point(shape, random) * random.within(0.0, 1.2);
     let origin = target + random.direction() * random.within(0.0, 0.8);
-    let direction = if random.unit() < 0.2 {
-        random.direction()
-    } else {
-        (target - origin).normalize_or(Vec3::X)
-    };
+    let direction = if random.unit() < 0.2 { random.direction() } else { (target - origin).normalize_or(Vec3::X) };
     let max = 2.0;
     let found = shape.cast_ray(origin, direction * random.within(0.1, 10.0), max);
     let marched = march(shape, origin, direction, max, step);
-    let context =
-        || format!("{shape:?} from {origin:?} along {direction:?}: {found:?}, marched {marched:?}");
+    let context = || format!("{shape:?} from {origin:?} along {direction:?}: {found:?}, marched {marched:?}");
     if let Some(hit) = found {
         let deep = origin + direction * (hit.distance + 1e-9);
         assert!(hit.distance >= 0.0 && hit.distance <= max, "{}", context());
-        assert!(
-            hit.point.distance(origin + direction * hit.distance) < 1e-9,
-            "{}",
-            context()
-        );
+        assert!(hit.point.distance(origin + direction * hit.distance) < 1e-9, "{}", context());
         assert!(brute_force(shape, hit.point, 64).0 < 1e-8, "{}", context());
         assert!((hit.normal.length() - 1.0).abs() < 1e-9, "{}", context());
         // The ray goes in there, against the normal, and the solid begins; a tip or an edge has no one normal.
         let t = hit.point.z / shape.length();
         let a = shape.a0() + (shape.a1() - shape.a0()) * t;
         let b = shape.b0() + (shape.b1() - shape.b0()) * t;
-        assert!(
-            hit.normal.dot(direction) < 1e-6 || a.min(b) < 1e-9,
-            "{}",
-            context()
-        );
-        assert!(
-            inside(shape, deep) || brute_force(shape, deep, 64).0 < 1e-8,
-            "{}",
-            context()
-        );
+        assert!(hit.normal.dot(direction) < 1e-6 || a.min(b) < 1e-9, "{}", context());
+        assert!(inside(shape, deep) || brute_force(shape, deep, 64).0 < 1e-8, "{}", context());
     }
     match (found, marched) {
         // The march may step over a thin part, so it may only be late.
@@ -85,10 +60,7 @@ fn check(shape: &TaperedEllipticCylinder, random: &mut Random) {
 #[test]
 fn agrees_with_dense_marching() {
     let mut random = Random(21);
-    for shape in limb_like()
-        .into_iter()
-        .chain(hostile().into_iter().take(13))
-    {
+    for shape in limb_like().into_iter().chain(hostile().into_iter().take(13)) {
         for _ in 0..100 {
             check(&shape, &mut random);
         }
@@ -106,15 +78,9 @@ fn known_hits() {
         limb.cast_ray(Vec3::from_array(origin), Vec3::from_array(direction), max)
     };
     let hit = cast([1.0, 0.0, 0.2], [-2.0, 0.0, 0.0], 5.0).expect("the side");
-    assert!(
-        (hit.distance - 0.9).abs() < 1e-12 && hit.normal == Vec3::X && hit.region == Region::Side
-    );
+    assert!((hit.distance - 0.9).abs() < 1e-12 && hit.normal == Vec3::X && hit.region == Region::Side);
     let hit = cast([0.05, 0.0, -1.0], [0.0, 0.0, 1.0], 5.0).expect("a cap");
-    assert!(
-        (hit.distance - 1.0).abs() < 1e-12
-            && hit.normal == Vec3::NEG_Z
-            && hit.region == Region::ProximalCap
-    );
+    assert!((hit.distance - 1.0).abs() < 1e-12 && hit.normal == Vec3::NEG_Z && hit.region == Region::ProximalCap);
     let hit = cast([0.05, 0.0, 1.0], [0.0, 0.0, -1.0], f64::INFINITY).expect("a cap");
     assert!((hit.distance - 0.6).abs() < 1e-12 && hit.region == Region::DistalCap);
     for (origin, direction, max) in [
@@ -140,9 +106,7 @@ fn a_ray_that_starts_inside_may_enter_again() {
         let origin = surface_point(&flip, &mut random) * 0.98 + Vec3::Z * 0.004;
         let direction = (surface_point(&flip, &mut random) - origin).normalize_or(Vec3::X);
         if inside(&flip, origin) {
-            let found = flip
-                .cast_ray(origin, direction, 2.0)
-                .map(|hit| hit.distance);
+            let found = flip.cast_ray(origin, direction, 2.0).map(|hit| hit.distance);
             again += usize::from(found.is_some());
             if let Some(marched) = march(&flip, origin, direction, 2.0, 2e-4) {
                 let distance = found.expect("the march entered again");
@@ -161,24 +125,17 @@ fn boxes_contain_the_surface_and_are_tight() {
             let bounds = shape.aabb(&pose);
             if pose == Pose::IDENTITY {
                 let local = shape.local_aabb();
-                assert!(
-                    bounds.mins.distance(local.mins) < 1e-15
-                        && bounds.maxs.distance(local.maxs) < 1e-15
-                );
+                assert!(bounds.mins.distance(local.mins) < 1e-15 && bounds.maxs.distance(local.maxs) < 1e-15);
             }
             let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             for k in 0..4000 {
                 let angle = std::f64::consts::TAU * f64::from(k) / 2000.0;
-                let point =
-                    pose.transform_point(shape_support::side(&shape, angle, f64::from(k / 2000)));
+                let point = pose.transform_point(shape_support::side(&shape, angle, f64::from(k / 2000)));
                 (low, high) = (low.min(point), high.max(point));
             }
             for _ in 0..500 {
                 let point = pose.transform_point(surface_point(&shape, &mut random));
-                assert!(
-                    (point - bounds.mins).min_element() > -1e-12
-                        && (bounds.maxs - point).min_element() > -1e-12
-                );
+                assert!((point - bounds.mins).min_element() > -1e-12 && (bounds.maxs - point).min_element() > -1e-12);
             }
             assert!((bounds.mins - low).abs().max_element() < 2e-6, "{shape:?}");
             assert!((bounds.maxs - high).abs().max_element() < 2e-6, "{shape:?}");

@@ -1,6 +1,7 @@
 //! Pose and sizes of a body from named positions in the world.
 
 use super::{Body, JointKind};
+use crate::chain::joint_turn;
 use crate::error::TrackError;
 use crate::geometry::{Mat3, Pose, Quat, Vec3};
 use crate::rigid::Moments;
@@ -44,10 +45,11 @@ impl Body {
             };
             let pairs = body.known_landmarks(limb, positions);
             let pose = body.orient_limb(limb, &pairs, prior, anchor, positions);
+            poses.push(pose);
             if fit_sizes {
                 body.stretch_limb(limb, &pairs, &pose);
+                body.align_hinge(limb, &poses);
             }
-            poses.push(pose);
         }
         // The last limbs may have stretched after their parents were placed; every joint is closed once more.
         body.close_joints(&mut poses);
@@ -203,6 +205,17 @@ impl Body {
                 .find(|(known, _)| (*known - position).length() < 1e-9)
                 .map_or(position * stretch, |(_, measured)| *measured)
         });
+    }
+
+    /// Turns the hinge on a limb so that its measured pose is one the hinge can take: nobody's elbow or knee axis is quite
+    /// square to the limbs (carrying angle). The axis on the parent stays.
+    fn align_hinge(&mut self, limb: usize, poses: &[Pose]) {
+        let Some((parent, joint)) = &mut self.limbs[limb].parent else { return };
+        if joint.kind() == JointKind::Hinge {
+            let twist = joint_turn(joint, &poses[*parent], &poses[limb]);
+            let world_from_joint = poses[*parent].rotation * joint.parent_from_joint.rotation * twist;
+            joint.limb_from_joint.rotation = (poses[limb].rotation.inverse() * world_from_joint).normalize();
+        }
     }
 
     /// Moves every limb so that the centres of its joint coincide.

@@ -160,19 +160,13 @@ mod tests {
             let (angle, t) = (0.1 * n as f64, (n % 97) as f64 / 96.0);
             let off = (n % 61) as f64 * 1e-3 - 0.02;
             let (a, b) = shape.semi_axes(t * shape.length());
-            Vec3::new(
-                (a + off) * angle.cos(),
-                (b + off) * angle.sin(),
-                t * shape.length(),
-            )
-            .as_vec3()
+            Vec3::new((a + off) * angle.cos(), (b + off) * angle.sin(), t * shape.length()).as_vec3()
         };
         (0..200)
             .map(|block| {
                 let mut queries = Block::ZERO;
                 for i in 0..BLOCK {
-                    [queries.x[i], queries.y[i], queries.z[i]] =
-                        point(block * BLOCK + i).to_array();
+                    [queries.x[i], queries.y[i], queries.z[i]] = point(block * BLOCK + i).to_array();
                 }
                 queries
             })
@@ -181,11 +175,9 @@ mod tests {
 
     #[test]
     fn limbs_rarely_need_the_exact_path() -> Result<(), crate::shape::ShapeError> {
-        for [length, a0, b0, a1, b1] in [
-            [0.55, 0.16, 0.11, 0.19, 0.12],
-            [0.25, 0.05, 0.045, 0.03, 0.027],
-            [0.42, 0.06, 0.065, 0.04, 0.042],
-        ] {
+        for [length, a0, b0, a1, b1] in
+            [[0.55, 0.16, 0.11, 0.19, 0.12], [0.25, 0.05, 0.045, 0.03, 0.027], [0.42, 0.06, 0.065, 0.04, 0.042]]
+        {
             let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1)?;
             let constants = Constants::new(&shape, &Pose::IDENTITY);
             let mut found = Surface::ZERO;
@@ -195,10 +187,7 @@ mod tests {
                 doubtful += found.doubtful.iter().filter(|&&doubt| doubt != 0).count();
             }
             let share = doubtful as f64 / (200 * BLOCK) as f64;
-            assert!(
-                shape.aspect_change() <= ONE_BASIN && share < 0.01,
-                "{share} of {shape:?}"
-            );
+            assert!(shape.aspect_change() <= ONE_BASIN && share < 0.01, "{share} of {shape:?}");
         }
         Ok(())
     }

@@ -20,11 +20,7 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub const ZERO: Self = Self {
-        x: [0.0; BLOCK],
-        y: [0.0; BLOCK],
-        z: [0.0; BLOCK],
-    };
+    pub const ZERO: Self = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
 }
 
 /// The results of one block, in the frame of the queries.
@@ -78,16 +74,10 @@ impl Constants {
         let cap = |a: f64, b: f64| [(a * a) as f32, (b * b) as f32, (a * a * b * b) as f32];
         let size = shape.a0.max(shape.a1).max(shape.b0).max(shape.b1);
         // The flatter an ellipse, the larger the third derivative of g at its tips.
-        let aspect = f64::max(
-            shape.a0.max(shape.b0) / shape.a0.min(shape.b0),
-            shape.a1.max(shape.b1) / shape.a1.min(shape.b1),
-        );
+        let aspect =
+            f64::max(shape.a0.max(shape.b0) / shape.a0.min(shape.b0), shape.a1.max(shape.b1) / shape.a1.min(shape.b1));
         Self {
-            columns: [
-                single(rotation.x_axis),
-                single(rotation.y_axis),
-                single(rotation.z_axis),
-            ],
+            columns: [single(rotation.x_axis), single(rotation.y_axis), single(rotation.z_axis)],
             origin: origin.to_array(),
             rest: single(rest),
             second_order: (size * aspect) as f32,
@@ -106,10 +96,7 @@ impl Constants {
     #[inline(always)]
     fn slice<const FMA: bool>(&self, z: f32) -> (f32, f32) {
         let t = max(min(z * self.inverse_length, 1.0), 0.0);
-        (
-            fma::<FMA>(self.da, t, self.a0),
-            fma::<FMA>(self.db, t, self.b0),
-        )
+        (fma::<FMA>(self.da, t, self.a0), fma::<FMA>(self.db, t, self.b0))
     }
 }
 
@@ -164,13 +151,7 @@ fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) 
     let mixed = fma::<FMA>(tx, dx, fma::<FMA>(ty, dy, turned));
     let drift = -mixed * inverse;
     let coupling = select(t == free, mixed * drift, 0.0);
-    Foot {
-        free,
-        drift,
-        slope,
-        bend: tangent - curved + coupling,
-        tangent,
-    }
+    Foot { free, drift, slope, bend: tangent - curved + coupling, tangent }
 }
 
 #[inline(always)]
@@ -197,10 +178,7 @@ fn newton(foot: &Foot) -> f32 {
 /// The angle after a Newton step, kept in the quadrant.
 #[inline(always)]
 fn turned<const FMA: bool>(c: f32, s: f32, step: f32) -> (f32, f32) {
-    nearly_unit::<FMA>(
-        max(fma::<FMA>(-step, s, c), 0.0),
-        max(fma::<FMA>(step, c, s), 0.0),
-    )
+    nearly_unit::<FMA>(max(fma::<FMA>(-step, s, c), 0.0), max(fma::<FMA>(step, c, s), 0.0))
 }
 
 /// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
@@ -211,18 +189,10 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
     let mut limb = Block::ZERO;
     let (mut cosine, mut sine) = ([0f32; BLOCK], [0f32; BLOCK]);
     for i in 0..BLOCK {
-        let (wx, wy, wz) = (
-            queries.x[i] - k.origin[0],
-            queries.y[i] - k.origin[1],
-            queries.z[i] - k.origin[2],
-        );
+        let (wx, wy, wz) = (queries.x[i] - k.origin[0], queries.y[i] - k.origin[1], queries.z[i] - k.origin[2]);
         let turn = |axis: usize| {
             let [cx, cy, cz] = k.columns[axis];
-            fma::<FMA>(
-                cx,
-                wx,
-                fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])),
-            )
+            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])))
         };
         let (qx, qy, z) = (turn(0), turn(1), turn(2));
         (limb.x[i], limb.y[i], limb.z[i]) = (qx, qy, z);
@@ -301,11 +271,7 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
             fma::<FMA>(
                 k.columns[0][axis],
                 x,
-                fma::<FMA>(
-                    k.columns[1][axis],
-                    y,
-                    fma::<FMA>(k.columns[2][axis], z, base),
-                ),
+                fma::<FMA>(k.columns[1][axis], y, fma::<FMA>(k.columns[2][axis], z, base)),
             )
         };
         out.points.x[i] = world(0, ex, ey, ez, queries.x[i]);
@@ -315,22 +281,12 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         out.normals.y[i] = world(1, nx, ny, nz, 0.0);
         out.normals.z[i] = world(2, nx, ny, nz, 0.0);
         out.signed_distance[i] = sign * distance;
-        let edge = if t <= 0.0 {
-            Region::ProximalRim as u8
-        } else {
-            Region::DistalRim as u8
-        };
+        let edge = if t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
         let lateral = if rim { edge } else { Region::Side as u8 };
-        let flat = if distal {
-            Region::DistalCap as u8
-        } else {
-            Region::ProximalCap as u8
-        };
+        let flat = if distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere is doubtful.
-        let clear = trusted
-            & (cap | (norm > 1e-12))
-            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        let clear = trusted & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
         out.doubtful[i] = u8::from(!clear);
     }
 }

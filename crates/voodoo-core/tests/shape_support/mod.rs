@@ -138,11 +138,7 @@ pub fn brute_force(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) -> (f6
     let fold = Vec3::new(1f64.copysign(q.x), 1f64.copysign(q.y), 1.0);
     let q = q * fold;
     let mut angles: Vec<f64> = Vec::new();
-    let tips = [
-        (1.0, 1.0),
-        (shape.a0().max(1e-4), shape.b0().max(1e-4)),
-        (shape.a1().max(1e-4), shape.b1().max(1e-4)),
-    ];
+    let tips = [(1.0, 1.0), (shape.a0().max(1e-4), shape.b0().max(1e-4)), (shape.a1().max(1e-4), shape.b1().max(1e-4))];
     for (a, b) in tips {
         for k in 0..=grid {
             let phi = FRAC_PI_2 * k as f64 / grid as f64;
@@ -151,17 +147,13 @@ pub fn brute_force(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) -> (f6
     }
     angles.sort_by(f64::total_cmp);
     angles.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-    let distances: Vec<f64> = angles
-        .iter()
-        .map(|&angle| to_ruling(shape, q, angle).0)
-        .collect();
+    let distances: Vec<f64> = angles.iter().map(|&angle| to_ruling(shape, q, angle).0).collect();
     let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
     let mut best = (f64::INFINITY, Vec3::ZERO);
     let last = angles.len() - 1;
     for k in 0..=last {
         let (low, high) = (k.saturating_sub(1), (k + 1).min(last));
-        let reach = (angles[high] - angles[low])
-            * shape.a0().max(shape.a1()).max(shape.b0()).max(shape.b1());
+        let reach = (angles[high] - angles[low]) * shape.a0().max(shape.a1()).max(shape.b0()).max(shape.b1());
         if distances[k] > distances[low].min(distances[high]) || distances[k] > least + reach {
             continue;
         }
@@ -181,10 +173,7 @@ pub fn brute_force(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) -> (f6
             }
         }
     }
-    for (z, a, b) in [
-        (0.0, shape.a0(), shape.b0()),
-        (shape.length(), shape.a1(), shape.b1()),
-    ] {
+    for (z, a, b) in [(0.0, shape.a0(), shape.b0()), (shape.length(), shape.a1(), shape.b1())] {
         let within = a > 0.0 && b > 0.0 && (q.x / a).powi(2) + (q.y / b).powi(2) <= 1.0;
         if within && (q.z - z).abs() < best.0 {
             best = ((q.z - z).abs(), Vec3::new(q.x, q.y, z));
