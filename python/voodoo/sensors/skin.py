@@ -144,8 +144,9 @@ class SkinTracker:
         sites = list(places)
         cost = np.array([ray_distance(origin, directions, predicted[site]) for site in sites])
         cost[:, ~np.isfinite(directions).all(axis=1)] = np.inf
-        no_hand = ~np.array([item.hand for item in self.candidates])
-        cost[np.ix_([not site.startswith("head") for site in sites], no_hand)] = np.inf
+        no_hand = np.flatnonzero([not item.hand for item in self.candidates])
+        hands = np.flatnonzero([not site.startswith("head") for site in sites])
+        cost[np.ix_(hands, no_hand)] = np.inf
         rays = []
         for row, column in assign(cost, gate=self.settings.gate):
             site = sites[row]
