@@ -76,7 +76,7 @@ class FrontEndSettings:
     gate_radius: float = 0.15
     gate_growth: float = 0.5
     gate_widest: float = 0.40
-    agreement: float = 0.05
+    agreement: float = 0.08
     depth_filter: DepthFilter | None = field(default_factory=DepthFilter)
     skin: SkinSettings = field(default_factory=SkinSettings)
     ground_z: float | None = None

@@ -38,7 +38,7 @@ class SiteRay:
 
 
 def agreed(
-    rays: Sequence[SiteRay], *, predicted: Mapping[str, npt.NDArray[np.float64]], scale: float = 0.05
+    rays: Sequence[SiteRay], *, predicted: Mapping[str, npt.NDArray[np.float64]], scale: float = 0.08
 ) -> list[SiteRay]:
     """The rays with a trust that tells how well those of one site agree.
 
