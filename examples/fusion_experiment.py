@@ -2,8 +2,8 @@
 
     python examples/fusion_experiment.py ../shared/data/rendered/dev_* --out out/fusion
 
-The 2-D cue is skin colour: head and hands in one colour picture. Writes table.md, groups.png (error of each joint group) and
-frames.png (what each of the ways makes of the frame in which depth alone is farthest off).
+The 2-D cue is skin colour: head and hands in one colour picture. Writes table.md, groups.png (error of each joint
+group) and frames.png (what each of the ways makes of the frame in which depth alone is farthest off).
 """
 
 import argparse
@@ -85,9 +85,7 @@ def table(results: list[Result], solver: str) -> str:
     lines = [f"Solver `{solver}`: mean error (cm) of a joint group, {' / '.join(MODES)}.", ""]
     lines += ["| recording | " + " | ".join(GROUPS) + " |", "|---" * (len(GROUPS) + 1) + "|"]
     for name in recordings:
-        cells = [
-            " / ".join(f"{100 * chosen[name, mode].group(group):.1f}" for mode in MODES) for group in GROUPS
-        ]
+        cells = [" / ".join(f"{100 * chosen[name, mode].group(group):.1f}" for mode in MODES) for group in GROUPS]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     for mode in ("fused", "all"):
         change = {

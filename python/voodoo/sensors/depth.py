@@ -10,7 +10,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
+from voodoo.sensors.pixels import FloatArray, in_sensor
 
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 
@@ -85,3 +87,49 @@ class DepthFilter:
             flying |= (low > 0.0) & (z - low > edge) & (high - z > edge) & (high - low > slant)
             lonely &= (np.abs(before - z) > edge) & (np.abs(after - z) > edge)
         return flying | lonely
+
+
+def body_mask(
+    depth: DepthArray,
+    *,
+    depth_camera: Camera,
+    world_from_depth: FloatArray,
+    metres_per_unit: float,
+    color_camera: Camera,
+    world_from_color: FloatArray,
+    joints: npt.ArrayLike,
+    margin: float = 0.30,
+    step: int = 1,
+) -> npt.NDArray[np.bool_]:
+    """Where, in a colour image, a depth camera beside it saw something within the box around the body.
+
+    Args:
+        depth: (H, W) uint16 or float32; 0 and NaN mean "no return".
+        depth_camera, world_from_depth: calibration and (4, 4) pose.
+        metres_per_unit: of `depth`.
+        color_camera, world_from_color: calibration and (4, 4) pose of the colour camera.
+        joints: (N, 3) predicted positions of the body [m].
+        margin: enlargement of their box [m].
+        step: every step-th row and column of the depth image is used.
+
+    Returns:
+        (H, W) of the colour image. The gaps between the depth pixels are closed; what no depth camera saw is False.
+    """
+    places = np.asarray(joints, dtype=np.float64)
+    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
+    z = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
+    rays = depth_camera.rays()[::step, ::step]
+    valid = np.isfinite(z) & (z > 0.0)
+    points = np.column_stack([rays[valid] * z[valid, None], z[valid]]) @ world_from_depth[:3, :3].T.astype(np.float32)
+    points = points + world_from_depth[:3, 3].astype(np.float32)
+    points = points[((points > low) & (points < high)).all(axis=1)]
+    mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
+    if not len(points):
+        return mask.astype(bool)
+    pixels = color_camera.project(in_sensor(world_from_color, points))
+    pixels = np.round(pixels[np.isfinite(pixels).all(axis=1)]).astype(np.int64)
+    inside = (pixels >= 0).all(axis=1) & (pixels < (color_camera.width, color_camera.height)).all(axis=1)
+    mask[pixels[inside, 1], pixels[inside, 0]] = 1
+    # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
+    size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
+    return np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)

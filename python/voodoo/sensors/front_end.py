@@ -22,7 +22,7 @@ from voodoo.recordings import (
     RecordedFrame,
     Recording,
 )
-from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.depth import DepthFilter, body_mask
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import (
     PLANAR_LASER,
@@ -60,6 +60,7 @@ class FrontEndSettings:
         depth_filter: what is dropped from depth images; None takes them as they are.
         skin: settings of the skin-colour cue.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
+        lost_points: a forearm with fewer matched points has lost its hand.
 
     Raises:
         MeasurementError: an unknown kind.
@@ -80,6 +81,7 @@ class FrontEndSettings:
     depth_filter: DepthFilter | None = field(default_factory=DepthFilter)
     skin: SkinSettings = field(default_factory=SkinSettings)
     ground_z: float | None = None
+    lost_points: int = 10
 
     def __post_init__(self) -> None:
         """Check the kinds."""
@@ -129,8 +131,13 @@ class FrontEnd:
             frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
         predicted = self._predictor.predict(recorded.stamp)
         self.rays = []
+        depth = next((item for item in recorded.measurements if isinstance(item, DepthImage)), None)
         for item in recorded.measurements:
-            self._add(frame, item, predicted)
+            if isinstance(item, ColorImage):
+                if "skin" in self.settings.use:
+                    self._add_skin(item, predicted, depth if "depth" in self.settings.use else None)
+            else:
+                self._add(frame, item, predicted)
         if self.settings.agreement > 0.0:
             self.rays = agreed(self.rays, predicted=predicted, scale=self.settings.agreement)
         add_rays(frame, self.rays, model=self.settings.model)
@@ -159,13 +166,34 @@ class FrontEnd:
             frame.add_points(item.points(), world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
         elif isinstance(item, KeypointImage) and "keypoints" in use:
             self._add_keypoints(item, predicted, frame.stamp)
-        elif isinstance(item, ColorImage) and "skin" in use:
-            skin = self.skin.setdefault(item.sensor, SkinTracker(self.settings.skin))
-            # The picture is older or newer than the frame: the ray is moved along with its site.
-            then = self._predictor.predict(item.stamp)
-            for ray in skin.observe(item.image, item.camera, item.root_from_sensor, then, source=item.sensor):
-                moved = ray.origin + (predicted[ray.site] - then[ray.site])
-                self.rays.append(SiteRay(ray.site, moved, ray.direction, ray.sigma, ray.source, ray.trust))
+
+    def _add_skin(self, item: ColorImage, predicted: Mapping[str, FloatArray], depth: DepthImage | None) -> None:
+        skin = self.skin.setdefault(item.sensor, SkinTracker(self.settings.skin))
+        # The picture is older or newer than the frame: the ray is moved along with its site.
+        then = self._predictor.predict(item.stamp)
+        body = None
+        if depth is not None:
+            body = body_mask(
+                depth.image,
+                depth_camera=depth.camera,
+                world_from_depth=depth.root_from_sensor,
+                metres_per_unit=depth.metres_per_unit,
+                color_camera=item.camera,
+                world_from_color=item.root_from_sensor,
+                joints=list(then.values()),
+                step=max(depth.camera.width // 200, 1),
+            )
+        rays = skin.observe(
+            item.image, item.camera, item.root_from_sensor, then, body=body, lost=self._lost(), source=item.sensor
+        )
+        for ray in rays:
+            moved = ray.origin + (predicted[ray.site] - then[ray.site])
+            self.rays.append(SiteRay(ray.site, moved, ray.direction, ray.sigma, ray.source, ray.trust))
+
+    def _lost(self) -> list[str]:
+        """Hands whose forearm had too few points in the last step to say where it is."""
+        points = self.tracker.estimate.limb_points
+        return [f"{side}_hand" for side in "lr" if points.get(f"{side}_forearm", 0) < self.settings.lost_points]
 
     def _add_keypoints(self, item: KeypointImage, predicted: Mapping[str, FloatArray], stamp: float) -> None:
         place: dict[str, Any] = {

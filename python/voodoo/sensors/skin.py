@@ -5,7 +5,10 @@ predicted
 sites, what is left over is ignored. Three things keep a hand with its owner:
 
 * A region that is larger than a hand (a bare forearm, a door) offers its tips, not its middle.
-* What has had skin's colour for long where no head or hand was is background (a wooden door).
+* What has had skin's colour for long where no head or hand was is background (a wooden door); with a depth image, so
+is what
+  lies nowhere near the body.
+* A site that other sensors measure well has a narrow gate, and where two candidates could both be it, neither is taken.
 * The colours are learnt at the projected head and hands while they are matched, with a forgetting factor, so that they
   follow the light and the person.
 """
@@ -13,7 +16,7 @@ sites, what is left over is ignored. Three things keep a hand with its owner:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import cv2
@@ -45,6 +48,8 @@ class SkinSettings:
     Args:
         sites: site -> standard deviation [m] of a region's centre from it. A face is the front of the head.
         gate: a candidate farther than this from the predicted site is not it [m].
+        lost_gate: the same for a site whose limb nothing else measures.
+        ambiguity: a second candidate that is not this many times as far as the first makes both useless.
         noise: of a region's centre in the image; its spread is that of the site.
         static_seconds: what has skin's colour for so long away from head and hands is background [s].
         settled_frames: pictures to learn from before the cue is used.
@@ -54,16 +59,18 @@ class SkinSettings:
     """
 
     sites: Mapping[str, float] = field(
-        default_factory=lambda: {"head_center": 0.05, "l_hand": 0.03, "r_hand": 0.03},
+        default_factory=lambda: {"head_center": 0.05, "l_hand": 0.04, "r_hand": 0.04},
     )
-    gate: float = 0.15
+    gate: float = 0.12
+    lost_gate: float = 0.35
+    ambiguity: float = 1.5
     noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.0))
     static_seconds: float = 1.0
     settled_frames: int = 1
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        numbers = {"gate": self.gate, "static_seconds": self.static_seconds, **self.sites}
+        numbers = {"gate": self.gate, "lost_gate": self.lost_gate, "static_seconds": self.static_seconds, **self.sites}
         for name, value in numbers.items():
             if not (math.isfinite(value) and value > 0.0):
                 raise MeasurementError(f"skin {name}: expected a number > 0, found {value!r}")
@@ -96,6 +103,7 @@ class SkinTracker:
         self.candidates: list[Candidate] = []
         self.assigned: dict[str, Candidate] = {}
         self._skin: Mask | None = None
+        self._body: Mask | None = None
         self._static: npt.NDArray[np.float32] | None = None
         self._learnt = 0
 
@@ -111,6 +119,8 @@ class SkinTracker:
         world_from_sensor: npt.ArrayLike,
         predicted: Mapping[str, FloatArray],
         *,
+        body: Mask | None = None,
+        lost: Collection[str] = (),
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -120,6 +130,8 @@ class SkinTracker:
             camera: calibration.
             world_from_sensor: (4, 4).
             predicted: site name -> (3,) in the world at the time of the picture.
+            body: (H, W), True where a depth camera saw something near the body; None: not known.
+            lost: sites whose limb nothing else measures.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -129,6 +141,9 @@ class SkinTracker:
         _check_image(image, camera)
         places = self._places(camera, pose, predicted)
         skin = self.colour.classify(image)
+        self._body = body
+        if body is not None:
+            skin &= body
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
         self._skin = skin
@@ -147,11 +162,18 @@ class SkinTracker:
         no_hand = np.flatnonzero([not item.hand for item in self.candidates])
         hands = np.flatnonzero([not site.startswith("head") for site in sites])
         cost[np.ix_(hands, no_hand)] = np.inf
+        gates = np.array([self.settings.lost_gate if site in lost else self.settings.gate for site in sites])
+        pixels = np.array([item.pixel for item in self.candidates])
         rays = []
-        for row, column in assign(cost, gate=self.settings.gate):
+        # Distances in units of each site's own gate.
+        for row, column in assign(cost / gates[:, None], gate=1.0):
             site = sites[row]
+            z = places[site][1]
+            apart = np.linalg.norm(pixels - pixels[column], axis=1) > 2.0 * PALM_M * focal / z
+            if (cost[row][apart] < max(self.settings.ambiguity * cost[row, column], 0.5 * gates[row])).any():
+                continue
             self.assigned[site] = self.candidates[column]
-            across = self.settings.noise.sigma(places[site][1], focal, spread=self.settings.sites[site])
+            across = self.settings.noise.sigma(z, focal, spread=self.settings.sites[site])
             rays.append(SiteRay(site, origin, directions[column], across, source))
         return rays
 
@@ -188,7 +210,7 @@ class SkinTracker:
             cv2.circle(near, centre, max(round(2.5 * radius), 2), 1, -1)
             if site in self.assigned or not self.settled:
                 cv2.circle(inside, centre, max(round(0.8 * radius), 1), 1, -1)
-        if self.colour.learn(image, inside.astype(bool), outside=~near.astype(bool)):
+        if self.colour.learn(image, inside.astype(bool), outside=~near.astype(bool), body=self._body):
             self._learnt += 1
         if self._skin is not None:
             seen = self.colour.classify(image)

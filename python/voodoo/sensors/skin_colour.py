@@ -50,13 +50,14 @@ class SkinColour:
         table = (self.skin > self.ratio * self.rest).astype(np.uint8).ravel()
         return np.asarray(cv2.medianBlur(table[self._bins(image)], 3), dtype=bool) & self._lit(image)
 
-    def learn(self, image: ByteImage, inside: Mask, *, outside: Mask) -> bool:
+    def learn(self, image: ByteImage, inside: Mask, *, outside: Mask, body: Mask | None = None) -> bool:
         """Learn from the pixels where skin must be, and from those far from it.
 
         Args:
             image: (H, W, 3) BGR.
             inside: (H, W) where head and hands are. Only pixels whose colour is near to what skin was are learnt.
             outside: (H, W) where no head or hand is.
+            body: (H, W) where the body is, if known: half of the rest is learnt from its clothes.
 
         Returns:
             Whether there was enough skin to learn from.
@@ -69,8 +70,11 @@ class SkinColour:
         # The first pictures make the general skin this person's; later ones follow slowly.
         keep = np.float32(self.forgetting if self._pictures >= 5 else 0.5)
         self.skin = keep * self.skin + (1 - keep) * _histogram(bins[chosen])
+        rest = _histogram(bins[outside])
+        if body is not None and (clothes := outside & body).any():
+            rest = 0.5 * rest + 0.5 * _histogram(bins[clothes])
         # A colour seen nowhere yet is not skin.
-        rest = 0.95 * _histogram(bins[outside]) + np.float32(0.05 / _SIZE)
+        rest = 0.95 * rest + np.float32(0.05 / _SIZE)
         self.rest = keep * self.rest + (1 - keep) * rest
         self._pictures += 1
         return True
