@@ -23,6 +23,7 @@ pub mod predict;
 mod relate;
 pub mod rigid;
 pub mod shape;
+mod simd;
 pub mod solver;
 pub mod terms;
 pub mod tracker;

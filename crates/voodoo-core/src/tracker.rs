@@ -14,10 +14,12 @@ use crate::frame::{Frame, PointSlice};
 use crate::geometry::{Points, Pose, Vec3};
 use crate::predict::predict;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Problem, Solver, solver};
+use crate::solver::{Gate, Problem, Solver, solver};
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
+/// Points farther than this from the set pose say nothing about girths, metres.
+const GIRTH_GATE: f64 = 0.10;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
 
@@ -152,7 +154,8 @@ impl Tracker {
         let mut previous = f64::INFINITY;
         while steps < self.config.max_steps {
             // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
-            self.match_points();
+            let gate = self.solver.gate(&self.config, steps);
+            self.match_points(&gate);
             // 4 Point-to-point relations, 5 closest points on rays.
             self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
@@ -174,7 +177,8 @@ impl Tracker {
             self.solver.solve(&problem, &mut self.poses);
             steps += 1;
         }
-        self.match_points();
+        let gate = self.solver.gate(&self.config, self.config.max_steps);
+        self.match_points(&gate);
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
@@ -236,30 +240,39 @@ impl Tracker {
 
     /// Fits the girths to the first frame after a reset, whose pose is known.
     fn fit_girths(&mut self) {
-        let mut totals = vec![GirthFit { shift: Vec3::ZERO, girth: 1.0 }; self.poses.len()];
+        let mut totals = vec![GirthFit::default(); self.poses.len()];
+        let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
         for _ in 0..GIRTH_STEPS {
-            self.match_points();
+            self.match_points(&gate);
             for (limb, total) in totals.iter_mut().enumerate() {
-                let Some(step) = girth_step(&self.correspondences.limbs[limb], &self.poses[limb], total) else {
-                    continue;
-                };
-                let girth = (total.girth * step.girth).clamp(0.7, 1.4);
-                if self.body.change_girth(limb, step.shift, girth / total.girth) {
+                let shape = self.body.limbs()[limb].shape;
+                let matches = &self.correspondences.limbs[limb];
+                let Some(step) = girth_step(&shape, matches, &self.poses[limb], total) else { continue };
+                let (sum, step) = total.then(&step);
+                if self.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut self.poses[limb];
                     pose.translation += pose.rotation * step.shift;
-                    *total = GirthFit { shift: total.shift + step.shift, girth };
+                    *total = sum;
                 }
             }
         }
     }
 
-    fn match_points(&mut self) {
+    fn match_points(&mut self, gate: &Gate) {
         let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
-        assignment.assign(body, poses, candidates, config);
+        assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let assignment = &*assignment;
         let work = |(index, matches): (usize, &mut LimbMatches)| {
-            assignment.match_limb(index, &body.limbs()[index], &poses[index], candidates, config, matches);
+            assignment.match_limb(
+                index,
+                &body.limbs()[index],
+                &poses[index],
+                candidates,
+                config,
+                gate.distance,
+                matches,
+            );
         };
         match threads {
             // Every limb is worked on by one thread in a fixed order: the result does not depend on their number.
