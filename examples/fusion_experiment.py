@@ -37,11 +37,13 @@ GROUPS = {
     "knees": ("l_knee", "r_knee"),
     "ankles": ("l_ankle", "r_ankle"),
 }
-LIMBS = tuple(
-    (f"{side}_{a}", f"{side}_{b}")
-    for side in "lr"
-    for a, b in (("shoulder", "elbow"), ("elbow", "hand"), ("hip", "knee"), ("knee", "ankle"), ("shoulder", "hip"))
-) + (("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"), ("vc7", "skull_tip"))
+PAIRS = (("shoulder", "elbow"), ("elbow", "hand"), ("hip", "knee"), ("knee", "ankle"), ("shoulder", "hip"))
+LIMBS = (
+    *((f"{side}_{a}", f"{side}_{b}") for side in "lr" for a, b in PAIRS),
+    ("l_shoulder", "r_shoulder"),
+    ("l_hip", "r_hip"),
+    ("vc7", "skull_tip"),
+)
 
 
 @dataclass(frozen=True)

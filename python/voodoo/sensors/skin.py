@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d  # type: ignore[import-untyped]
 
 from voodoo._core import Estimate
 from voodoo.camera import Camera
@@ -273,13 +274,15 @@ def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
     rows, columns = np.nonzero(mask)
     pixels = np.column_stack([columns, rows]).astype(np.float64)
     distance = np.linalg.norm(outline - pixels.mean(axis=0), axis=1)
+    # A tip is farther out than all of the contour around it.
+    peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
     tips: list[tuple[float, float]] = []
     taken: list[FloatArray] = []
     for index in np.argsort(-distance, kind="stable"):
         if len(tips) == 4 or distance[index] < 1.5 * palm_px:
             break
         tip = outline[index]
-        if any(float(np.linalg.norm(tip - other)) < 3.0 * palm_px for other in taken):
+        if not peak[index] or any(float(np.linalg.norm(tip - other)) < 3.0 * palm_px for other in taken):
             continue
         taken.append(tip)
         near = pixels[np.linalg.norm(pixels - tip, axis=1) < 3.2 * palm_px]
