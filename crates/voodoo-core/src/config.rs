@@ -221,6 +221,10 @@ config! {
     limb_box_margin: f64 = 0.10, "m", 0.0 ..= 10.0;
     /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
     overlap: Overlap = Overlap::Exclusive, "";
+    /// At most about this many pixels of a depth image are used; a finer image is sampled on a grid.
+    max_points: usize = 3000, "", 100 ..= 10000000;
+    /// Learn the still scene behind the body from depth images, as long as their camera does not move, and leave it out.
+    background: bool = true, "";
     /// Every n-th point of a limb is used (K06 IV-B.3).
     sampling_factor: usize = 1, "", 1 ..= 1000;
     /// A limb keeps at least this many of its points when sampled (K06 IV-B.3).
@@ -249,6 +253,8 @@ config! {
     root_shift_sigma: f64 = 0.04, "m", 0.0001 ..= 10.0;
     /// Multiplies the standard deviations of all unexpected motion: smaller is smoother and slower.
     motion_scale: f64 = 1.0, "", 0.01 ..= 100.0;
+    /// Try other configurations of arms and legs where the frame speaks against the current ones.
+    hypotheses: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.

@@ -118,6 +118,18 @@ pub struct DepthImage<'a> {
     pub source: u16,
 }
 
+impl DepthImage<'_> {
+    /// The point of a pixel in the camera's frame for a depth of `z` metres.
+    pub fn back_project(&self, index: usize, z: f32) -> Vec3 {
+        let [fx, fy, cx, cy] = self.intrinsics;
+        let [x, y] = match self.rays {
+            Some(rays) => rays[index].map(f64::from),
+            None => [((index % self.width) as f64 - cx) / fx, ((index / self.width) as f64 - cy) / fy],
+        };
+        f64::from(z) * Vec3::new(x, y, 1.0)
+    }
+}
+
 /// A named site was seen at a position (K06 IV-A: 3-D point-to-point relation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionRelation {
