@@ -18,6 +18,7 @@ pub mod error;
 pub mod estimate;
 pub mod frame;
 pub mod geometry;
+pub mod ik;
 pub mod normal;
 pub mod predict;
 mod relate;
