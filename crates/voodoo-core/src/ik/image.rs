@@ -42,6 +42,20 @@ pub struct Criterion<'a> {
 }
 
 impl Criterion<'_> {
+    /// Mean length of the projected bones, pixels, if they lay across the line of sight: what `h` can change by at most per radian,
+    /// about.
+    pub fn reach(&self, at: &Kinematics) -> f64 {
+        let mut sum = 0.0;
+        for segment in self.segments {
+            let ends = segment.ends.map(|(part, point)| at.poses[part].transform_point(point));
+            for view in self.views {
+                let z = view.camera_from_world.transform_point(0.5 * (ends[0] + ends[1])).z;
+                sum += view.intrinsics[0] * (ends[1] - ends[0]).length() / z.max(NEAREST);
+            }
+        }
+        sum / (self.views.len() * self.segments.len()).max(1) as f64
+    }
+
     /// The criterion, and its gradient by all unknowns into `gradient` (J10 eq. 7, 8). Samples no camera sees count zero.
     pub fn evaluate(&self, model: &Model, at: &Kinematics, gradient: &mut [f64]) -> f64 {
         gradient.fill(0.0);

@@ -14,6 +14,8 @@ const LEAST_DAMPING: f64 = 1e-10;
 const SETTLE: usize = 100;
 /// Residual that a lower level may leave in a higher one, metres.
 const SETTLED: f64 = 1e-10;
+/// Share of the bones' length in the images, per radian, below which the gradient of `h` says little.
+const BLIND: f64 = 0.2;
 /// Turn that leaves a stationary pose with a residual, radians.
 const NUDGE: f64 = 0.05;
 
@@ -280,10 +282,12 @@ impl Solver {
     }
 
     /// The image's part: `-alpha (I - J^+ J) grad h` (J10 eq. 4) with Polyak's step `alpha = gain h / |P grad h|^2`, since the
-    /// least `h` is zero.
+    /// least `h` is zero. Where the images hardly see the free motion (along the line of sight) the gradient is small and
+    /// says little, so `alpha = gain h / (|P grad h|^2 + (BLIND reach)^2)`.
     fn image_part(&mut self, problem: &Problem, count: usize, angles: &[f64]) {
         let n = angles.len();
         self.inherit(count, n);
+        let blind = BLIND * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.at));
         for _ in 0..=n {
             self.part.copy_from_slice(&self.gradient);
             self.taken.project(&mut self.part);
@@ -291,7 +295,7 @@ impl Solver {
             if square < 1e-16 {
                 break;
             }
-            let alpha = self.gain * self.h / square;
+            let alpha = self.gain * self.h / (square + blind * blind);
             self.part.iter_mut().for_each(|value| *value *= -alpha);
             if !self.add_part(problem, count, angles) {
                 break;
