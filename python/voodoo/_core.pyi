@@ -243,3 +243,74 @@ class Tracker:
         sites: Sequence[tuple[str, tuple[float, float, float]]],
     ) -> None: ...
     def remove_limb(self, name: str) -> None: ...
+
+@final
+class View:
+    """A silhouette as the core holds it; use voodoo.ik.Silhouette."""
+
+    def __new__(
+        cls,
+        distance: npt.NDArray[np.float32],
+        intrinsics: tuple[float, float, float, float],
+        camera_from_world: npt.ArrayLike,
+    ) -> View: ...
+
+@final
+class Chain:
+    """A kinematic chain as the core holds it; use voodoo.ik.Chain."""
+
+    def __new__(cls, body: Body, limbs: Sequence[str], free_root: bool) -> Chain: ...
+    @property
+    def angle_names(self) -> list[str]: ...
+    @property
+    def limits(self) -> list[list[float]]: ...
+    @property
+    def limb_names(self) -> list[str]: ...
+    @property
+    def site_names(self) -> list[str]: ...
+    def forward(
+        self, base: npt.ArrayLike, angles: npt.NDArray[np.float64]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+    def jacobian(
+        self, base: npt.ArrayLike, angles: npt.NDArray[np.float64], site: str
+    ) -> npt.NDArray[np.float64]: ...
+    def criterion(
+        self,
+        base: npt.ArrayLike,
+        angles: npt.NDArray[np.float64],
+        segments: Sequence[tuple[str, str, float]] | None,
+        margin: float,
+        views: Sequence[View],
+    ) -> tuple[float, npt.NDArray[np.float64]]: ...
+    def project(
+        self, base: npt.ArrayLike, world_from_limb: Sequence[npt.NDArray[np.float64]], closest: bool
+    ) -> list[float]: ...
+    def solve(
+        self,
+        base: npt.ArrayLike,
+        start: npt.NDArray[np.float64],
+        goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
+        segments: Sequence[tuple[str, str, float]] | None,
+        margin: float,
+        views: Sequence[View],
+        how: tuple[int, float, float, float, float],
+    ) -> tuple[
+        npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], int, bool, float
+    ]: ...
+    def solve_many(
+        self,
+        base: npt.ArrayLike,
+        starts: npt.NDArray[np.float64],
+        goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
+        positions: npt.NDArray[np.float64],
+        segments: Sequence[tuple[str, str, float]] | None,
+        margin: float,
+        views: Sequence[View],
+        how: tuple[int, float, float, float, float],
+    ) -> tuple[
+        npt.NDArray[np.float64],
+        npt.NDArray[np.float64],
+        npt.NDArray[np.float64],
+        npt.NDArray[np.float64],
+        npt.NDArray[np.float64],
+    ]: ...
