@@ -104,6 +104,9 @@ class Frame:
     def __init__(self, *, stamp):
         self.stamp, self.calls = stamp, []
 
+    def set_ground(self, *, normal, offset=0.0):
+        pass
+
     def add_depth(self, image, **options):
         self.calls.append(("depth", image.shape, options))
 

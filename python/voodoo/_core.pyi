@@ -8,11 +8,13 @@ import numpy.typing as npt
 
 __all__ = [
     "Body",
+    "Chain",
     "ClosestPoints",
     "Estimate",
     "Frame",
     "TaperedEllipticCylinder",
     "Tracker",
+    "View",
     "__version__",
     "config_fields",
 ]
@@ -271,9 +273,7 @@ class Chain:
     def forward(
         self, base: npt.ArrayLike, angles: npt.NDArray[np.float64]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
-    def jacobian(
-        self, base: npt.ArrayLike, angles: npt.NDArray[np.float64], site: str
-    ) -> npt.NDArray[np.float64]: ...
+    def jacobian(self, base: npt.ArrayLike, angles: npt.NDArray[np.float64], site: str) -> npt.NDArray[np.float64]: ...
     def criterion(
         self,
         base: npt.ArrayLike,
@@ -294,9 +294,7 @@ class Chain:
         margin: float,
         views: Sequence[View],
         how: tuple[int, float, float, float, float],
-    ) -> tuple[
-        npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], int, bool, float
-    ]: ...
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], int, bool, float]: ...
     def solve_many(
         self,
         base: npt.ArrayLike,

@@ -1,4 +1,4 @@
-"""Masks of the person in depth and colour pictures, for voodoo.ik: by connected depth, or against a still background."""
+"""Masks of the person in depth and colour pictures, for voodoo.ik: by connected depth or still background."""
 
 from __future__ import annotations
 
