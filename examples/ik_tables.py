@@ -3,8 +3,8 @@
     python examples/ik_tables.py DATA [--out DIR]
 
 DATA is the folder that holds rendered/ and pose2sim/. A limb is J10's: two segments, two joints of three freedoms each.
-Known are the shoulder and the wrist (the hip and the ankle); the elbow (knee) is estimated, from the true one in the first
-frame on.
+Known are the shoulder and the wrist (the hip and the ankle); the elbow (knee) is estimated, from the true one in the
+first frame on.
 """
 
 from __future__ import annotations

@@ -352,8 +352,8 @@ def solve(
 ) -> Posture:
     """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, limits throughout.
 
-    Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing here
-    is ever NaN.
+    Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing
+    here is ever NaN.
 
     Args:
         chain: what moves; a body stands for the chain of all its limbs with a free root.

@@ -324,7 +324,13 @@ impl Solver {
         let mut hit = None;
         for (i, [low, high]) in problem.model.limits().iter().enumerate() {
             let (from, by) = (angles[i] + step[i], self.part[i]);
-            let room = if by < -1e-15 { low - from } else if by > 1e-15 { high - from } else { continue };
+            let room = if by < -1e-15 {
+                low - from
+            } else if by > 1e-15 {
+                high - from
+            } else {
+                continue;
+            };
             if share * by.abs() > room.abs() {
                 share = (room / by).max(0.0);
                 hit = Some(i);
@@ -360,7 +366,9 @@ impl Solver {
             }
             self.propose(problem, angles, stage, share);
             self.evaluate(problem, true);
-            if (share == 0.0 && slack) || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none() {
+            if (share == 0.0 && slack)
+                || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
+            {
                 return self.take_trial(angles);
             }
         }
