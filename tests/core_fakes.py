@@ -104,14 +104,14 @@ class Frame:
     def __init__(self, *, stamp):
         self.stamp, self.calls = stamp, []
 
-    def set_ground(self, *, normal, offset=0.0):
-        pass
-
     def add_depth(self, image, **options):
         self.calls.append(("depth", image.shape, options))
 
     def add_points(self, points, **options):
         self.calls.append(("points", points.shape, options))
+
+    def set_ground(self, **options):
+        self.ground = options
 
 
 class Tracker:
