@@ -1,7 +1,7 @@
 //! Cost of a frame: against the number of points (K07 figure 8), of ICP steps (figure 9), the weights, and from image to pose.
 //!
 //! `cargo bench --bench step`. Synthetic points of the default human, 1.75 m, ten limbs, which moves to and fro, so that
-//! no frame is at its optimum; the published solver; all boxes and weights are the defaults.
+//! no frame is at its optimum; the published solver unless another is named; all boxes and weights are the defaults.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a bench stops at the first surprise")]
 
 use std::hint::black_box;
@@ -57,9 +57,16 @@ fn body() -> Body {
     Body::human(1.75, HumanModel::Papers).unwrap()
 }
 
-fn tracker(max_steps: usize, threads: usize) -> Tracker {
-    let solver = SolverKind::Limbwise;
-    let config = Config { solver, max_steps, threads, min_change: 0.0, max_limb_points: 100_000, ..Config::default() };
+fn tracker(solver: SolverKind, max_steps: usize, threads: usize) -> Tracker {
+    let config = Config {
+        solver,
+        max_steps,
+        threads,
+        min_change: 0.0,
+        max_limb_points: 100_000,
+        max_points: 10_000_000,
+        ..Config::default()
+    };
     let mut tracker = Tracker::new(body(), config).unwrap();
     tracker.reset_pose(&scene::standing(&body())).unwrap();
     tracker
@@ -103,7 +110,7 @@ fn points(criterion: &mut Criterion) {
             let [first, second] = two_clouds(count);
             let (first, second) = ([scene::cloud(&first)], [scene::cloud(&second)]);
             let bench = |max_steps| Bench {
-                tracker: tracker(max_steps, threads),
+                tracker: tracker(SolverKind::Limbwise, max_steps, threads),
                 instants: [(&first, &[]), (&second, &[])],
                 frames: 0,
             };
@@ -131,7 +138,7 @@ fn steps(criterion: &mut Criterion) {
         let (mut used, mut times) = (Vec::new(), Vec::new());
         for max_steps in 1..=8 {
             let instants: [(&[_], &[_]); 2] = [(&first, &[]), (&second, &[])];
-            let mut bench = Bench { tracker: tracker(max_steps, threads), instants, frames: 0 };
+            let mut bench = Bench { tracker: tracker(SolverKind::Limbwise, max_steps, threads), instants, frames: 0 };
             let (time, steps) = bench.median(201);
             used.push(steps);
             times.push(time);
@@ -155,7 +162,7 @@ fn weights(criterion: &mut Criterion) {
     for weight in [1.0, 1000.0] {
         let (first, second) = ([Cloud { weight, ..scene::cloud(&first) }], [Cloud { weight, ..scene::cloud(&second) }]);
         let instants: [(&[_], &[_]); 2] = [(&first, &[]), (&second, &[])];
-        let mut bench = Bench { tracker: tracker(6, 1), instants, frames: 0 };
+        let mut bench = Bench { tracker: tracker(SolverKind::Limbwise, 6, 1), instants, frames: 0 };
         let (time, steps) = bench.median(401);
         println!("weight {weight}: {:.1} us a frame of {steps:.1} ICP steps", time * 1e6);
         group.bench_function(BenchmarkId::from_parameter(weight), |b| b.iter(|| bench.frame()));
@@ -170,17 +177,25 @@ fn images(criterion: &mut Criterion) {
         let [first, second] = two_poses().map(|poses| camera.shoot(&body(), &poses, 0.01, &mut noise));
         let seen = first.1;
         let (first, second) = ([camera.image(&first.0)], [camera.image(&second.0)]);
-        for threads in [1, 2] {
+        for (solver, name, threads) in [
+            (SolverKind::Limbwise, "limbwise", 1),
+            (SolverKind::Limbwise, "limbwise", 2),
+            (SolverKind::Chain, "chain", 1),
+            (SolverKind::Chain, "chain", 2),
+        ] {
             let instants: [(&[_], &[_]); 2] = [(&[], &first), (&[], &second)];
-            let mut bench = Bench { tracker: tracker(6, threads), instants, frames: 0 };
+            let mut bench = Bench { tracker: tracker(solver, 6, threads), instants, frames: 0 };
             let (time, steps) = bench.median(201);
             println!(
-                "{width}x{height}, {seen} pixels on the body, {threads} thread(s): {:.3} ms a frame of {steps:.1} ICP steps",
+                "{width}x{height}, {seen} pixels on the body, {name}, {threads} thread(s): {:.3} ms a frame of {steps:.1} ICP steps",
                 time * 1e3
             );
-            group.bench_function(BenchmarkId::new(format!("{threads} thread(s)"), format!("{width}x{height}")), |b| {
-                b.iter(|| bench.frame());
-            });
+            group.bench_function(
+                BenchmarkId::new(format!("{name}, {threads} thread(s)"), format!("{width}x{height}")),
+                |b| {
+                    b.iter(|| bench.frame());
+                },
+            );
         }
     }
 }

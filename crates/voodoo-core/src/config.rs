@@ -252,9 +252,9 @@ config! {
     /// Standard deviation of the root's unexpected shift in 1/30 s.
     root_shift_sigma: f64 = 0.04, "m", 0.0001 ..= 10.0;
     /// Multiplies the standard deviations of all unexpected motion: smaller is smoother and slower.
-    motion_scale: f64 = 1.0, "", 0.01 ..= 100.0;
+    motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones.
-    hypotheses: bool = true, "";
+    hypotheses: bool = false, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.

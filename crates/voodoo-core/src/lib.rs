@@ -20,6 +20,7 @@ pub mod estimate;
 pub mod evidence;
 pub mod frame;
 pub mod geometry;
+pub mod ik;
 pub mod normal;
 pub mod predict;
 pub mod recover;

@@ -7,6 +7,7 @@ mod config;
 mod errors;
 mod estimate;
 mod frame;
+mod ik;
 mod shape;
 mod tracker;
 
@@ -22,6 +23,8 @@ mod _core {
     use super::estimate::PyEstimate;
     #[pymodule_export]
     use super::frame::PyFrame;
+    #[pymodule_export]
+    use super::ik::{PyChain, PyView};
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
     #[pymodule_export]

@@ -6,6 +6,7 @@ mod limbwise;
 mod whole_body;
 
 pub use chain::ChainSolver;
+pub(crate) use cholesky::solve_in_place;
 pub use limbwise::Limbwise;
 pub use whole_body::WholeBody;
 

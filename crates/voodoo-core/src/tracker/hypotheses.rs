@@ -13,6 +13,8 @@ use crate::terms::ShortestAxis;
 const SUSPICIOUS: f64 = 25.0;
 /// So large a share of its visible surface contradicted makes it suspect.
 const CONTRADICTED: f64 = 0.35;
+/// A limb of whose visible surface this share is seen where it is, is not suspect.
+const SUPPORTED: f64 = 0.4;
 /// A hypothesis must explain so many patches more than the current pose.
 const GAIN: f64 = 8.0;
 /// ICP steps that refine the best hypothesis.
@@ -33,6 +35,7 @@ pub(super) struct Hypotheses {
     near: Points,
     near_weight: Vec<f64>,
     best: Vec<f32>,
+    others: Vec<f32>,
     surface: SurfaceBatch,
     trial: Vec<Pose>,
     kept: Vec<Pose>,
@@ -100,7 +103,10 @@ impl Tracker {
             sum
         };
         let now = look(&self.poses);
-        if open < SUSPICIOUS && now.contradicted < CONTRADICTED * now.facing.max(1.0) {
+        // A limb that is seen where it is needs no other place, whatever lies near it unexplained.
+        let lost = now.seen < SUPPORTED * now.facing.max(1.0);
+        let contradicted = now.contradicted > CONTRADICTED * now.facing.max(1.0);
+        if open < SUSPICIOUS || !(lost || contradicted) {
             return 0;
         }
         // The points the chain explains now must stay explained.
@@ -114,11 +120,21 @@ impl Tracker {
                 }
             }
         }
+        let targets = targets(&work.near, open_count, root);
         thin(&mut work.near, &mut work.near_weight, SAMPLE);
+        // What the other limbs explain anyway is no merit of this one.
+        work.others.clear();
+        work.others.resize(work.near.len(), f32::INFINITY);
+        for limb in (0..self.poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
+            self.body.limbs()[limb].shape.closest_points(&self.poses[limb], &work.near, &mut work.surface);
+            for (least, distance) in work.others.iter_mut().zip(&work.surface.signed_distance) {
+                *least = least.min(distance.abs());
+            }
+        }
+        let others = std::mem::take(&mut work.others);
         let score =
             |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, surface: &mut SurfaceBatch| {
-                best.clear();
-                best.resize(near.len(), f32::INFINITY);
+                best.clone_from(&others);
                 for limb in chain.limbs() {
                     self.body.limbs()[limb].shape.closest_points(&poses[limb], near, surface);
                     for (best, distance) in best.iter_mut().zip(&surface.signed_distance) {
@@ -132,7 +148,6 @@ impl Tracker {
         let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
         let mut least = current - GAIN;
         let mut found = false;
-        let targets = targets(&work.near, open_count.min(work.near.len()), root);
         for target in targets.into_iter().flatten() {
             for swivel in 0..TwoBone::swivels() {
                 work.trial.clone_from(&self.poses);
@@ -155,6 +170,7 @@ impl Tracker {
                 work.kept.clone_from(&work.trial);
             }
         }
+        work.others = others;
         if !found {
             return 0;
         }

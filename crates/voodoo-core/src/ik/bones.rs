@@ -1,0 +1,29 @@
+//! The segments that stand for a chain in the images: joint to joint (J10 eq. 6).
+
+use super::image::Segment;
+use super::model::Model;
+use crate::body::Body;
+use crate::geometry::Vec3;
+
+/// One segment from the joint of every limb to each joint of its children in the chain, or to the end of a last limb: its
+/// farthest site, else its distal end. A root limb without a joint has none. Radius: the mean of the limb's semi-axes times
+/// `margin`; with 0 the criterion is J10's.
+pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Segment> {
+    let mut segments = Vec::new();
+    for (index, part) in model.parts().iter().enumerate() {
+        let limb = &body.limbs()[part.limb];
+        let Some((_, joint)) = &limb.parent else { continue };
+        let start = joint.limb_from_joint.translation;
+        let shape = &limb.shape;
+        let radius = margin * 0.25 * (shape.a0() + shape.b0() + shape.a1() + shape.b1());
+        let children = model.parts().iter().filter(|child| child.parent == Some(index));
+        let mut ends: Vec<Vec3> = children.map(|child| child.parent_from_joint.translation).collect();
+        if ends.is_empty() {
+            let sites = body.sites().iter().filter(|site| site.limb == part.limb).map(|site| site.position);
+            let farthest = sites.max_by(|a, b| (*a - start).length().total_cmp(&(*b - start).length()));
+            ends.push(farthest.filter(|end| (*end - start).length() > 1e-6).unwrap_or(Vec3::Z * shape.length()));
+        }
+        segments.extend(ends.into_iter().map(|end| Segment { ends: [(index, start), (index, end)], radius }));
+    }
+    segments
+}

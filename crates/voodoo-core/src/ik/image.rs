@@ -1,0 +1,154 @@
+//! The image criterion (J10 eq. 5-8): how far the projected limbs lie outside the silhouettes.
+
+use super::model::{Kinematics, Model};
+use crate::geometry::{Mat3, Pose, Vec3};
+
+/// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
+pub const SAMPLES: usize = 8;
+/// Points nearer to the camera plane than this, or behind it, are not seen; metres.
+const NEAREST: f64 = 0.05;
+
+/// One calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Distances, row by row; at least 2 x 2.
+    pub distance: &'a [f32],
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Focal lengths fx, fy and centre cx, cy, pixels; integer coordinates are pixel centres.
+    pub intrinsics: [f64; 4],
+    /// Pose of the world in the optical frame.
+    pub camera_from_world: Pose,
+}
+
+/// A bone that shall lie inside the silhouettes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Part and point in its frame of both ends.
+    pub ends: [(usize, Vec3); 2],
+    /// How deep inside it shall lie at least: the limb's radius, metres; 0 is J10's criterion.
+    pub radius: f64,
+}
+
+/// `h`: mean over all samples of all views of `max(distance + projected radius, 0)`, pixels (J10 eq. 5).
+#[derive(Clone, Copy, Debug)]
+pub struct Criterion<'a> {
+    /// The silhouettes.
+    pub views: &'a [View<'a>],
+    /// The bones.
+    pub segments: &'a [Segment],
+}
+
+impl Criterion<'_> {
+    /// Mean length of the projected bones, pixels, if they lay across the line of sight: what `h` can change by at most per radian,
+    /// about.
+    pub fn reach(&self, at: &Kinematics) -> f64 {
+        let mut sum = 0.0;
+        for segment in self.segments {
+            let ends = segment.ends.map(|(part, point)| at.poses[part].transform_point(point));
+            for view in self.views {
+                let z = view.camera_from_world.transform_point(0.5 * (ends[0] + ends[1])).z;
+                sum += view.intrinsics[0] * (ends[1] - ends[0]).length() / z.max(NEAREST);
+            }
+        }
+        sum / (self.views.len() * self.segments.len()).max(1) as f64
+    }
+
+    /// The criterion, and its gradient by all unknowns into `gradient` (J10 eq. 7, 8). Samples no camera sees count zero.
+    pub fn evaluate(&self, model: &Model, at: &Kinematics, gradient: &mut [f64]) -> f64 {
+        gradient.fill(0.0);
+        let count = self.views.len() * self.segments.len() * SAMPLES;
+        if count == 0 {
+            return 0.0;
+        }
+        let share = 1.0 / count as f64;
+        let mut h = 0.0;
+        for segment in self.segments {
+            let ends = segment.ends.map(|(part, point)| at.poses[part].transform_point(point));
+            // Derivatives of h by the world positions of both ends.
+            let mut forces = [Vec3::ZERO; 2];
+            for view in self.views {
+                let (a, b) = (
+                    view.camera_from_world.transform_point(ends[0]),
+                    view.camera_from_world.transform_point(ends[1]),
+                );
+                let mut pull = [Vec3::ZERO; 2];
+                for sample in 0..SAMPLES {
+                    let t = (sample as f64 + 0.5) / SAMPLES as f64;
+                    let (value, slope) = view.outside(a + t * (b - a), segment.radius);
+                    h += value;
+                    pull[0] += (1.0 - t) * slope;
+                    pull[1] += t * slope;
+                }
+                let world_from_camera = Mat3::from_quat(view.camera_from_world.rotation).transpose();
+                forces[0] += world_from_camera * pull[0];
+                forces[1] += world_from_camera * pull[1];
+            }
+            for ((part, _), (x, force)) in segment.ends.iter().zip(ends.iter().zip(forces)) {
+                if force == Vec3::ZERO {
+                    continue;
+                }
+                let moment = x.cross(force);
+                for &mover in model.movers(*part) {
+                    let column = &at.columns[mover];
+                    gradient[mover] += share * (column.omega.dot(moment) + column.v.dot(force));
+                }
+            }
+        }
+        share * h
+    }
+}
+
+impl View<'_> {
+    /// `max(distance + projected radius, 0)` of a point in the optical frame and its derivative by that point.
+    fn outside(&self, x: Vec3, radius: f64) -> (f64, Vec3) {
+        if x.z < NEAREST {
+            return (0.0, Vec3::ZERO);
+        }
+        let [fx, fy, cx, cy] = self.intrinsics;
+        let inverse = 1.0 / x.z;
+        let (px, py) = (x.x * inverse, x.y * inverse);
+        let (distance, du, dv) = self.sample(fx * px + cx, fy * py + cy);
+        let margin = fx * radius * inverse;
+        let value = distance + margin;
+        if value <= 0.0 {
+            return (0.0, Vec3::ZERO);
+        }
+        let (gx, gy) = (du * fx, dv * fy);
+        (value, Vec3::new(gx, gy, -(gx * px + gy * py) - margin) * inverse)
+    }
+
+    /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the
+    /// picture is background.
+    fn sample(&self, u: f64, v: f64) -> (f64, f64, f64) {
+        let (right, bottom) = ((self.width - 1) as f64, (self.height - 1) as f64);
+        let (x, y) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
+        let column = (x as usize).min(self.width - 2);
+        let row = (y as usize).min(self.height - 2);
+        let (s, t) = (x - column as f64, y - row as f64);
+        let start = row * self.width + column;
+        let (Some(upper), Some(lower)) =
+            (self.distance.get(start..start + 2), self.distance.get(start + self.width..start + self.width + 2))
+        else {
+            return (0.0, 0.0, 0.0);
+        };
+        let [d00, d01, d10, d11] = [upper[0], upper[1], lower[0], lower[1]].map(f64::from);
+        let (first, second) = (d00 + s * (d01 - d00), d10 + s * (d11 - d10));
+        let value = first + t * (second - first);
+        let (mut du, mut dv) = ((1.0 - t) * (d01 - d00) + t * (d11 - d10), second - first);
+        let (ox, oy) = (u - x, v - y);
+        if ox == 0.0 && oy == 0.0 {
+            return (value, du, dv);
+        }
+        let beyond = ox.hypot(oy);
+        if ox != 0.0 {
+            du = ox / beyond;
+        }
+        if oy != 0.0 {
+            dv = oy / beyond;
+        }
+        (value + beyond, du, dv)
+    }
+}

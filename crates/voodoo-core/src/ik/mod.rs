@@ -1,0 +1,22 @@
+//! Inverse kinematics with image constraints (J10: Jaume-i-Capo, Varona, Gonzalez-Hidalgo, Perales, "Adding Image Constraints
+//! to Inverse Kinematics for Human Motion Capture", EURASIP JASP 2010) on the kinematic chain of R07 (Rosenhahn, Brox, Cremers,
+//! Seidel, "Online Smoothing for Markerless Motion Capture", DAGM 2007).
+//!
+//! Files depend downwards only: `solver` > `image`, `goal`, `linear` > `model` > `twist`.
+
+mod bones;
+mod goal;
+mod image;
+mod linear;
+mod model;
+mod project;
+mod solver;
+mod twist;
+
+pub use bones::bones;
+pub use goal::{Aim, Goal, level_cost, level_rows};
+pub use image::{Criterion, SAMPLES, Segment, View};
+pub use model::{Column, Kinematics, Model, Part, Root, Turn};
+pub use project::{project, read};
+pub use solver::{Options, Report, Solver};
+pub use twist::log;

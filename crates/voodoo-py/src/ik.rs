@@ -1,0 +1,330 @@
+//! `Chain` and `View` of inverse kinematics; voodoo.ik validates and names what goes in and out.
+
+use numpy::{PyArrayDyn, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use voodoo_core::Body;
+use voodoo_core::geometry::{Pose, Vec3};
+use voodoo_core::ik::{self, Aim, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver};
+
+use crate::arrays::{frozen, matrix, pose};
+use crate::body::PyBody;
+use crate::errors::{IntoPy, exception};
+
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+/// site, "position" or "line", position or (direction, moment), weight, level
+type GoalParts = (String, String, [f64; 6], f64, usize);
+/// site, site, radius
+type SegmentParts = (String, String, f64);
+/// steps, tolerance, still, gain, largest turn
+type OptionParts = (usize, f64, f64, f64, f64);
+
+#[pyclass(name = "View", module = "voodoo._core", frozen)]
+pub struct PyView {
+    distance: Vec<f32>,
+    width: usize,
+    height: usize,
+    intrinsics: [f64; 4],
+    camera_from_world: Pose,
+}
+
+#[pymethods]
+impl PyView {
+    #[new]
+    fn new(
+        distance: PyReadonlyArray2<'_, f32>,
+        intrinsics: [f64; 4],
+        camera_from_world: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let [height, width] = [distance.shape()[0], distance.shape()[1]];
+        if width < 2 || height < 2 {
+            let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
+            return Err(exception(camera_from_world.py(), "MeasurementError", message));
+        }
+        Ok(Self {
+            distance: distance.as_slice()?.to_vec(),
+            width,
+            height,
+            intrinsics,
+            camera_from_world: pose("camera_from_world", Some(camera_from_world))?,
+        })
+    }
+}
+
+impl PyView {
+    fn view(&self) -> ik::View<'_> {
+        ik::View {
+            distance: &self.distance,
+            width: self.width,
+            height: self.height,
+            intrinsics: self.intrinsics,
+            camera_from_world: self.camera_from_world,
+        }
+    }
+}
+
+#[pyclass(name = "Chain", module = "voodoo._core", frozen)]
+pub struct PyChain {
+    body: Body,
+    model: Model,
+}
+
+fn options((steps, tolerance, still, gain, largest_turn): OptionParts) -> Options {
+    Options { steps, tolerance, still, gain, largest_turn }
+}
+
+impl PyChain {
+    fn site(&self, py: Python<'_>, name: &str) -> PyResult<(usize, Vec3)> {
+        let index = self.body.site_index(name).map_err(|error| error.into_py(py))?;
+        let site = &self.body.sites()[index];
+        self.model.part_of(site.limb).map(|part| (part, site.position)).ok_or_else(|| {
+            let known = self.site_names().join(", ");
+            exception(py, "BodyError", format!("site: expected one on the chain ({known}), found {name:?}"))
+        })
+    }
+
+    fn goals(&self, py: Python<'_>, parts: &[GoalParts]) -> PyResult<Vec<Goal>> {
+        let mut goals = parts
+            .iter()
+            .map(|(site, kind, v, weight, level)| {
+                let (part, point) = self.site(py, site)?;
+                let (first, second) = (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]));
+                let aim =
+                    if kind == "line" { Aim::Line { n: first, m: second } } else { Aim::Position(first) };
+                Ok(Goal { part, point, aim, weight: *weight, level: *level })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        goals.sort_by_key(|goal| goal.level);
+        Ok(goals)
+    }
+
+    fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Segment>> {
+        parts
+            .iter()
+            .map(|(a, b, radius)| Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: *radius }))
+            .collect()
+    }
+
+    fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Segment>> {
+        match parts {
+            Some(parts) => self.segments(py, &parts),
+            None => Ok(ik::bones(&self.body, &self.model, margin)),
+        }
+    }
+
+    fn poses_of(&self, world_from_limb: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose>> {
+        world_from_limb.iter().map(|value| pose("world_from_limb", Some(value))).collect()
+    }
+
+    fn checked(&self, py: Python<'_>, angles: &[f64]) -> PyResult<()> {
+        if angles.len() == self.model.freedoms() && angles.iter().all(|angle| angle.is_finite()) {
+            return Ok(());
+        }
+        let message =
+            format!("angles: expected {} finite numbers, found {}", self.model.freedoms(), short(&format!("{angles:?}")));
+        Err(exception(py, "MeasurementError", message))
+    }
+
+    fn place(&self, py: Python<'_>, base: &Bound<'_, PyAny>, angles: &[f64]) -> PyResult<Kinematics> {
+        self.checked(py, angles)?;
+        let mut at = Kinematics::default();
+        self.model.place(&pose("world_from_base", Some(base))?, angles, &mut at);
+        Ok(at)
+    }
+
+    fn site_parts(&self) -> impl Iterator<Item = (&str, usize, Vec3)> {
+        self.body
+            .sites()
+            .iter()
+            .filter_map(|site| self.model.part_of(site.limb).map(|part| (site.name.as_str(), part, site.position)))
+    }
+}
+
+fn short(text: &str) -> String {
+    text.chars().take(120).collect()
+}
+
+#[pymethods]
+impl PyChain {
+    #[new]
+    fn new(py: Python<'_>, body: &PyBody, limbs: Vec<String>, free_root: bool) -> PyResult<Self> {
+        let indices = limbs
+            .iter()
+            .map(|name| body.0.limb_index(name))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| error.into_py(py))?;
+        let root = if free_root { Root::Free } else { Root::Fixed };
+        let model = Model::new(&body.0, &indices, root).map_err(|error| error.into_py(py))?;
+        Ok(Self { body: body.0.clone(), model })
+    }
+
+    #[getter]
+    fn angle_names(&self) -> Vec<String> {
+        self.model.names().to_vec()
+    }
+
+    #[getter]
+    fn limits(&self) -> Vec<[f64; 2]> {
+        self.model.limits().to_vec()
+    }
+
+    #[getter]
+    fn limb_names(&self) -> Vec<String> {
+        self.model.parts().iter().map(|part| self.body.limbs()[part.limb].name.clone()).collect()
+    }
+
+    #[getter]
+    fn site_names(&self) -> Vec<String> {
+        self.site_parts().map(|(name, _, _)| name.to_owned()).collect()
+    }
+
+    /// Poses `(P, 4, 4)` of the limbs and positions `(S, 3)` of the sites.
+    fn forward<'py>(
+        &self,
+        base: &Bound<'py, PyAny>,
+        angles: Vec<f64>,
+    ) -> PyResult<(Array<'py>, Array<'py>)> {
+        let py = base.py();
+        let at = self.place(py, base, &angles)?;
+        let poses: Vec<f64> = at.poses.iter().flat_map(matrix).flatten().collect();
+        let sites: Vec<f64> =
+            self.site_parts().flat_map(|(_, part, x)| at.poses[part].transform_point(x).to_array()).collect();
+        let counts = (at.poses.len(), sites.len() / 3);
+        Ok((frozen(py, poses, &[counts.0, 4, 4])?, frozen(py, sites, &[counts.1, 3])?))
+    }
+
+    /// Derivative `(3, n)` of the position of a site.
+    fn jacobian<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>, site: &str) -> PyResult<Array<'py>> {
+        let py = base.py();
+        let at = self.place(py, base, &angles)?;
+        let (part, point) = self.site(py, site)?;
+        let goal = Goal { part, point, aim: Aim::Position(Vec3::ZERO), weight: 1.0, level: 0 };
+        let (mut rows, mut residual) = (Vec::new(), Vec::new());
+        ik::level_rows(&self.model, &[goal], &at, &mut rows, &mut residual);
+        frozen(py, rows, &[3, self.model.freedoms()])
+    }
+
+    /// Value and gradient `(n,)` of the image criterion.
+    fn criterion<'py>(
+        &self,
+        base: &Bound<'py, PyAny>,
+        angles: Vec<f64>,
+        segments: Option<Vec<SegmentParts>>,
+        margin: f64,
+        views: Vec<PyRef<'py, PyView>>,
+    ) -> PyResult<(f64, Array<'py>)> {
+        let py = base.py();
+        let at = self.place(py, base, &angles)?;
+        let segments = self.bones(py, segments, margin)?;
+        let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
+        let mut gradient = vec![0.0; self.model.freedoms()];
+        let h = Criterion { views: &views, segments: &segments }.evaluate(&self.model, &at, &mut gradient);
+        Ok((h, frozen(py, gradient, &[self.model.freedoms()])?))
+    }
+
+    /// Angles of the poses `(4, 4)` of all limbs of the body; `closest`: of the closed chain nearest to them.
+    fn project(
+        &self,
+        base: &Bound<'_, PyAny>,
+        world_from_limb: Vec<Bound<'_, PyAny>>,
+        closest: bool,
+    ) -> PyResult<Vec<f64>> {
+        let (base, poses) = (pose("world_from_base", Some(base))?, self.poses_of(&world_from_limb)?);
+        let mut angles = Vec::new();
+        if closest {
+            ik::project(&self.body, &self.model, &base, &poses, &mut angles);
+        } else {
+            ik::read(&self.body, &self.model, &base, &poses, &mut angles);
+        }
+        Ok(angles)
+    }
+
+    /// One posture: angles, steps, converged, h.
+    #[allow(clippy::too_many_arguments, reason = "called by voodoo.ik only")]
+    fn solve<'py>(
+        &self,
+        base: &Bound<'py, PyAny>,
+        start: Vec<f64>,
+        goals: Vec<GoalParts>,
+        segments: Option<Vec<SegmentParts>>,
+        margin: f64,
+        views: Vec<PyRef<'py, PyView>>,
+        how: OptionParts,
+    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, usize, bool, f64)> {
+        let py = base.py();
+        self.checked(py, &start)?;
+        let base = pose("world_from_base", Some(base))?;
+        let goals = self.goals(py, &goals)?;
+        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, margin)? };
+        let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
+        let criterion = Criterion { views: &views, segments: &segments };
+        let mut angles = start;
+        let mut solver = Solver::default();
+        let report = solver.solve(&self.model, &base, &goals, Some(&criterion), &options(how), &mut angles);
+        let at = solver.kinematics();
+        let poses: Vec<f64> = at.poses.iter().flat_map(matrix).flatten().collect();
+        let sites: Vec<f64> =
+            self.site_parts().flat_map(|(_, part, x)| at.poses[part].transform_point(x).to_array()).collect();
+        let (limbs, points, n) = (at.poses.len(), sites.len() / 3, angles.len());
+        Ok((
+            frozen(py, angles, &[n])?,
+            frozen(py, poses, &[limbs, 4, 4])?,
+            frozen(py, sites, &[points, 3])?,
+            report.steps,
+            report.converged,
+            report.h,
+        ))
+    }
+
+    /// Many postures that share sites, images and options: angles `(N, n)`, sites `(N, S, 3)`, h `(N,)`, steps `(N,)`,
+    /// converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
+    #[allow(clippy::too_many_arguments, clippy::type_complexity, reason = "called by voodoo.ik only")]
+    fn solve_many<'py>(
+        &self,
+        base: &Bound<'py, PyAny>,
+        starts: PyReadonlyArray2<'py, f64>,
+        goals: Vec<GoalParts>,
+        positions: PyReadonlyArray3<'py, f64>,
+        segments: Option<Vec<SegmentParts>>,
+        margin: f64,
+        views: Vec<PyRef<'py, PyView>>,
+        how: OptionParts,
+    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
+        let py = base.py();
+        let base = pose("world_from_base", Some(base))?;
+        let mut goals = self.goals(py, &goals)?;
+        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, margin)? };
+        let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
+        let criterion = Criterion { views: &views, segments: &segments };
+        let (count, n) = (starts.shape()[0], self.model.freedoms());
+        let mut angles = starts.as_slice()?.to_vec();
+        let positions = positions.as_slice()?;
+        let sites: Vec<(usize, Vec3)> = self.site_parts().map(|(_, part, x)| (part, x)).collect();
+        let how = options(how);
+        let mut points = Vec::with_capacity(3 * sites.len() * count);
+        let (mut h, mut steps, mut converged) = (Vec::new(), Vec::new(), Vec::new());
+        py.detach(|| {
+            let mut solver = Solver::default();
+            let width = 3 * goals.len();
+            for index in 0..count {
+                let (rows, _) = positions[index * width..(index + 1) * width].as_chunks::<3>();
+                for (goal, position) in goals.iter_mut().zip(rows) {
+                    goal.aim = Aim::Position(Vec3::from_array(*position));
+                }
+                let row = &mut angles[index * n..(index + 1) * n];
+                let report = solver.solve(&self.model, &base, &goals, Some(&criterion), &how, row);
+                let at = solver.kinematics();
+                points.extend(sites.iter().flat_map(|(part, x)| at.poses[*part].transform_point(*x).to_array()));
+                h.push(report.h);
+                steps.push(report.steps as f64);
+                converged.push(f64::from(u8::from(report.converged)));
+            }
+        });
+        Ok((
+            frozen(py, angles, &[count, n])?,
+            frozen(py, points, &[count, sites.len(), 3])?,
+            frozen(py, h, &[count])?,
+            frozen(py, steps, &[count])?,
+            frozen(py, converged, &[count])?,
+        ))
+    }
+}
