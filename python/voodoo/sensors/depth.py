@@ -55,7 +55,7 @@ class DepthFilter:
             image: uint16 or float32; 0 and NaN mean "no return".
             metres_per_unit: of the image.
         """
-        kept = image.copy()
+        kept: DepthArray = image.copy()
         kept[self.dropped(image, metres_per_unit=metres_per_unit)] = 0
         return kept
 
@@ -71,7 +71,7 @@ class DepthFilter:
         returned = np.isfinite(z) & (z > 0.0)
         z[~returned] = 0.0
         outside = returned & ((z < self.nearest) | (z > self.farthest))
-        return outside | (returned & self._flying(z))
+        return np.asarray(outside | (returned & self._flying(z)))
 
     def _flying(self, z: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
         height, width = z.shape

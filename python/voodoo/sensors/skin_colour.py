@@ -81,7 +81,7 @@ class SkinColour:
 
     def _lit(self, image: ByteImage) -> Mask:
         # Green carries most of the luma; a threshold needs no more.
-        return np.asarray(image[..., 1] >= self.darkest // 2) & (image.max(axis=2) >= self.darkest)
+        return np.asarray((image[..., 1] >= self.darkest // 2) & (image.max(axis=2) >= self.darkest))
 
     @staticmethod
     def _bins(image: ByteImage) -> npt.NDArray[np.int32]:

@@ -43,8 +43,8 @@ class StereoPair:
         nearest, farthest: range of depths to look for [m].
         block: side of the matched squares [px], odd.
         disparity_sigma: standard deviation of a disparity [px].
-        max_difference: disparities of left and right may differ by this [px]; where they differ more, one of the cameras
-            does not see the place.
+        max_difference: disparities of left and right may differ by this [px]; where they differ more, one of the
+            cameras does not see the place.
 
     Raises:
         MeasurementError: sizes differ, the right camera is not to the right, a range that is none, or a fish-eye lens.
