@@ -48,7 +48,10 @@ def follow(
     local = np.stack([np.linalg.inv(torso) @ [*truth[name][0], 1.0] for name in TRUNK])[:, :3]
     pivot = (np.linalg.inv(torso) @ [*truth[first][0], 1.0])[:3]
     follower = ik.Follower(
-        chain, start=chain.project(estimate.world_from_limb, world_from_base=torso, closest=False), steps=15, margin=margin
+        chain,
+        start=chain.project(estimate.world_from_limb, world_from_base=torso, closest=False),
+        steps=15,
+        margin=margin,
     )
     found = []
     for frame, pictures in enumerate(images):
@@ -112,7 +115,12 @@ def main() -> None:
     arguments = parser.parse_args()
     print("| sequence | joint | IK (mm) | 1 view (mm) | 2 views (mm) |")
     print("|---|---|---|---|---|")
-    for name, joint in (("dev_03_punch", "elbow"), ("dev_05_walk", "knee"), ("dev_05_walk", "elbow"), ("dev_03_punch", "knee")):
+    for name, joint in (
+        ("dev_03_punch", "elbow"),
+        ("dev_05_walk", "knee"),
+        ("dev_05_walk", "elbow"),
+        ("dev_03_punch", "knee"),
+    ):
         sequence = rendered(arguments.data / "rendered" / name)
         rows = [table(sequence, joint, views, arguments.margin) for views in ([], [0], [0, 1])]
         for key in rows[0]:

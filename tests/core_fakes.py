@@ -67,7 +67,7 @@ class Body:
         self.limb_names = tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height=1.75):
+    def human(cls, height=1.75, *, model="papers"):
         body = cls()
         body.height = height
         return body

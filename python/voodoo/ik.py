@@ -73,9 +73,7 @@ class Target:
         return cls(site, "position", (x, y, z, 0.0, 0.0, 0.0), weight, priority)
 
     @classmethod
-    def on_ray(
-        cls, site: str, *, origin: Vector, direction: Vector, weight: float = 1.0, priority: int = 0
-    ) -> Target:
+    def on_ray(cls, site: str, *, origin: Vector, direction: Vector, weight: float = 1.0, priority: int = 0) -> Target:
         """A site on the line through `origin` (3,) [m] along `direction` (3,), as a pixel tells it.
 
         Raises:
@@ -202,9 +200,7 @@ class Posture:
 class Chain:
     """A body, or limbs of one that hang together, with exact joints; made from any Body, hence from TOML."""
 
-    def __init__(
-        self, body: Body, *, limbs: Sequence[str] = (), root: Literal["free", "fixed"] | None = None
-    ) -> None:
+    def __init__(self, body: Body, *, limbs: Sequence[str] = (), root: Literal["free", "fixed"] | None = None) -> None:
         """Lay out the joint angles.
 
         Args:
@@ -248,9 +244,7 @@ class Chain:
         poses, sites = self._core.forward(_base(world_from_base), _vector(angles))
         return _named(self.limb_names, poses), _named(self.site_names, sites)
 
-    def jacobian(
-        self, site: str, angles: npt.ArrayLike, *, world_from_base: npt.ArrayLike | None = None
-    ) -> FloatArray:
+    def jacobian(self, site: str, angles: npt.ArrayLike, *, world_from_base: npt.ArrayLike | None = None) -> FloatArray:
         """Derivative (3, n) of the position of a site by the angles (J10 eq. 2).
 
         Raises:
