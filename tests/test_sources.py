@@ -10,7 +10,7 @@ from voodoo.metrics import JOINTS
 from voodoo.recordings import ColorImage, DepthImage, LaserScan, RecordedFrame, open_recording, sample_path
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
 
-FRAMES = 60
+FRAMES = 40
 
 
 def run(change=lambda index, items: items, use=("depth", "scan", "skin")):
