@@ -1,4 +1,4 @@
-"""voodoo: the 3-D pose of a person, or any articulated body, every frame, on a plain CPU, from whatever the robot has."""
+"""voodoo: the 3-D pose of a person, or any articulated body, every frame, on a plain CPU, from what the robot has."""
 
 from voodoo._core import ClosestPoints, Estimate, Frame, TaperedEllipticCylinder, __version__
 from voodoo.body import Body, Joint, Limb

@@ -6,6 +6,17 @@ from typing import Any, ClassVar, Protocol, final
 import numpy as np
 import numpy.typing as npt
 
+__all__ = [
+    "Body",
+    "ClosestPoints",
+    "Estimate",
+    "Frame",
+    "TaperedEllipticCylinder",
+    "Tracker",
+    "__version__",
+    "config_fields",
+]
+
 __version__: str
 
 _Points = npt.NDArray[np.float32] | npt.NDArray[np.float64]
@@ -57,8 +68,8 @@ class TaperedEllipticCylinder:
         """Closest surface point (3,), outward normal (3,) and signed distance of one point, all in the limb frame."""
     def closest_points(self, points: _Points) -> ClosestPoints:
         """Closest surface points of many points (N, 3) in the limb frame, by the tracker's SIMD kernel."""
-    def __eq__(self, other: object) -> bool: ...
-    def __ne__(self, other: object) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
 
 @final
 class ClosestPoints:
@@ -82,8 +93,8 @@ class Body:
     def human(stature: float, model: str) -> Body: ...
     def scaled(self, factor: float) -> Body: ...
     def parts(self) -> tuple[str, list[Any], list[Any]]: ...
-    def __eq__(self, other: object) -> bool: ...
-    def __ne__(self, other: object) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
 
 @final
 class Frame:
@@ -132,7 +143,7 @@ class Frame:
         weight: float = 1.0,
         source: str = "depth",
     ) -> None:
-        """Add an organised depth image (height, width): distance along the optical axis, 0 or NaN where nothing returned.
+        """Add an organised depth image (height, width): depth along the optical axis, 0 or NaN where nothing returned.
 
         Raises:
             MeasurementError: wrong shape or dtype, or no rigid transform.
@@ -168,7 +179,7 @@ class Estimate:
         """Time of the frame [s]; NaN after a reset."""
     @property
     def status(self) -> str:
-        """tracking, degraded (half of the limbs or more are carried by their joints only) or lost (nothing measured)."""
+        """tracking, degraded (half of the limbs or more carried by their joints only) or lost (nothing measured)."""
     @property
     def steps(self) -> int:
         """ICP steps used."""
@@ -209,6 +220,7 @@ class Estimate:
     def sources(self) -> Mapping[str, tuple[int, int, float]]:
         """What each source gave: candidates, those that matched, root of their mean squared distance [m]."""
 
+@final
 class Tracker:
     """The tracker of the core; use voodoo.Tracker."""
 
@@ -227,7 +239,7 @@ class Tracker:
         name: str,
         parent: str,
         shape: TaperedEllipticCylinder,
-        parts: Any,
+        parts: tuple[Any, ...],
         sites: Sequence[tuple[str, tuple[float, float, float]]],
     ) -> None: ...
     def remove_limb(self, name: str) -> None: ...

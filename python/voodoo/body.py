@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -66,7 +67,7 @@ class Joint(_Strict):
     limits: tuple[_Range, _Range, _Range] | None = None
     motion: _Number = 0.3
 
-    def parts(self) -> Any:
+    def parts(self) -> tuple[Any, ...]:
         """The joint as the core takes it."""
         places = [(place.position, place.rotation) for place in (self.on_parent, self.on_limb)]
         return (self.name, *places, self.semi_axes, self.weight, self.limits, self.motion)
@@ -126,12 +127,12 @@ class Body:
         return tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height: float = 1.75, *, model: Literal["papers", "full"] = "papers") -> Body:
+    def human(cls, height: float = 1.75, *, model: Literal["papers", "full"] = "full") -> Body:
         """The default human.
 
         Args:
             height: stature [m], 0.3 to 3.0.
-            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen limbs, with a waist, neck, hands and feet.
+            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen, with waist, neck, hands and feet.
 
         Raises:
             BodyError: the stature is out of range, or the model unknown.
@@ -184,22 +185,23 @@ class Body:
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
         name, limbs, sites = self._core.parts()
-        lines = [f'name = "{name}"']
+        lines = [f"name = {_text(name)}"]
         for limb, parent, shape, joint, match_caps in limbs:
-            lines += ["", "[[limbs]]", f'name = "{limb}"']
-            lines += [f'parent = "{parent}"'] if parent is not None else []
+            lines += ["", "[[limbs]]", f"name = {_text(limb)}"]
+            lines += [f"parent = {_text(parent)}"] if parent is not None else []
             sizes = {key: getattr(shape, key) for key in ("length", "a0", "b0", "a1", "b1")}
             lines.append("shape = { " + ", ".join(f"{key} = {_number(value)}" for key, value in sizes.items()) + " }")
             lines.append(f"match_caps = [{', '.join(str(flag).lower() for flag in match_caps)}]")
             if joint is not None:
                 joint_name, on_parent, on_limb, semi_axes, weight, limits, motion = joint
-                lines += ["[limbs.joint]", f'name = "{joint_name}"', f"on_parent = {_place(on_parent)}"]
+                lines += ["[limbs.joint]", f"name = {_text(joint_name)}", f"on_parent = {_place(on_parent)}"]
                 lines += [f"on_limb = {_place(on_limb)}", f"semi_axes = {_vector(semi_axes)}"]
                 lines += [f"weight = {_number(weight)}", f"motion = {_number(motion)}"]
                 if limits is not None:
                     lines.append(f"limits = [{', '.join(_vector(pair) for pair in limits)}]")
         for site, limb, position in sites:
-            lines += ["", "[[sites]]", f'name = "{site}"', f'limb = "{limb}"', f"position = {_vector(position)}"]
+            lines += ["", "[[sites]]", f"name = {_text(site)}", f"limb = {_text(limb)}"]
+            lines.append(f"position = {_vector(position)}")
         return "\n".join(lines) + "\n"
 
     def __eq__(self, other: object) -> bool:
@@ -213,7 +215,9 @@ class Body:
         return f"Body(name={self.name!r}, limbs={len(self.limbs)}, sites={len(self.site_names)})"
 
 
-def checked_joints(joints: Mapping[str, Sequence[float]], *, what: str = "joints") -> dict[str, tuple[float, float, float]]:
+def checked_joints(
+    joints: Mapping[str, Sequence[float]], *, what: str = "joints"
+) -> dict[str, tuple[float, float, float]]:
     """Positions by name as plain numbers.
 
     Raises:
@@ -234,9 +238,9 @@ def checked_joints(joints: Mapping[str, Sequence[float]], *, what: str = "joints
 def _problems(values: dict[str, Any], error: ValidationError) -> str:
     def key(location: tuple[str | int, ...]) -> str:
         parts: list[str] = []
-        node: Any = values
+        node: object = values
         for part in location:
-            node = node[part] if isinstance(node, (dict, list)) and _has(node, part) else None
+            node = _child(node, part)
             name = node.get("name") if isinstance(part, int) and isinstance(node, dict) else None
             parts.append(str(name if isinstance(name, str) else part))
         return ".".join(parts)
@@ -245,13 +249,20 @@ def _problems(values: dict[str, Any], error: ValidationError) -> str:
     return "; ".join(found)
 
 
-def _has(node: dict[str, Any] | list[Any], part: str | int) -> bool:
-    return part in node if isinstance(node, dict) else isinstance(part, int) and part < len(node)
+def _child(node: object, part: str | int) -> object:
+    if isinstance(node, dict):
+        return node.get(part)
+    return node[part] if isinstance(node, list) and isinstance(part, int) and part < len(node) else None
 
 
 def _short(value: object) -> str:
     text = repr(value)
     return text if len(text) < 80 else text[:77] + "..."
+
+
+def _text(value: str) -> str:
+    """A TOML string; JSON's escapes are TOML's, but for DEL, which TOML wants escaped."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _number(value: float) -> str:

@@ -19,7 +19,7 @@ else:
 _FIELDS = {name: row for name, *row in _core.config_fields()}
 
 
-def _annotation(default: object, limits: tuple[float, float] | None, words: list[str]) -> Any:
+def _annotation(default: object, limits: tuple[float, float] | None, words: list[str]) -> Any:  # noqa: ANN401 - a type form
     if words:
         return Literal[tuple(words)]
     if limits is None:
@@ -30,7 +30,7 @@ def _annotation(default: object, limits: tuple[float, float] | None, words: list
 class _Base(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False, allow_inf_nan=False)
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, **values: Any) -> None:  # noqa: ANN401 - validated below
         try:
             super().__init__(**values)
         except ValidationError as error:
@@ -48,14 +48,11 @@ def _message(what: str, error: ValidationError) -> str:
     return f"{what}: " + "; ".join(problems)
 
 
-_Model: Any = create_model(
-    "_Model",
-    __base__=_Base,
-    **{name: (_annotation(row[2], row[3], row[4]), row[2]) for name, row in _FIELDS.items()},
-)
+_entries: Any = {name: (_annotation(row[2], row[3], row[4]), row[2]) for name, row in _FIELDS.items()}
+_Model: Any = create_model("_Model", __base__=_Base, **_entries)
 
 
-class Config(_Model):
+class Config(_Model):  # type: ignore[misc] # made from the table of the core
     """Frozen parameters of a tracker, given by keyword; `Config().to_toml()` explains every one.
 
     Raises:

@@ -61,7 +61,9 @@ class Tracker:
 
         names = self.body.limb_names
         if set(world_from_limb) != set(names):
-            raise BodyError(f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(world_from_limb)}")
+            raise BodyError(
+                f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(world_from_limb)}"
+            )
         return self._core._reset_pose([np.asarray(world_from_limb[name], dtype=np.float64) for name in names])
 
     def step(self, frame: Frame) -> Estimate:

@@ -4,60 +4,64 @@ use crate::body::{Body, Limb};
 use crate::candidates::{ANY_LIMB, Candidates};
 use crate::config::{Config, Overlap};
 use crate::correspondence::LimbMatches;
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{Points, Pose, Vec3};
 use crate::shape::Region;
+use crate::simd::widest;
 
-/// Distance of a candidate that lies outside a limb's box.
+/// Squared distance of a candidate that lies outside a limb's box.
 const OUTSIDE: f32 = f32::INFINITY;
+/// Candidates looked at together: short, so that neighbours in an image share few limbs, and a whole number of SIMD lanes.
+const BLOCK: usize = 32;
+/// What single precision may err in the place of a box, metres; the boxes that only rule out are this much wider.
+const ROUNDING: f32 = 1e-4;
 
 /// Working memory of the assignment.
 #[derive(Debug, Default)]
 pub struct Assignment {
-    /// `distance[limb * candidates + i]`: rough distance to the surface inside the limb's box, else infinite.
-    distance: Vec<f32>,
-    /// Candidates of each limb.
+    /// Candidates of each limb, ascending.
     members: Vec<Vec<u32>>,
+    boxes: Vec<LimbBox>,
+    /// Squared rough distances of one block of candidates to each limb.
+    squares: Vec<[f32; BLOCK]>,
 }
 
 impl Assignment {
     /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
-    pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, config: &Config) {
-        let count = candidates.len();
-        self.distance.resize(count * poses.len(), OUTSIDE);
+    pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, overlap: Overlap, box_margin: f64) {
         self.members.resize_with(poses.len(), Vec::new);
-        self.members.truncate(poses.len());
         self.members.iter_mut().for_each(Vec::clear);
-        if count == 0 {
-            return;
-        }
-        for ((limb, pose), row) in body.limbs().iter().zip(poses).zip(self.distance.chunks_exact_mut(count)) {
-            BoxDistance::new(limb, pose, config.limb_box_margin).fill(candidates, row);
-        }
-        for index in 0..count {
-            match candidates.limb[index] {
-                ANY_LIMB => self.share(body, index, count, config.overlap),
-                limb => self.members[usize::from(limb)].push(index as u32),
+        self.squares.resize(poses.len(), [OUTSIDE; BLOCK]);
+        self.boxes.clear();
+        let limbs = body.limbs().iter().zip(poses);
+        self.boxes.extend(limbs.map(|(limb, pose)| LimbBox::new(limb, pose, box_margin)));
+        for start in (0..candidates.len()).step_by(BLOCK) {
+            let count = BLOCK.min(candidates.len() - start);
+            let block = Block::load(&candidates.points, start, count);
+            let (boxes, squares) = (&self.boxes, &mut self.squares);
+            let closest = widest(
+                #[inline(always)]
+                || closest_limbs(&block, boxes, squares),
+            );
+            for (offset, limb) in candidates.limb[start..start + count].iter().enumerate() {
+                match *limb {
+                    ANY_LIMB => self.share(body, offset, start + offset, closest[offset], overlap),
+                    limb => self.members[usize::from(limb)].push((start + offset) as u32),
+                }
             }
         }
     }
 
-    fn share(&mut self, body: &Body, index: usize, count: usize, policy: Overlap) {
-        let limbs = self.members.len();
-        let (mut closest, mut least) = (0, OUTSIDE);
-        for limb in 0..limbs {
-            let distance = self.distance[limb * count + index];
-            if distance < least {
-                (closest, least) = (limb, distance);
-            }
-        }
-        if least == OUTSIDE {
+    /// Gives a free candidate, at `offset` in the block, to its closest limb and to others as the policy says.
+    fn share(&mut self, body: &Body, offset: usize, index: usize, closest: u32, policy: Overlap) {
+        let closest = closest as usize;
+        if closest >= self.members.len() {
             return;
         }
         match policy {
             Overlap::Exclusive => self.members[closest].push(index as u32),
             Overlap::Shared | Overlap::Adjacent => {
-                for limb in 0..limbs {
-                    let inside = self.distance[limb * count + index] < OUTSIDE;
+                for limb in 0..self.members.len() {
+                    let inside = self.squares[limb][offset] < OUTSIDE;
                     if inside && (policy == Overlap::Shared || limb == closest || body.adjacent(limb, closest)) {
                         self.members[limb].push(index as u32);
                     }
@@ -75,23 +79,28 @@ impl Assignment {
         pose: &Pose,
         candidates: &Candidates,
         config: &Config,
+        max_distance: f64,
         matches: &mut LimbMatches,
     ) {
         let members = &self.members[index];
         let kept = sampled_count(members.len(), config);
         matches.candidate.clear();
-        matches.measured.clear();
-        matches.weight.clear();
-        for sample in 0..kept {
-            let candidate = members[sample * members.len() / kept] as usize;
-            matches.candidate.push(candidate as u32);
-            let points = &candidates.points;
-            matches.measured.push([points.x[candidate], points.y[candidate], points.z[candidate]]);
-            matches.weight.push(candidates.weight[candidate]);
+        if kept == members.len() {
+            matches.candidate.extend_from_slice(members);
+        } else {
+            matches.candidate.extend((0..kept).map(|sample| members[sample * members.len() / kept]));
         }
+        let pick = |from: &[f32], to: &mut Vec<f32>| {
+            to.clear();
+            to.extend(matches.candidate.iter().map(|candidate| from[*candidate as usize]));
+        };
+        pick(&candidates.points.x, &mut matches.measured.x);
+        pick(&candidates.points.y, &mut matches.measured.y);
+        pick(&candidates.points.z, &mut matches.measured.z);
+        pick(&candidates.weight, &mut matches.weight);
         limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
         let refused = refused_regions(limb);
-        let limit = config.max_distance as f32;
+        let limit = max_distance as f32;
         for ((weight, distance), region) in
             matches.weight.iter_mut().zip(&matches.surface.signed_distance).zip(&matches.surface.region)
         {
@@ -118,57 +127,132 @@ fn refused_regions(limb: &Limb) -> [bool; 5] {
     refused
 }
 
-/// Box test and rough distance of a tapered elliptic cylinder, in single precision for whole rows of candidates.
-struct BoxDistance {
+/// Some candidates, padded with the last of them.
+struct Block {
+    x: [f32; BLOCK],
+    y: [f32; BLOCK],
+    z: [f32; BLOCK],
+}
+
+impl Block {
+    fn load(points: &Points, start: usize, count: usize) -> Self {
+        let pad = |from: &[f32]| {
+            let mut to = [from[start + count - 1]; BLOCK];
+            to[..count].copy_from_slice(&from[start..start + count]);
+            to
+        };
+        Self { x: pad(&points.x), y: pad(&points.y), z: pad(&points.z) }
+    }
+
+    #[inline(always)]
+    fn bounds(&self) -> [[f32; 2]; 3] {
+        [&self.x, &self.y, &self.z].map(|values| {
+            let (mut low, mut high) = ([f32::MAX; 8], [f32::MIN; 8]);
+            for lanes in values.as_chunks::<8>().0 {
+                for lane in 0..8 {
+                    low[lane] = if lanes[lane] < low[lane] { lanes[lane] } else { low[lane] };
+                    high[lane] = if lanes[lane] > high[lane] { lanes[lane] } else { high[lane] };
+                }
+            }
+            [low.into_iter().fold(f32::MAX, f32::min), high.into_iter().fold(f32::MIN, f32::max)]
+        })
+    }
+}
+
+/// The closest limb of every candidate of a block (a number too high: none), and the squared distances to all limbs.
+#[inline(always)]
+fn closest_limbs(block: &Block, boxes: &[LimbBox], squares: &mut [[f32; BLOCK]]) -> [u32; BLOCK] {
+    let bounds = block.bounds();
+    let (mut closest, mut least) = ([u32::MAX; BLOCK], [OUTSIDE; BLOCK]);
+    for ((limb, shape), square) in (0..).zip(boxes).zip(squares) {
+        if !shape.reaches(&bounds) {
+            *square = [OUTSIDE; BLOCK];
+            continue;
+        }
+        for i in 0..BLOCK {
+            square[i] = shape.square(block.x[i], block.y[i], block.z[i]);
+        }
+        for i in 0..BLOCK {
+            let closer = square[i] < least[i];
+            closest[i] = if closer { limb } else { closest[i] };
+            least[i] = if closer { square[i] } else { least[i] };
+        }
+    }
+    closest
+}
+
+/// Box test and rough distance of a tapered elliptic cylinder, in single precision for whole blocks of candidates.
+#[derive(Debug)]
+struct LimbBox {
+    /// Columns of the rotation, and the shift, from the working frame to the limb's.
     axes: [[f32; 3]; 3],
     shift: [f32; 3],
+    /// The enlarged box in the limb's frame.
     low: [f32; 3],
     high: [f32; 3],
+    /// A box in the working frame that holds the enlarged one.
+    around: [[f32; 2]; 3],
     length: f32,
+    /// Semi-axes at the proximal end and their growth along the axis.
     a: [f32; 2],
     b: [f32; 2],
 }
 
-impl BoxDistance {
-    fn new(limb: &Limb, pose: &Pose, margin: f64) -> Self {
+impl LimbBox {
+    fn new(limb: &Limb, working_from_limb: &Pose, margin: f64) -> Self {
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
-        let limb_from_working = pose.inverse();
-        let bounds = limb.shape.local_aabb();
+        let limb_from_working = working_from_limb.inverse();
         let shape = &limb.shape;
+        let bounds = shape.local_aabb();
+        let (low, high) = (bounds.mins - Vec3::splat(margin), bounds.maxs + Vec3::splat(margin));
+        let centre = to_f32(*working_from_limb * (0.5 * (low + high)));
+        let half = 0.5 * (high - low);
+        let reach = [(Vec3::X, half.x), (Vec3::Y, half.y), (Vec3::Z, half.z)]
+            .map(|(axis, half)| (working_from_limb.rotation * axis).abs() * half);
+        let reach = to_f32(reach[0] + reach[1] + reach[2]);
         Self {
             axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_f32(limb_from_working.rotation * axis)),
             shift: to_f32(limb_from_working.translation),
-            low: to_f32(bounds.mins - Vec3::splat(margin)),
-            high: to_f32(bounds.maxs + Vec3::splat(margin)),
+            low: to_f32(low),
+            high: to_f32(high),
+            around: [0, 1, 2].map(|axis| {
+                let reach = reach[axis] + ROUNDING;
+                [centre[axis] - reach, centre[axis] + reach]
+            }),
             length: shape.length() as f32,
             a: [shape.a0() as f32, ((shape.a1() - shape.a0()) / shape.length()) as f32],
             b: [shape.b0() as f32, ((shape.b1() - shape.b0()) / shape.length()) as f32],
         }
     }
 
-    fn fill(&self, candidates: &Candidates, row: &mut [f32]) {
-        let points = &candidates.points;
-        let coordinates = points.x.iter().zip(&points.y).zip(&points.z);
-        for (distance, ((x, y), z)) in row.iter_mut().zip(coordinates) {
-            *distance = self.distance(*x, *y, *z);
-        }
+    /// False when nothing inside the bounds can be inside the box.
+    #[inline(always)]
+    fn reaches(&self, bounds: &[[f32; 2]; 3]) -> bool {
+        self.around.iter().zip(bounds).all(|(own, other)| own[0] <= other[1] && other[0] <= own[1])
     }
 
-    /// About `(rho - 1) / |grad rho|` beside the limb with `rho^2 = (x/a)^2 + (y/b)^2`, and the distance beyond its ends.
+    /// Square of about `(rho - 1) / |grad rho|` beside the limb, with `rho^2 = (x/a)^2 + (y/b)^2`, and of the distance beyond
+    /// its ends.
     #[inline(always)]
-    fn distance(&self, x: f32, y: f32, z: f32) -> f32 {
-        let local = [0, 1, 2].map(|i| self.axes[0][i] * x + self.axes[1][i] * y + self.axes[2][i] * z + self.shift[i]);
+    fn square(&self, x: f32, y: f32, z: f32) -> f32 {
+        let local = |i: usize| self.axes[0][i] * x + self.axes[1][i] * y + self.axes[2][i] * z + self.shift[i];
+        let local = [local(0), local(1), local(2)];
         let inside = |axis: usize| (local[axis] >= self.low[axis]) & (local[axis] <= self.high[axis]);
-        let along = local[2].clamp(0.0, self.length);
-        let a = (self.a[0] + self.a[1] * along).max(1e-4);
-        let b = (self.b[0] + self.b[1] * along).max(1e-4);
-        let (u, v) = (local[0] / a, local[1] / b);
-        let square = u * u + v * v;
-        let rho = square.sqrt();
-        let gradient = ((u / a) * (u / a) + (v / b) * (v / b)).sqrt().max(1e-9);
-        let side = ((square - rho) / gradient).abs();
-        let beyond = (local[2] - along).abs();
-        let distance = (side * side + beyond * beyond).sqrt();
-        if inside(0) & inside(1) & inside(2) { distance } else { OUTSIDE }
+        let along = if local[2] > 0.0 { local[2] } else { 0.0 };
+        let along = if along < self.length { along } else { self.length };
+        let at_least = |value: f32, least: f32| if value > least { value } else { least };
+        let a = at_least(self.a[0] + self.a[1] * along, 1e-4);
+        let b = at_least(self.b[0] + self.b[1] * along, 1e-4);
+        let over = 1.0 / (a * b);
+        let (over_a, over_b) = (b * over, a * over);
+        let (u, v) = (local[0] * over_a, local[1] * over_b);
+        let rho_square = u * u + v * v;
+        // grad rho = (u/a, v/b) / rho, so (rho - 1) / |grad rho| = (rho^2 - rho) / |(u/a, v/b)|.
+        let (gx, gy) = (u * over_a, v * over_b);
+        let rise = rho_square - rho_square.sqrt();
+        let side_square = rise * rise / at_least(gx * gx + gy * gy, 1e-18);
+        let beyond = local[2] - along;
+        let square = side_square + beyond * beyond;
+        if inside(0) & inside(1) & inside(2) { square } else { OUTSIDE }
     }
 }

@@ -1,10 +1,11 @@
 //! Girths from the first frame: the named joints fix pose and lengths, the points around them how thick each limb is and
 //! where its surface lies about the line of its joints.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{SMatrix, SVector};
 
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Pose, Vec3};
+use crate::shape::TaperedEllipticCylinder;
 
 /// Standard deviation of the shift of a limb's surface against its joints (metres) and of its relative girth: what
 /// anthropometry leaves open between persons, clothes and definitions of joint centres.
@@ -21,39 +22,77 @@ const ENOUGH: usize = 15;
 pub struct GirthFit {
     /// Shift across the axis, metres; z is 0.
     pub shift: Vec3,
-    /// Factor of all semi-axes.
-    pub girth: f64,
+    /// Factors of the semi-axes along x, of those along y, and of both at the distal end. Three, not four: both axes taper
+    /// alike, so that the side of the limb stays nearly developable and its closest points cheap.
+    pub factors: [f64; 3],
 }
 
-/// One Gauss-Newton step for shift and girth from the matches of one limb: `d = n . shift + (girth - 1) n . (x, y, 0)` for a
-/// point at signed distance `d` whose closest point `(x, y, z)` has the normal `n` (limb frame), robust (Cauchy) and drawn
-/// to `total`, the change made so far, being none.
-pub fn girth_step(matches: &LimbMatches, working_from_limb: &Pose, total: &GirthFit) -> Option<GirthFit> {
+impl Default for GirthFit {
+    fn default() -> Self {
+        Self { shift: Vec3::ZERO, factors: [1.0; 3] }
+    }
+}
+
+/// One Gauss-Newton step for shift and semi-axes from the matches of one limb.
+///
+/// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb
+/// frame), asks for `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, `e` the relative changes. Robust (Cauchy); `total`, the change made so far, is drawn to none.
+pub fn girth_step(
+    shape: &TaperedEllipticCylinder,
+    matches: &LimbMatches,
+    working_from_limb: &Pose,
+    total: &GirthFit,
+) -> Option<GirthFit> {
     let (points, _) = matches.accepted();
     if points < ENOUGH {
         return None;
     }
-    let mut h = Matrix3::zeros();
-    let mut b = Vector3::zeros();
+    let mut h = SMatrix::<f64, 5, 5>::zeros();
+    let mut g = SVector::<f64, 5>::zeros();
     for index in 0..matches.weight.len() {
         if matches.weight[index] <= 0.0 {
             continue;
         }
         let distance = f64::from(matches.surface.signed_distance[index]);
         let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
-        let normal = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
-        let row = Vector3::new(normal.x, normal.y, normal.x * foot.x + normal.y * foot.y);
+        let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
+        let t = (foot.z / shape.length()).clamp(0.0, 1.0);
+        let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
+        let (a, b) = (n.x * foot.x, n.y * foot.y);
+        let taper = a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1());
+        let row = SVector::from([n.x, n.y, a, b, taper]);
         let scale = distance / (2.0 * POINT_SIGMA);
         let weight = 1.0 / (1.0 + scale * scale);
         h += weight * row * row.transpose();
-        b += weight * distance * row;
+        g += weight * distance * row;
     }
     let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
-    let prior = Vector3::new(SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA).map(|sigma| 1.0 / (sigma * sigma));
-    let h = h * information + Matrix3::from_diagonal(&prior);
-    let b = b * information - prior.component_mul(&Vector3::new(total.shift.x, total.shift.y, total.girth - 1.0));
-    let step = h.cholesky()?.solve(&b);
-    step.iter()
-        .all(|value| value.is_finite())
-        .then(|| GirthFit { shift: Vec3::new(step.x, step.y, 0.0), girth: 1.0 + step.z })
+    let [e0, e1, e2] = total.factors.map(|factor| factor - 1.0);
+    let so_far = SVector::from([total.shift.x, total.shift.y, e0, e1, e2]);
+    let prior = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA])
+        .map(|sigma| 1.0 / (sigma * sigma));
+    let h = h * information + SMatrix::from_diagonal(&prior);
+    let g = g * information - prior.component_mul(&so_far);
+    let step = h.cholesky()?.solve(&g);
+    let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
+    step.iter().all(|value| value.is_finite()).then(|| GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors })
+}
+
+impl GirthFit {
+    /// Factors of the semi-axes a0, b0, a1, b1.
+    pub fn axes(&self) -> [f64; 4] {
+        let [a, b, distal] = self.factors;
+        [a, b, a * distal, b * distal]
+    }
+
+    /// This change followed by another, held to what a person may differ by; and the part of the other that is left.
+    pub fn then(&self, step: &Self) -> (Self, Self) {
+        let mut total = Self { shift: self.shift + step.shift, factors: self.factors };
+        let mut done = *step;
+        for index in 0..3 {
+            total.factors[index] = (self.factors[index] * step.factors[index]).clamp(0.6, 1.6);
+            done.factors[index] = total.factors[index] / self.factors[index];
+        }
+        (total, done)
+    }
 }

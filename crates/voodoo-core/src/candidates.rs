@@ -1,8 +1,11 @@
 //! Step 1: free points inside the enlarged whole-body box, joined by the points known to be on the body (K06 IV-B.1).
 
+use crate::background::{Background, Backgrounds};
 use crate::body::Body;
-use crate::frame::{Cloud, DepthImage, Frame, PointSlice, Scope};
-use crate::geometry::{Aabb, Points, Pose, Vec3};
+use crate::config::Config;
+use crate::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
+use crate::geometry::{Aabb, Mat3, Points, Pose, Vec3};
+use crate::simd::widest;
 
 /// Mark of a point that may belong to any limb.
 pub const ANY_LIMB: u16 = u16::MAX;
@@ -31,7 +34,7 @@ struct Gate {
 impl Gate {
     #[inline(always)]
     fn passes(&self, p: [f32; 3]) -> bool {
-        let inside = |axis: usize| p[axis] >= self.low[axis] && p[axis] <= self.high[axis];
+        let inside = |axis: usize| (p[axis] >= self.low[axis]) & (p[axis] <= self.high[axis]);
         inside(0) & inside(1) & inside(2) & (p[0] * self.up[0] + p[1] * self.up[1] + p[2] * self.up[2] >= self.floor)
     }
 }
@@ -59,20 +62,22 @@ impl Candidates {
     }
 
     /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
-    /// whole-body box in the working frame, `clearance` the height above the ground under which free points are background.
-    pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, clearance: f64) {
+    /// whole-body box in the working frame, and pixels of the learnt
+    /// backgrounds are left out.
+    pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, backgrounds: &Backgrounds, config: &Config) {
         self.points.clear();
         self.weight.clear();
         self.limb.clear();
         self.source.clear();
         let (up, floor) = match frame.ground {
-            Some(ground) => (ground.normal, ground.offset + clearance - ground.normal.dot(origin)),
+            Some(ground) => (ground.normal, ground.offset + config.ground_clearance - ground.normal.dot(origin)),
             None => (Vec3::ZERO, -1.0),
         };
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
         let gate = Gate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
-        for image in frame.images {
-            self.gather_image(image, origin, bounds, &gate);
+        for (index, image) in frame.images.iter().enumerate() {
+            let background = backgrounds.of(index, image).map_or(&[][..], Background::depth);
+            self.gather_image(image, background, origin, bounds, &gate, config.max_points);
         }
         for cloud in frame.clouds {
             self.gather_cloud(cloud, origin, &gate);
@@ -88,12 +93,13 @@ impl Candidates {
 
     fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &Gate) {
         let working_from_sensor = shifted(&cloud.world_from_sensor, origin);
+        let (rotation, shift) = (Mat3::from_quat(working_from_sensor.rotation), working_from_sensor.translation);
         let limb = match cloud.scope {
             Scope::Limb(limb) => limb as u16,
             Scope::Free | Scope::Body => ANY_LIMB,
         };
         let mut visit = |point: Vec3| {
-            let point = (working_from_sensor * point).to_array().map(|value| value as f32);
+            let point = (rotation * point + shift).to_array().map(|value| value as f32);
             if cloud.scope != Scope::Free || gate.passes(point) {
                 self.push(point, cloud.weight as f32, limb, cloud.source);
             }
@@ -104,32 +110,127 @@ impl Candidates {
         }
     }
 
-    fn gather_image(&mut self, image: &DepthImage, origin: Vec3, bounds: &Aabb, gate: &Gate) {
+    fn gather_image(
+        &mut self,
+        image: &DepthImage,
+        background: &[f32],
+        origin: Vec3,
+        bounds: &Aabb,
+        gate: &Gate,
+        max_points: usize,
+    ) {
         let working_from_sensor = shifted(&image.world_from_sensor, origin);
         let (columns, rows) = image_window(image, &working_from_sensor, bounds);
-        let m = glam_f32(&working_from_sensor);
-        let scale = image.metres_per_unit as f32;
-        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
-        let (inverse_fx, inverse_fy) = (1.0 / fx, 1.0 / fy);
-        for row in rows {
-            let ray_y = (row as f32 - cy) * inverse_fy;
-            for column in columns.clone() {
-                let index = row * image.width + column;
-                let z = image.pixels.get(index) * scale;
-                if z.is_nan() || z <= 0.0 || z.is_infinite() {
-                    continue;
+        let m = columns_f32(&working_from_sensor);
+        let points = &mut self.points;
+        // A pixel stands for a patch of surface: its size follows from the distance of the body.
+        let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(0.3);
+        let patch = distance * distance / (image.intrinsics[0] * image.intrinsics[1]);
+        let stride = (VISIBLE_AREA / patch / max_points as f64).sqrt().round().max(1.0);
+        let weight = image.weight * patch * stride * stride / REFERENCE_PATCH;
+        let stride = stride as usize;
+        widest(
+            #[inline(always)]
+            || {
+                for row in rows.step_by(stride) {
+                    for start in columns.clone().step_by(STRETCH * stride) {
+                        let stretch = Stretch::load(image, background, row, start, columns.end, stride);
+                        stretch.gather(&m, gate, points);
+                    }
                 }
-                let [x, y] = match image.rays {
-                    Some(rays) => rays[index],
-                    None => [(column as f32 - cx) * inverse_fx, ray_y],
-                };
-                let point =
-                    [0, 1, 2].map(|axis| m[0][axis] * (x * z) + (m[1][axis] * (y * z) + (m[2][axis] * z + m[3][axis])));
-                if gate.passes(point) {
-                    self.push(point, image.weight as f32, ANY_LIMB, image.source);
+            },
+        );
+        let count = self.points.len();
+        self.weight.resize(count, weight as f32);
+        self.limb.resize(count, ANY_LIMB);
+        self.source.resize(count, image.source);
+    }
+}
+
+/// Area of a person that a camera sees, about, m^2.
+const VISIBLE_AREA: f64 = 0.4;
+/// A depth pixel that stands for this much surface has weight one: 12 mm squared, that of a 160x124 time-of-flight camera
+/// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
+pub const REFERENCE_PATCH: f64 = 0.012 * 0.012;
+
+/// Pixels of a row that are looked at together.
+const STRETCH: usize = 64;
+
+/// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
+struct Stretch {
+    x: [f32; STRETCH],
+    y: [f32; STRETCH],
+    z: [f32; STRETCH],
+}
+
+impl Stretch {
+    #[inline(always)]
+    fn load(image: &DepthImage, background: &[f32], row: usize, start: usize, end: usize, stride: usize) -> Self {
+        let count = STRETCH.min((end - start).div_ceil(stride));
+        let first = row * image.width + start;
+        let scale = image.metres_per_unit as f32;
+        let mut z = [0.0; STRETCH];
+        match image.pixels {
+            DepthPixels::U16(pixels) => {
+                let pixels = pixels[first..].iter().step_by(stride);
+                z[..count].iter_mut().zip(pixels).for_each(|(z, pixel)| *z = f32::from(*pixel) * scale);
+            }
+            DepthPixels::F32(pixels) => {
+                let pixels = pixels[first..].iter().step_by(stride);
+                z[..count].iter_mut().zip(pixels).for_each(|(z, pixel)| *z = *pixel * scale);
+            }
+        }
+        if !background.is_empty() {
+            for (z, depth) in z[..count].iter_mut().zip(background[first..].iter().step_by(stride)) {
+                *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
+            }
+        }
+        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
+        let mut x = [0.0; STRETCH];
+        let mut y = [(row as f32 - cy) * (1.0 / fy); STRETCH];
+        match image.rays {
+            Some(rays) => {
+                for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(rays[first..].iter().step_by(stride)).take(count) {
+                    (*x, *y) = (ray[0], ray[1]);
+                }
+            }
+            None => {
+                let inverse = 1.0 / fx;
+                for (x, offset) in x.iter_mut().zip(0_i32..) {
+                    *x = ((start as i32 + offset * stride as i32) as f32 - cx) * inverse;
                 }
             }
         }
+        Self { x, y, z }
+    }
+
+    /// Appends the points that returned and lie inside the gate, in order.
+    #[inline(always)]
+    fn gather(&self, m: &[[f32; 3]; 4], gate: &Gate, points: &mut Points) {
+        let mut p = [[0.0; STRETCH]; 3];
+        let mut passes = [false; STRETCH];
+        for i in 0..STRETCH {
+            let z = self.z[i];
+            let (x, y) = (self.x[i] * z, self.y[i] * z);
+            let place = |axis: usize| m[0][axis] * x + (m[1][axis] * y + (m[2][axis] * z + m[3][axis]));
+            let point = [place(0), place(1), place(2)];
+            // A NaN fails the first comparison.
+            passes[i] = (z > 0.0) & (z < f32::INFINITY) & gate.passes(point);
+            (p[0][i], p[1][i], p[2][i]) = (point[0], point[1], point[2]);
+        }
+        if passes.iter().fold(0, |any, pass| any | u8::from(*pass)) == 0 {
+            return;
+        }
+        let mut kept = 0;
+        for i in 0..STRETCH {
+            // `kept` is at most `i`; the mask only spares the bounds checks.
+            let to = kept % STRETCH;
+            (p[0][to], p[1][to], p[2][to]) = (p[0][i], p[1][i], p[2][i]);
+            kept += usize::from(passes[i]);
+        }
+        points.x.extend_from_slice(&p[0][..kept]);
+        points.y.extend_from_slice(&p[1][..kept]);
+        points.z.extend_from_slice(&p[2][..kept]);
     }
 }
 
@@ -170,7 +271,7 @@ pub fn shifted(world_from_sensor: &Pose, origin: Vec3) -> Pose {
 }
 
 /// Columns of the rotation, then the translation.
-fn glam_f32(pose: &Pose) -> [[f32; 3]; 4] {
+fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
     [pose.rotation * Vec3::X, pose.rotation * Vec3::Y, pose.rotation * Vec3::Z, pose.translation]
         .map(|column| column.to_array().map(|value| value as f32))
 }

@@ -216,22 +216,31 @@ config! {
     min_change: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
     /// Enlargement of the box around the whole body; free points outside are background (K06 IV-B.1).
     body_box_margin: f64 = 0.20, "m", 0.0 ..= 10.0;
-    /// Enlargement of the box of each limb: how far a limb may move between two frames (K06 IV-B.2).
+    /// Enlargement of the box of each limb: how far a limb may move between two frames (K06 IV-B.2;
+    /// limbwise solver).
     limb_box_margin: f64 = 0.10, "m", 0.0 ..= 10.0;
     /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
     overlap: Overlap = Overlap::Exclusive, "";
+    /// At most about this many pixels of a depth image are used; a finer image is sampled on a grid.
+    max_points: usize = 3000, "", 100 ..= 10000000;
+    /// Learn the still scene behind the body from depth images, as long as their camera does not move, and leave it out.
+    background: bool = true, "";
     /// Every n-th point of a limb is used (K06 IV-B.3).
     sampling_factor: usize = 1, "", 1 ..= 1000;
     /// A limb keeps at least this many of its points when sampled (K06 IV-B.3).
     min_limb_points: usize = 50, "", 0 ..= 1000000;
     /// A limb keeps at most this many points (K06 IV-B.3).
     max_limb_points: usize = 1000, "", 1 ..= 1000000;
-    /// A point farther than this from its limb's surface is not matched (K06 IV-B.4).
+    /// A point farther than this from its limb's surface is not matched (K06 IV-B.4; limbwise solver).
     max_distance: f64 = 0.15, "m", 0.001 ..= 10.0;
     /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7).
     band_ratio: f64 = 0.5, "", 0.0 ..= 100.0;
     /// Standard deviation of a surface point of weight one, for the whole-body solvers.
     point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
+    /// Greatest distance of a matched point in the first step of a frame, for the whole-body solvers; it narrows.
+    gate_start: f64 = 0.30, "m", 0.001 ..= 10.0;
+    /// Greatest distance of a matched point once narrowed.
+    gate_end: f64 = 0.12, "m", 0.001 ..= 10.0;
     /// Scale of the robust kernel in the first step of a frame; it narrows from step to step.
     kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
     /// Scale at which the robust kernel stops narrowing.
@@ -243,7 +252,9 @@ config! {
     /// Standard deviation of the root's unexpected shift in 1/30 s.
     root_shift_sigma: f64 = 0.04, "m", 0.0001 ..= 10.0;
     /// Multiplies the standard deviations of all unexpected motion: smaller is smoother and slower.
-    motion_scale: f64 = 1.0, "", 0.01 ..= 100.0;
+    motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
+    /// Try other configurations of arms and legs where the frame speaks against the current ones.
+    hypotheses: bool = false, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.

@@ -118,6 +118,18 @@ pub struct DepthImage<'a> {
     pub source: u16,
 }
 
+impl DepthImage<'_> {
+    /// The point of a pixel in the camera's frame for a depth of `z` metres.
+    pub fn back_project(&self, index: usize, z: f32) -> Vec3 {
+        let [fx, fy, cx, cy] = self.intrinsics;
+        let [x, y] = match self.rays {
+            Some(rays) => rays[index].map(f64::from),
+            None => [((index % self.width) as f64 - cx) / fx, ((index / self.width) as f64 - cy) / fy],
+        };
+        f64::from(z) * Vec3::new(x, y, 1.0)
+    }
+}
+
 /// A named site was seen at a position (K06 IV-A: 3-D point-to-point relation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionRelation {
@@ -191,8 +203,8 @@ impl<'a> Frame<'a> {
         }
         for (index, cloud) in self.clouds.iter().enumerate() {
             let what = |part: &str| format!("points[{index}].{part}");
-            check_weight(what("weight"), cloud.weight)?;
-            check_pose(what("world_from_sensor"), &cloud.world_from_sensor)?;
+            check_weight(|| what("weight"), cloud.weight)?;
+            check_pose(|| what("world_from_sensor"), &cloud.world_from_sensor)?;
             if let Scope::Limb(limb) = cloud.scope
                 && limb >= body.limbs().len()
             {
@@ -208,20 +220,20 @@ impl<'a> Frame<'a> {
             }
         }
         for (index, image) in self.images.iter().enumerate() {
-            check_image(&format!("depth[{index}]"), image)?;
+            check_image(index, image)?;
         }
         for (index, relation) in self.positions.iter().enumerate() {
             let what = |part: &str| format!("positions[{index}].{part}");
-            check_site(what("site"), relation.site, body)?;
-            check_weight(what("weight"), relation.weight)?;
-            check_vector(what("position"), relation.position)?;
+            check_site(|| what("site"), relation.site, body)?;
+            check_weight(|| what("weight"), relation.weight)?;
+            check_vector(|| what("position"), relation.position)?;
         }
         for (index, relation) in self.rays.iter().enumerate() {
             let what = |part: &str| format!("rays[{index}].{part}");
-            check_site(what("site"), relation.site, body)?;
-            check_weight(what("weight"), relation.weight)?;
-            check_vector(what("origin"), relation.origin)?;
-            check_vector(what("direction"), relation.direction)?;
+            check_site(|| what("site"), relation.site, body)?;
+            check_weight(|| what("weight"), relation.weight)?;
+            check_vector(|| what("origin"), relation.origin)?;
+            check_vector(|| what("direction"), relation.direction)?;
             if relation.direction.length() < 1e-9 {
                 return Err(TrackError::measurement(
                     what("direction"),
@@ -239,9 +251,10 @@ impl<'a> Frame<'a> {
     }
 }
 
-fn check_image(what: &str, image: &DepthImage) -> Result<(), TrackError> {
-    let wrong =
-        |part: &str, expected, found: String| Err(TrackError::measurement(format!("{what}.{part}"), expected, found));
+fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
+    let wrong = |part: &str, expected, found: String| {
+        Err(TrackError::measurement(format!("depth[{index}].{part}"), expected, found))
+    };
     let count = image.width * image.height;
     if image.pixels.len() != count || count == 0 {
         return wrong(
@@ -260,34 +273,38 @@ fn check_image(what: &str, image: &DepthImage) -> Result<(), TrackError> {
     if !(image.metres_per_unit > 0.0 && image.metres_per_unit.is_finite()) {
         return wrong("metres_per_unit", "a finite length above zero", image.metres_per_unit.to_string());
     }
-    check_weight(format!("{what}.weight"), image.weight)?;
-    check_pose(format!("{what}.world_from_sensor"), &image.world_from_sensor)
+    check_weight(|| format!("depth[{index}].weight"), image.weight)?;
+    check_pose(|| format!("depth[{index}].world_from_sensor"), &image.world_from_sensor)
 }
 
-fn check_site(what: String, site: usize, body: &Body) -> Result<(), TrackError> {
+fn check_site(what: impl FnOnce() -> String, site: usize, body: &Body) -> Result<(), TrackError> {
     if site < body.sites().len() {
         Ok(())
     } else {
-        Err(TrackError::measurement(what, "the index of a site", site.to_string()))
+        Err(TrackError::measurement(what(), "the index of a site", site.to_string()))
     }
 }
 
-fn check_weight(what: String, weight: f64) -> Result<(), TrackError> {
+fn check_weight(what: impl FnOnce() -> String, weight: f64) -> Result<(), TrackError> {
     if weight.is_finite() && weight > 0.0 {
         Ok(())
     } else {
-        Err(TrackError::measurement(what, "a finite weight above zero", weight.to_string()))
+        Err(TrackError::measurement(what(), "a finite weight above zero", weight.to_string()))
     }
 }
 
-fn check_vector(what: String, vector: Vec3) -> Result<(), TrackError> {
-    if vector.is_finite() { Ok(()) } else { Err(TrackError::measurement(what, "finite metres", format!("{vector:?}"))) }
+fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), TrackError> {
+    if vector.is_finite() {
+        Ok(())
+    } else {
+        Err(TrackError::measurement(what(), "finite metres", format!("{vector:?}")))
+    }
 }
 
-fn check_pose(what: String, pose: &Pose) -> Result<(), TrackError> {
+fn check_pose(what: impl FnOnce() -> String, pose: &Pose) -> Result<(), TrackError> {
     if pose.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6 {
         Ok(())
     } else {
-        Err(TrackError::measurement(what, "a rigid transform", format!("{pose:?}")))
+        Err(TrackError::measurement(what(), "a rigid transform", format!("{pose:?}")))
     }
 }

@@ -8,6 +8,7 @@
 //! `body` > `shape`, `rigid` > `geometry`.
 
 pub mod associate;
+pub mod background;
 pub mod body;
 mod calibrate;
 pub mod candidates;
@@ -16,14 +17,17 @@ pub mod config;
 pub mod correspondence;
 pub mod error;
 pub mod estimate;
+pub mod evidence;
 pub mod frame;
 pub mod geometry;
 pub mod ik;
 pub mod normal;
 pub mod predict;
+pub mod recover;
 mod relate;
 pub mod rigid;
 pub mod shape;
+mod simd;
 pub mod solver;
 pub mod terms;
 pub mod tracker;

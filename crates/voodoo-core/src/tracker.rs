@@ -3,21 +3,27 @@
 use rayon::prelude::*;
 
 use crate::associate::Assignment;
+use crate::background::Backgrounds;
 use crate::body::Body;
 use crate::calibrate::{GirthFit, girth_step};
-use crate::candidates::{Candidates, body_box, shifted};
+use crate::candidates::{Candidates, body_box, image_window, shifted};
 use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
 use crate::error::{BodyError, TrackError};
 use crate::estimate::{Estimate, Status};
-use crate::frame::{Frame, PointSlice};
-use crate::geometry::{Points, Pose, Vec3};
+use crate::frame::{DepthImage, Frame, PointSlice};
+use crate::geometry::{Aabb, Points, Pose, Vec3};
 use crate::predict::predict;
+use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Problem, Solver, solver};
+use crate::solver::{Gate, Problem, Solver, solver};
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
+/// In the first frame, what lies within this of the body may be the body, metres.
+const BODY_REACH: f32 = 0.15;
+/// Points farther than this from the set pose say nothing about girths, metres.
+const GIRTH_GATE: f64 = 0.10;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
 
@@ -39,10 +45,14 @@ pub struct Tracker {
     interval: Option<f64>,
     predicted: Vec<Pose>,
     origin: Vec3,
+    backgrounds: Backgrounds,
     candidates: Candidates,
     assignment: Assignment,
     correspondences: Correspondences,
     measured: Vec<f64>,
+    hypotheses: Hypotheses,
+    /// Arms and legs.
+    chains: Vec<TwoBone>,
     estimate: Estimate,
 }
 
@@ -68,10 +78,13 @@ impl Tracker {
             interval: None,
             predicted: Vec::new(),
             origin: Vec3::ZERO,
+            backgrounds: Backgrounds::default(),
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
             measured: Vec::new(),
+            hypotheses: Hypotheses::default(),
+            chains: Vec::new(),
             estimate: Estimate::default(),
         })
     }
@@ -119,6 +132,7 @@ impl Tracker {
 
     fn restart(&mut self, body: Body, world_from_limb: Vec<Pose>) {
         self.body = body;
+        self.prepare_hypotheses();
         self.poses = world_from_limb;
         self.origin = Vec3::ZERO;
         self.stamp = None;
@@ -129,6 +143,7 @@ impl Tracker {
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
         self.candidates = Candidates::default();
+        self.backgrounds.clear();
         self.report(f64::NAN, 0);
         // The caller vouches for a pose that was set.
         self.estimate.status = Status::Tracking;
@@ -144,38 +159,27 @@ impl Tracker {
         let pace = self.predict(frame.stamp);
         // 1 Prefilter the free points by the enlarged box of the whole body.
         let bounds = body_box(&self.body, &self.poses, self.config.body_box_margin);
-        self.candidates.gather(frame, self.origin, &bounds, self.config.ground_clearance);
+        if self.config.background {
+            self.learn_background(frame, &bounds);
+        }
+        self.candidates.gather(frame, self.origin, &bounds, &self.backgrounds, &self.config);
         if std::mem::take(&mut self.girths_open) {
             self.fit_girths();
         }
         let mut steps = 0;
         let mut previous = f64::INFINITY;
         while steps < self.config.max_steps {
-            // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
-            self.match_points();
-            // 4 Point-to-point relations, 5 closest points on rays.
-            self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
-            let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+            let distance = self.match_and_solve(frame, pace, steps);
+            steps += 1;
             if (previous - distance).abs() < self.config.min_change {
                 break;
             }
             previous = distance;
-            // 6 Elastic bands on both limbs.
-            self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
-            // 7 Fit the model.
-            let problem = Problem {
-                body: &self.body,
-                correspondences: &self.correspondences,
-                predicted: &self.predicted,
-                step: steps,
-                pace,
-                config: &self.config,
-            };
-            self.solver.solve(&problem, &mut self.poses);
-            steps += 1;
         }
-        self.match_points();
-        self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+        self.match_all(frame, self.config.max_steps);
+        if self.config.hypotheses && self.solver.starts_from_prediction() && self.stamp.is_some() {
+            steps += self.try_hypotheses(frame, pace);
+        }
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);
@@ -215,6 +219,27 @@ impl Tracker {
         }
     }
 
+    /// Steps 2-5 at the current poses: everything measured becomes a correspondence.
+    fn match_all(&mut self, frame: &Frame, step: usize) {
+        // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
+        let gate = self.solver.gate(&self.config, step);
+        self.match_points(&gate);
+        // 4 Point-to-point relations, 5 closest points on rays.
+        self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+    }
+
+    /// One ICP step (2-7); returns the mean squared distance it started from.
+    fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) -> f64 {
+        self.match_all(frame, step);
+        let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+        // 6 Elastic bands on both limbs.
+        self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
+        // 7 Fit the model.
+        let Self { body, correspondences, predicted, config, solver, poses, .. } = self;
+        solver.solve(&Problem { body, correspondences, predicted, step, pace, config }, poses);
+        distance
+    }
+
     /// Sets the predicted poses, and the current ones to them where the solver wants it; the current ones become the previous.
     /// Returns the time since the last frame in units of 1/30 s, held to what a motion model can say.
     fn predict(&mut self, stamp: f64) -> f64 {
@@ -236,30 +261,63 @@ impl Tracker {
 
     /// Fits the girths to the first frame after a reset, whose pose is known.
     fn fit_girths(&mut self) {
-        let mut totals = vec![GirthFit { shift: Vec3::ZERO, girth: 1.0 }; self.poses.len()];
+        let mut totals = vec![GirthFit::default(); self.poses.len()];
+        let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
         for _ in 0..GIRTH_STEPS {
-            self.match_points();
+            self.match_points(&gate);
             for (limb, total) in totals.iter_mut().enumerate() {
-                let Some(step) = girth_step(&self.correspondences.limbs[limb], &self.poses[limb], total) else {
-                    continue;
-                };
-                let girth = (total.girth * step.girth).clamp(0.7, 1.4);
-                if self.body.change_girth(limb, step.shift, girth / total.girth) {
+                let shape = self.body.limbs()[limb].shape;
+                let matches = &self.correspondences.limbs[limb];
+                let Some(step) = girth_step(&shape, matches, &self.poses[limb], total) else { continue };
+                let (sum, step) = total.then(&step);
+                if self.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut self.poses[limb];
                     pose.translation += pose.rotation * step.shift;
-                    *total = GirthFit { shift: total.shift + step.shift, girth };
+                    *total = sum;
                 }
             }
         }
     }
 
-    fn match_points(&mut self) {
+    /// In the first frame after a reset the pose is known, and all that is not near the body is scene.
+    fn learn_background(&mut self, frame: &Frame, bounds: &Aabb) {
+        let Self { backgrounds, body, poses, origin, .. } = self;
+        if self.stamp.is_some() {
+            let window = |image: &DepthImage| image_window(image, &shifted(&image.world_from_sensor, *origin), bounds);
+            backgrounds.update(frame, window);
+            return;
+        }
+        let mut query = Points::default();
+        let mut surface = SurfaceBatch::default();
+        backgrounds.start(frame, |image, index, z| {
+            let point = shifted(&image.world_from_sensor, *origin) * image.back_project(index, z);
+            if !bounds.contains_local_point(point) {
+                return false;
+            }
+            query.clear();
+            query.push(point.to_array().map(|value| value as f32));
+            body.limbs().iter().zip(poses.iter()).any(|(limb, pose)| {
+                limb.shape.closest_points(pose, &query, &mut surface);
+                surface.signed_distance[0] < BODY_REACH
+            })
+        });
+    }
+
+    fn match_points(&mut self, gate: &Gate) {
         let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
-        assignment.assign(body, poses, candidates, config);
+        assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let assignment = &*assignment;
         let work = |(index, matches): (usize, &mut LimbMatches)| {
-            assignment.match_limb(index, &body.limbs()[index], &poses[index], candidates, config, matches);
+            assignment.match_limb(
+                index,
+                &body.limbs()[index],
+                &poses[index],
+                candidates,
+                config,
+                gate.distance,
+                matches,
+            );
         };
         match threads {
             // Every limb is worked on by one thread in a fixed order: the result does not depend on their number.
@@ -320,6 +378,7 @@ impl Tracker {
         // The motion starts anew: the poses before belong to another body.
         self.previous.clear();
         self.interval = None;
+        self.prepare_hypotheses();
         if !self.started {
             return;
         }
@@ -337,4 +396,7 @@ impl Tracker {
     }
 }
 
+mod hypotheses;
 mod report;
+
+use hypotheses::Hypotheses;

@@ -1,4 +1,5 @@
 //! The one finite-difference checker that every term passes: gradient of the cost by each limb's twist.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use nalgebra::Vector6;
 use proptest::prelude::*;

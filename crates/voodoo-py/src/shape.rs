@@ -20,6 +20,8 @@ pub struct PyClosestPoints {
     region: Py<PyAny>,
 }
 
+type Array<'py> = Bound<'py, PyArray1<f64>>;
+
 #[pymethods]
 impl PyShape {
     #[new]
@@ -58,7 +60,7 @@ impl PyShape {
         &self,
         py: Python<'py>,
         point: &Bound<'py, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
+    ) -> PyResult<(Array<'py>, Array<'py>, f64)> {
         let query = vector("point", point)?;
         if !query.is_finite() {
             return Err(crate::errors::wrong_argument(py, "point", "finite metres", point));

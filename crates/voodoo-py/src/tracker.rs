@@ -16,7 +16,7 @@ use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::shape::PyShape;
 
-#[pyclass(name = "Tracker", module = "voodoo._core", subclass)]
+#[pyclass(name = "Tracker", module = "voodoo._core")]
 pub struct PyTracker {
     tracker: Tracker,
     names: Arc<Names>,

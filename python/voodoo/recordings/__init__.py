@@ -4,6 +4,7 @@ from voodoo.recordings.loaders import LOADERS, open_recording
 from voodoo.recordings.measurements import (
     ColorImage,
     DepthImage,
+    KeypointImage,
     LaserScan,
     Measurement,
     PointCloud,
@@ -16,6 +17,7 @@ __all__ = [
     "LOADERS",
     "ColorImage",
     "DepthImage",
+    "KeypointImage",
     "LaserScan",
     "Measurement",
     "PointCloud",

@@ -10,6 +10,7 @@ from typing import Any
 
 from voodoo.errors import RecordingError
 from voodoo.recordings.folder import FolderRecording
+from voodoo.recordings.pose2sim import Pose2SimRecording
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.ros import RosRecording
 from voodoo.recordings.ros_bag import find_bag, zip_members
@@ -29,6 +30,7 @@ LOADERS: dict[str, Loader] = {
     "ros1": Loader(RosRecording, "a ROS 1 .bag, or a .zip of it"),
     "utd-mhad": Loader(UtdMhadRecording, "a *_depth.mat of UTD-MHAD"),
     "folder": Loader(FolderRecording, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
+    "pose2sim": Loader(Pose2SimRecording, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
 }
 
 
@@ -79,6 +81,8 @@ def guess_loader(path: Path) -> str:
         if any(name.endswith((".mcap", ".db3")) for name in names):
             return "ros2"
     else:
+        if any(path.glob("Calib*.toml")):
+            return "pose2sim"
         if (path / "depth").is_dir() or (path / "depth.txt").is_file():
             return "folder"
         try:

@@ -123,7 +123,32 @@ class ColorImage:
         return f"ColorImage({self.sensor!r}, stamp={self.stamp:.6f}, {self.camera.width}x{self.camera.height})"
 
 
-Measurement: TypeAlias = DepthImage | PointCloud | LaserScan | ColorImage
+@dataclass(frozen=True, eq=False, repr=False)
+class KeypointImage:
+    """What a 2-D keypoint network saw in one image.
+
+    Args:
+        sensor: name of the camera.
+        stamp: time of measurement [s].
+        people: one (K, 3) array of (u, v, confidence) for each person found, in pixels of the distorted image.
+        layout: which keypoints these are, a name in voodoo.keypoints.LAYOUTS.
+        camera: calibration.
+        root_from_sensor: (4, 4) from the optical frame to the recording's root frame.
+    """
+
+    sensor: str
+    stamp: float
+    people: tuple[FloatArray, ...]
+    layout: str
+    camera: Camera
+    root_from_sensor: FloatArray
+
+    def __repr__(self) -> str:
+        """One line with the number of people."""
+        return f"KeypointImage({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.people)} people, {self.layout})"
+
+
+Measurement: TypeAlias = DepthImage | PointCloud | LaserScan | ColorImage | KeypointImage
 
 
 @dataclass(frozen=True, eq=False)

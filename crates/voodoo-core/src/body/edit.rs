@@ -44,12 +44,13 @@ impl Body {
         Ok(body)
     }
 
-    /// Moves the surface of a limb across its axis by `shift` (limb frame, metres) and multiplies its semi-axes by `girth`.
+    /// Moves the surface of a limb across its axis by `shift` (limb frame, metres) and multiplies its semi-axes (a0, b0, a1, b1) by `axes`.
     /// The limb frame moves with the surface; joints and sites stay where they are in space. A change that makes no solid is
     /// not made.
-    pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, girth: f64) -> bool {
+    pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, axes: [f64; 4]) -> bool {
         let shape = self.limbs[limb].shape;
-        let [a0, b0, a1, b1] = [shape.a0(), shape.b0(), shape.a1(), shape.b1()].map(|axis| axis * girth);
+        let [fa0, fb0, fa1, fb1] = axes;
+        let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
         let Ok(shape) = TaperedEllipticCylinder::new(shape.length(), a0, b0, a1, b1) else { return false };
         self.limbs[limb].shape = shape;
         self.map_landmarks(limb, |_, position| position - shift);

@@ -1,6 +1,6 @@
 //! Pose and sizes of a body from named positions in the world.
 
-use super::{Body, JointKind};
+use super::{Body, Joint, JointKind};
 use crate::chain::joint_turn;
 use crate::error::TrackError;
 use crate::geometry::{Mat3, Pose, Quat, Vec3};
@@ -8,6 +8,11 @@ use crate::rigid::Moments;
 
 /// A hinge bent by less than this does not tell its axis; radians.
 const BENT: f64 = 0.3;
+/// A joint whose every range is narrower than this (radians) belongs to the trunk: spine and neck, not shoulder and hip.
+const STEADY: f64 = 2.5;
+/// Weight and lever (metres) of the prior orientation against landmarks of weight one.
+const PRIOR_WEIGHT: f64 = 0.01;
+const PRIOR_LEVER: f64 = 0.1;
 
 impl Body {
     /// World poses of all limbs, and the body itself in the sizes that the positions tell, from positions of sites.
@@ -99,13 +104,22 @@ impl Body {
         if modelled > 0.0 && measured > 0.0 { measured / modelled } else { 1.0 }
     }
 
-    /// Orientation of the whole body: the root's landmarks where they fix it, else all sites against the rest pose.
+    /// Orientation of the whole body: the landmarks of the trunk (the root and what its joints hold nearly upright on it)
+    /// where they fix it, else all sites, against the rest pose.
     fn overall_orientation(&self, positions: &[(usize, Vec3)]) -> Result<Pose, TrackError> {
         let rest = self.rest_pose(Pose::identity());
-        let root: Vec<_> =
-            self.known_landmarks(0, positions).into_iter().map(|(local, p)| (rest[0] * local, p)).collect();
+        let mut trunk = vec![true];
+        for limb in &self.limbs()[1..] {
+            let steady =
+                |joint: &Joint| joint.limits.is_some_and(|limits| limits.iter().all(|[low, high]| high - low < STEADY));
+            trunk.push(limb.parent.as_ref().is_some_and(|(parent, joint)| trunk[*parent] && steady(joint)));
+        }
+        let mut central: Vec<(Vec3, Vec3)> = Vec::new();
+        for limb in (0..trunk.len()).filter(|limb| trunk[*limb]) {
+            central.extend(self.known_landmarks(limb, positions).into_iter().map(|(local, p)| (rest[limb] * local, p)));
+        }
         let all: Vec<_> = positions.iter().map(|(site, p)| (self.site_position(&rest, *site), *p)).collect();
-        for pairs in [root, all] {
+        for pairs in [central, all] {
             if spans_a_plane(pairs.iter().map(|pair| pair.0)) && spans_a_plane(pairs.iter().map(|pair| pair.1)) {
                 let mut moments = Moments::default();
                 pairs.iter().for_each(|(x, p)| moments.add(1.0, *x, *p));
@@ -134,6 +148,12 @@ impl Body {
         {
             moments.add(1.0, prior * local, position);
         }
+        // A faint wish for the prior orientation: landmarks nearly on a line must not decide the turn about it.
+        let mean = if moments.weight > 0.0 { moments.p / moments.weight } else { prior.translation };
+        let middle = if moments.weight > 0.0 { moments.x / moments.weight } else { prior.translation };
+        for axis in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
+            moments.add(PRIOR_WEIGHT, middle + PRIOR_LEVER * axis, mean + PRIOR_LEVER * axis);
+        }
         let turn = moments.absolute_orientation(0.1).map_or(Quat::IDENTITY, |pose| pose.rotation);
         let mut rotation = turn * prior.rotation;
         if let Some((axis, hinge)) = self.hinge_axis(limb, positions) {
@@ -141,10 +161,10 @@ impl Body {
         }
         let translation = match anchor {
             Some((local, centre)) => centre - rotation * local,
-            None if moments.weight > 0.0 => {
-                let count = moments.weight;
+            None if !pairs.is_empty() => {
+                let count = pairs.len() as f64;
                 let local = pairs.iter().map(|pair| pair.0).sum::<Vec3>() / count;
-                moments.p / count - rotation * local
+                mean - rotation * local
             }
             None => prior.translation,
         };

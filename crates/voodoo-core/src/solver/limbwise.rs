@@ -1,6 +1,7 @@
 //! The published solver: weighted absolute orientation, each limb alone (K06 IV-B.7, K07 3.2).
 
-use super::{Problem, Solver};
+use super::{Gate, Problem, Solver};
+use crate::config::Config;
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Mat3, Pose, Vec3};
 use crate::rigid::Moments;
@@ -37,6 +38,10 @@ impl Solver for Limbwise {
                 *pose = Pose::from_parts(centre + motion.translation, rotation);
             }
         }
+    }
+
+    fn gate(&self, config: &Config, _step: usize) -> Gate {
+        Gate { box_margin: config.limb_box_margin, distance: config.max_distance }
     }
 
     fn starts_from_prediction(&self) -> bool {

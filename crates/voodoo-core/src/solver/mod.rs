@@ -32,10 +32,22 @@ pub struct Problem<'a> {
     pub config: &'a Config,
 }
 
+/// Which points may be matched in one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gate {
+    /// Enlargement of the limb boxes, metres.
+    pub box_margin: f64,
+    /// Greatest distance of a point from its limb's surface, metres.
+    pub distance: f64,
+}
+
 /// Moves the limbs towards their correspondences.
 pub trait Solver: std::fmt::Debug + Send + Sync {
     /// One update of all poses (working frame).
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
+
+    /// Which points may be matched in a step of a frame.
+    fn gate(&self, config: &Config, step: usize) -> Gate;
 
     /// Whether a frame starts from the predicted poses; the published method starts from the last ones.
     fn starts_from_prediction(&self) -> bool;

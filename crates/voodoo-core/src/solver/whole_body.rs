@@ -1,6 +1,7 @@
 //! All limbs at once: the terms are summed into one system, which the chain solves.
 
-use super::{ChainSolver, Problem, Solver};
+use super::{ChainSolver, Gate, Problem, Solver};
+use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
@@ -9,8 +10,15 @@ use crate::terms::{Limits, Prior, Sites, Surface, Term};
 const SLIDE: f64 = 0.07;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
+/// Factor from step to step.
+const NARROWING: f64 = 0.7;
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
+
+/// Gates and kernels narrow from step to step: far points pull while the pose is rough.
+fn narrowed(start: f64, end: f64, step: usize) -> f64 {
+    (start * NARROWING.powi(step.min(1000) as i32)).max(end)
+}
 
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
@@ -24,9 +32,7 @@ impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
-        // The kernel narrows from step to step: far points pull while the pose is rough.
-        let narrowing = 0.6_f64.powi(problem.step as i32);
-        let scale = (config.kernel_start * narrowing).max(config.kernel_end);
+        let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
         self.joint_sigmas.clear();
         self.joint_sigmas.extend(body.limbs().iter().map(|limb| {
             limb.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * problem.pace * config.motion_scale
@@ -44,6 +50,11 @@ impl Solver for WholeBody {
             term.add(body, poses, &mut self.normal);
         }
         self.chain.step(body, &self.normal, DAMPING, poses);
+    }
+
+    fn gate(&self, config: &Config, step: usize) -> Gate {
+        let distance = narrowed(config.gate_start, config.gate_end, step);
+        Gate { box_margin: distance, distance }
     }
 
     fn starts_from_prediction(&self) -> bool {

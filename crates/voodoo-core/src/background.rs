@@ -1,0 +1,118 @@
+//! The still scene behind the body, learnt from the depth images of a camera that does not move.
+
+use std::ops::Range;
+
+use crate::frame::{DepthImage, Frame};
+use crate::geometry::Pose;
+
+/// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth.
+const MARGIN: (f32, f32) = (0.04, 0.012);
+/// A deeper return by more than this replaces what was learnt (something stood before it), metres.
+const DEEPER: f32 = 0.15;
+/// Share of a new return in what was learnt.
+const LEARNING: f32 = 0.1;
+/// One row of this many is learnt in a frame.
+const ROW_STEP: usize = 8;
+
+/// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
+#[derive(Clone, Debug, Default)]
+pub struct Background {
+    world_from_sensor: Option<Pose>,
+    width: usize,
+    depth: Vec<f32>,
+    row: usize,
+}
+
+/// The backgrounds of all depth images, in the order of the frame.
+#[derive(Clone, Debug, Default)]
+pub struct Backgrounds {
+    images: Vec<Background>,
+}
+
+impl Background {
+    /// Learnt depth, row by row; empty when nothing was learnt.
+    pub fn depth(&self) -> &[f32] {
+        &self.depth
+    }
+
+    /// Whether a return at `z` metres in pixel `index` belongs to the background.
+    #[inline(always)]
+    pub fn holds(depth: f32, z: f32) -> bool {
+        depth > 0.0 && z > depth - MARGIN.0 - MARGIN.1 * depth
+    }
+
+    fn fits(&self, image: &DepthImage) -> bool {
+        self.world_from_sensor == Some(image.world_from_sensor)
+            && self.width == image.width
+            && self.depth.len() == image.pixels.len()
+    }
+
+    fn learn_pixel(depth: &mut f32, z: f32) {
+        if !z.is_finite() || z <= 0.0 {
+            return;
+        }
+        if *depth == 0.0 || z > *depth + DEEPER {
+            *depth = z;
+        } else if (z - *depth).abs() < DEEPER {
+            *depth += LEARNING * (z - *depth);
+        }
+    }
+}
+
+impl Backgrounds {
+    /// The background of the image with this index, if its camera has not moved.
+    pub fn of(&self, index: usize, image: &DepthImage) -> Option<&Background> {
+        self.images.get(index).filter(|background| background.fits(image))
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.images.clear();
+    }
+
+    /// Starts from a frame whose body pose is known: every pixel for which `is_body(image, pixel, depth)` is false is scene.
+    pub fn start(&mut self, frame: &Frame, mut is_body: impl FnMut(&DepthImage, usize, f32) -> bool) {
+        self.images.clear();
+        for image in frame.images {
+            let mut depth = vec![0.0; image.pixels.len()];
+            for (index, learnt) in depth.iter_mut().enumerate() {
+                let z = image.pixels.get(index) * image.metres_per_unit as f32;
+                if z > 0.0 && z.is_finite() && !is_body(image, index, z) {
+                    *learnt = z;
+                }
+            }
+            self.images.push(Background {
+                world_from_sensor: Some(image.world_from_sensor),
+                width: image.width,
+                depth,
+                row: 0,
+            });
+        }
+    }
+
+    /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. A camera that moved
+    /// starts anew with nothing known.
+    pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> (Range<usize>, Range<usize>)) {
+        self.images.resize_with(frame.images.len(), Background::default);
+        for (image, background) in frame.images.iter().zip(&mut self.images) {
+            if !background.fits(image) {
+                background.world_from_sensor = Some(image.world_from_sensor);
+                background.width = image.width;
+                background.depth.clear();
+                background.depth.resize(image.pixels.len(), 0.0);
+            }
+            let (columns, rows) = window(image);
+            background.row = (background.row + 1) % ROW_STEP;
+            for row in (background.row..image.height).step_by(ROW_STEP) {
+                for column in 0..image.width {
+                    if rows.contains(&row) && columns.contains(&column) {
+                        continue;
+                    }
+                    let index = row * image.width + column;
+                    let z = image.pixels.get(index) * image.metres_per_unit as f32;
+                    Background::learn_pixel(&mut background.depth[index], z);
+                }
+            }
+        }
+    }
+}

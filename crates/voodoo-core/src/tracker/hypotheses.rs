@@ -1,0 +1,276 @@
+//! Trying other configurations of arms and legs, and keeping the best by one score.
+
+use super::Tracker;
+use crate::chain::joint_turn;
+use crate::evidence::{EXPLAINED, Visibility, Witness, unexplained};
+use crate::frame::Frame;
+use crate::geometry::{Points, Pose, Vec3};
+use crate::recover::TwoBone;
+use crate::shape::SurfaceBatch;
+use crate::terms::ShortestAxis;
+
+/// So many unexplained patches near a chain make it suspect.
+const SUSPICIOUS: f64 = 25.0;
+/// So large a share of its visible surface contradicted makes it suspect.
+const CONTRADICTED: f64 = 0.35;
+/// A limb of whose visible surface this share is seen where it is, is not suspect.
+const SUPPORTED: f64 = 0.4;
+/// A hypothesis must explain so many patches more than the current pose.
+const GAIN: f64 = 8.0;
+/// ICP steps that refine the best hypothesis.
+const REFINE: usize = 4;
+/// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians.
+const LIMIT_STRAIN: f64 = 0.1;
+const MOTION_STRAIN: f64 = 0.6;
+/// Points looked at when hypotheses are compared, at most.
+const SAMPLE: usize = 400;
+
+/// Working memory.
+#[derive(Debug, Default)]
+pub(super) struct Hypotheses {
+    /// Candidates that no limb explains.
+    open: Points,
+    open_weight: Vec<f64>,
+    /// Points the chain under test may explain.
+    near: Points,
+    near_weight: Vec<f64>,
+    best: Vec<f32>,
+    others: Vec<f32>,
+    surface: SurfaceBatch,
+    trial: Vec<Pose>,
+    kept: Vec<Pose>,
+    kept_predicted: Vec<Pose>,
+}
+
+impl Tracker {
+    pub(super) fn prepare_hypotheses(&mut self) {
+        self.chains = TwoBone::of(&self.body);
+    }
+
+    /// Looks at every arm and leg; where the frame speaks against it, tries others.
+    pub(super) fn try_hypotheses(&mut self, frame: &Frame, pace: f64) -> usize {
+        let mut work = std::mem::take(&mut self.hypotheses);
+        let mut steps = 0;
+        for index in 0..self.chains.len() {
+            self.collect_open(&mut work);
+            steps += self.try_chain(index, frame, pace, &mut work);
+        }
+        self.hypotheses = work;
+        steps
+    }
+
+    /// Candidates that the current matches leave unexplained.
+    fn collect_open(&self, work: &mut Hypotheses) {
+        work.open.clear();
+        work.open_weight.clear();
+        work.best.clear();
+        work.best.resize(self.candidates.len(), f32::INFINITY);
+        for matches in &self.correspondences.limbs {
+            for (candidate, distance) in matches.candidate.iter().zip(&matches.surface.signed_distance) {
+                let best = &mut work.best[*candidate as usize];
+                // A refused match (a cap inside the body) still explains its point.
+                *best = best.min(distance.abs());
+            }
+        }
+        for (index, distance) in work.best.iter().enumerate() {
+            if f64::from(*distance) > EXPLAINED {
+                let points = &self.candidates.points;
+                work.open.push([points.x[index], points.y[index], points.z[index]]);
+                work.open_weight.push(f64::from(self.candidates.weight[index]));
+            }
+        }
+    }
+
+    fn try_chain(&mut self, index: usize, frame: &Frame, pace: f64, work: &mut Hypotheses) -> usize {
+        let chain = &self.chains[index];
+        let root = chain.root(&self.body, &self.poses);
+        let reach = 1.15 * chain.reach();
+        work.near.clear();
+        work.near_weight.clear();
+        for index in 0..work.open.len() {
+            let point = work.open.get(index);
+            if (point - root).length() < reach {
+                work.near.push(point.to_array().map(|value| value as f32));
+                work.near_weight.push(work.open_weight[index]);
+            }
+        }
+        let open_count = work.near.len();
+        let open: f64 = work.near_weight.iter().sum();
+        let witness = Witness::new(frame, &self.backgrounds, self.origin);
+        let look = |poses: &[Pose]| {
+            let mut sum = Visibility::default();
+            chain.limbs().for_each(|limb| sum += witness.look(&self.body.limbs()[limb], &poses[limb]));
+            sum
+        };
+        let now = look(&self.poses);
+        // A limb that is seen where it is needs no other place, whatever lies near it unexplained.
+        let lost = now.seen < SUPPORTED * now.facing.max(1.0);
+        let contradicted = now.contradicted > CONTRADICTED * now.facing.max(1.0);
+        if open < SUSPICIOUS || !(lost || contradicted) {
+            return 0;
+        }
+        // The points the chain explains now must stay explained.
+        for limb in chain.limbs() {
+            let matches = &self.correspondences.limbs[limb];
+            for (index, weight) in matches.weight.iter().enumerate() {
+                if *weight > 0.0 {
+                    let point = matches.measured.get(index);
+                    work.near.push(point.to_array().map(|value| value as f32));
+                    work.near_weight.push(f64::from(*weight));
+                }
+            }
+        }
+        let targets = targets(&work.near, open_count, root);
+        thin(&mut work.near, &mut work.near_weight, SAMPLE);
+        // What the other limbs explain anyway is no merit of this one.
+        work.others.clear();
+        work.others.resize(work.near.len(), f32::INFINITY);
+        for limb in (0..self.poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
+            self.body.limbs()[limb].shape.closest_points(&self.poses[limb], &work.near, &mut work.surface);
+            for (least, distance) in work.others.iter_mut().zip(&work.surface.signed_distance) {
+                *least = least.min(distance.abs());
+            }
+        }
+        let others = std::mem::take(&mut work.others);
+        let score =
+            |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, surface: &mut SurfaceBatch| {
+                best.clone_from(&others);
+                for limb in chain.limbs() {
+                    self.body.limbs()[limb].shape.closest_points(&poses[limb], near, surface);
+                    for (best, distance) in best.iter_mut().zip(&surface.signed_distance) {
+                        *best = best.min(distance.abs());
+                    }
+                }
+                let points: f64 =
+                    best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / EXPLAINED).powi(2).min(1.0)).sum();
+                points + look(poses).cost() + self.strain(chain, poses)
+            };
+        let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
+        let mut least = current - GAIN;
+        let mut found = false;
+        for target in targets.into_iter().flatten() {
+            for swivel in 0..TwoBone::swivels() {
+                work.trial.clone_from(&self.poses);
+                chain.point_at(&self.body, &mut work.trial, target, swivel);
+                let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
+                if cost < least {
+                    least = cost;
+                    found = true;
+                    work.kept.clone_from(&work.trial);
+                }
+            }
+        }
+        if self.previous.len() == self.poses.len() {
+            // Where the chain was a frame ago, carried by its parent.
+            work.trial.clone_from(&self.poses);
+            carry(chain, &self.body, &self.previous, &mut work.trial);
+            let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
+            if cost < least {
+                found = true;
+                work.kept.clone_from(&work.trial);
+            }
+        }
+        work.others = others;
+        if !found {
+            return 0;
+        }
+        self.refine(frame, pace, work)
+    }
+
+    /// Refines the kept hypothesis with the whole body and takes it when it explains the frame better as a whole.
+    fn refine(&mut self, frame: &Frame, pace: f64, work: &mut Hypotheses) -> usize {
+        let before = self.overall_score(frame);
+        work.trial.clone_from(&self.poses);
+        self.poses.clone_from(&work.kept);
+        // The prediction spoke for the old configuration; the new one is what is expected now.
+        work.kept_predicted.clone_from(&self.predicted);
+        self.predicted.clone_from(&work.kept);
+        let last = self.config.max_steps;
+        for step in 0..REFINE {
+            self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
+        }
+        self.match_all(frame, last);
+        if self.overall_score(frame) < before - GAIN {
+            return REFINE;
+        }
+        self.poses.clone_from(&work.trial);
+        self.predicted.clone_from(&work.kept_predicted);
+        self.match_all(frame, last);
+        REFINE
+    }
+
+    fn overall_score(&self, frame: &Frame) -> f64 {
+        let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+        let witness = Witness::new(frame, &self.backgrounds, self.origin);
+        let limbs = self.body.limbs().iter().zip(&self.poses);
+        let seen: f64 = limbs.map(|(limb, pose)| witness.look(limb, pose).cost()).sum();
+        let strain: f64 = self.chains.iter().map(|chain| self.strain(chain, &self.poses)).sum();
+        unexplained(&self.correspondences, total) + seen + strain
+    }
+
+    /// Cost of broken joint limits and of motion since the last frame, in unexplained patches.
+    fn strain(&self, chain: &TwoBone, poses: &[Pose]) -> f64 {
+        let mut cost = 0.0;
+        for limb in [chain.upper, chain.lower] {
+            let Some((parent, joint)) = &self.body.limbs()[limb].parent else { continue };
+            let turn = joint_turn(joint, &poses[*parent], &poses[limb]);
+            if let Some(limits) = &joint.limits {
+                let v = turn.to_scaled_axis_shortest();
+                for (axis, [low, high]) in limits.iter().enumerate() {
+                    let excess = (low - v[axis]).max(v[axis] - high).max(0.0) / LIMIT_STRAIN;
+                    cost += excess * excess;
+                }
+            }
+            if self.previous.len() == poses.len() {
+                let before = joint_turn(joint, &self.previous[*parent], &self.previous[limb]);
+                let moved = (turn * before.inverse()).to_scaled_axis_shortest().length() / MOTION_STRAIN;
+                cost += moved * moved;
+            }
+        }
+        cost
+    }
+}
+
+/// The chain's relative pose of another time on the parent of now.
+fn carry(chain: &TwoBone, body: &crate::body::Body, then: &[Pose], now: &mut [Pose]) {
+    for limb in chain.limbs() {
+        if let Some((parent, _)) = &body.limbs()[limb].parent {
+            now[limb] = now[*parent] * then[*parent].inverse() * then[limb];
+        }
+    }
+}
+
+/// Where the end of the chain may be: the farthest open point from its root, the middle of the far half, the middle of all.
+fn targets(points: &Points, count: usize, root: Vec3) -> [Option<Vec3>; 3] {
+    let distance = |index: usize| (points.get(index) - root).length();
+    let Some(farthest) = (0..count).max_by(|a, b| distance(*a).total_cmp(&distance(*b))) else { return [None; 3] };
+    let most = distance(farthest);
+    let mean = |least: f64| {
+        let (mut sum, mut number) = (Vec3::ZERO, 0.0);
+        for index in (0..count).filter(|index| distance(*index) >= least) {
+            sum += points.get(index);
+            number += 1.0;
+        }
+        (number > 0.0).then(|| sum / number)
+    };
+    [mean(0.93 * most), mean(0.7 * most), mean(0.0)]
+}
+
+/// Keeps about `most` of the points, evenly, and their total weight.
+fn thin(points: &mut Points, weights: &mut Vec<f64>, most: usize) {
+    let count = points.len();
+    if count <= most {
+        return;
+    }
+    let scale = count as f64 / most as f64;
+    for kept in 0..most {
+        let from = (kept as f64 * scale) as usize;
+        let point = points.get(from).to_array().map(|value| value as f32);
+        points.set(kept, point);
+        weights[kept] = weights[from] * scale;
+    }
+    points.x.truncate(most);
+    points.y.truncate(most);
+    points.z.truncate(most);
+    weights.truncate(most);
+}

@@ -1,0 +1,98 @@
+//! No heap allocation in a step after warm-up, counted.
+#![allow(missing_docs, unsafe_code, clippy::unwrap_used, reason = "an allocator is unsafe by nature; a test may stop")]
+
+mod scene;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use voodoo_core::body::HumanModel;
+use voodoo_core::frame::{Frame, PositionRelation, RayRelation};
+use voodoo_core::geometry::Vec3;
+use voodoo_core::{Body, Config, Tracker};
+
+struct Counting;
+
+static COUNT: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is handed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `alloc`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the pointer came from `alloc` above, hence from the system's allocator.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: as above.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const WARM_UP: usize = 12;
+const COUNTED: usize = 60;
+
+/// Allocations inside `step` in the frames after the warm-up.
+fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let camera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };
+    let wrist = body.site_index("l_wrist").unwrap();
+    let knee = body.site_index("r_knee").unwrap();
+    let mut tracker = Tracker::new(body.clone(), config).unwrap();
+    let estimate = tracker.reset_pose(&scene::standing(&body)).unwrap();
+    let positions = [PositionRelation { site: wrist, position: estimate.sites[wrist], weight: 20.0, source: 1 }];
+    let rays = [RayRelation {
+        site: knee,
+        origin: Vec3::Z,
+        direction: estimate.sites[knee] - Vec3::Z,
+        weight: 20.0,
+        source: 2,
+    }];
+    let mut count = 0;
+    for index in 0..WARM_UP + COUNTED {
+        let (pixels, points) = &frames[index % frames.len()];
+        let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);
+        let frame = Frame {
+            clouds: &clouds,
+            images: &images,
+            positions: &positions,
+            rays: &rays,
+            ..Frame::empty(index as f64)
+        };
+        let before = COUNT.load(Ordering::Relaxed);
+        tracker.step(&frame).unwrap();
+        if index >= WARM_UP {
+            count += COUNT.load(Ordering::Relaxed) - before;
+        }
+    }
+    count
+}
+
+/// One test only: the counter is global, another test in this process would be counted, too.
+#[test]
+fn a_warm_step_allocates_nothing() {
+    let before = COUNT.load(Ordering::Relaxed);
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(100)));
+    assert!(COUNT.load(Ordering::Relaxed) > before, "the counter counts nothing");
+
+    let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);
+    // To and fro, so that the frames after the warm-up need no more memory than those before.
+    frames.extend(frames.clone().into_iter().rev());
+    for config in scene::every_solver() {
+        assert_eq!(allocations(config.clone(), &frames), 0, "{config:?}");
+        // The step itself allocates nothing here either; the queue through which rayon hands work to its threads takes a
+        // new block for every 63 jobs, and a frame hands over at most one job an ICP step and one more.
+        let jobs = COUNTED * (config.max_steps + 1);
+        let many = allocations(Config { threads: 2, ..config.clone() }, &frames);
+        assert!(many <= jobs / 63 + 1, "{many} allocations in {COUNTED} frames, {config:?}");
+    }
+}

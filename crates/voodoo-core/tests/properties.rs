@@ -1,0 +1,249 @@
+//! What must hold for any pose, shift, weight: the step as K06 IV-B says, and the changes of the body.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod scene;
+
+use proptest::prelude::*;
+use voodoo_core::body::{HumanModel, Joint};
+use voodoo_core::config::SolverKind;
+use voodoo_core::frame::{Cloud, Frame, PositionRelation, RayRelation, Scope};
+use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::{Body, Config, Status, TaperedEllipticCylinder, Tracker};
+
+fn human() -> Body {
+    Body::human(1.75, HumanModel::Papers).unwrap()
+}
+
+/// The published solver with steps enough to settle and no sampling.
+fn settled() -> Config {
+    let solver = SolverKind::Limbwise;
+    Config { solver, max_steps: 60, min_change: 0.0, max_limb_points: 100_000, ..Config::default() }
+}
+
+fn tracker(config: Config, poses: &[Pose]) -> Tracker {
+    let mut tracker = Tracker::new(human(), config).unwrap();
+    tracker.reset_pose(poses).unwrap();
+    tracker
+}
+
+fn moved(poses: &[Pose], motion: &Pose) -> Vec<Pose> {
+    poses.iter().map(|pose| *motion * *pose).collect()
+}
+
+/// A motion of the standing person about its own place: up to `turn` radians and `shift` metres.
+fn small_motion(turn: f64, shift: f64) -> impl Strategy<Value = Pose> {
+    (any::<u64>()).prop_map(move |seed| {
+        let mut noise = scene::Noise(seed);
+        let centre = scene::standing(&human())[0].translation;
+        let rotation = Quat::from_scaled_axis(noise.vector(turn));
+        Pose::from_parts(centre - rotation * centre + noise.vector(shift), rotation)
+    })
+}
+
+fn largest_distance(first: &[Vec3], second: &[Vec3]) -> f64 {
+    assert_eq!(first.len(), second.len());
+    first.iter().zip(second).map(|(first, second)| (*first - *second).length()).fold(0.0, f64::max)
+}
+
+fn sites(body: &Body, poses: &[Pose]) -> Vec<Vec3> {
+    (0..body.sites().len()).map(|site| body.site_position(poses, site)).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 16, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_fit_reproduces_positions_and_sizes(seed: u64, stature in 1.2..2.1_f64) {
+        let mut noise = scene::Noise(seed);
+        let truth = Body::human(stature, HumanModel::Papers).unwrap();
+        let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
+        let poses = scene::bent(&truth, root, 0.5, &mut noise);
+        let wanted = sites(&truth, &poses);
+        let named: Vec<(usize, Vec3)> = wanted.iter().copied().enumerate().collect();
+        let (body, found) = human().fit(&named, true).unwrap();
+        prop_assert!(largest_distance(&sites(&body, &found), &wanted) < 1e-6);
+        for (limb, original) in body.limbs().iter().zip(truth.limbs()) {
+            prop_assert!((limb.shape.length() - original.shape.length()).abs() < 1e-6, "length of {}", limb.name);
+        }
+    }
+
+    #[test]
+    fn a_single_ray_draws_its_site_onto_itself(offset in [-0.06..0.06_f64, -0.06..0.06, -0.06..0.06], from: u64) {
+        let poses = scene::standing(&human());
+        let site = human().site_index("l_wrist").unwrap();
+        let target = human().site_position(&poses, site) + Vec3::from_array(offset);
+        let origin = target + 2.0 * Vec3::new(-1.0, scene::Noise(from).uniform() - 0.5, 0.3);
+        let direction = 3.0 * (target - origin);
+        let ray = [RayRelation { site, origin, direction, weight: 1.0, source: 0 }];
+        let mut tracker = tracker(settled(), &poses);
+        for stamp in 0..10 {
+            tracker.step(&Frame { rays: &ray, ..Frame::empty(f64::from(stamp)) }).unwrap();
+        }
+        let found = tracker.estimate().sites[site] - origin;
+        prop_assert!(found.reject_from(direction).length() < 1e-3, "{} m off", found.reject_from(direction).length());
+        prop_assert!(found.dot(direction) > 0.0);
+    }
+
+    #[test]
+    fn a_single_position_draws_its_site_to_itself(offset in [-0.08..0.08_f64, -0.08..0.08, -0.08..0.08]) {
+        let poses = scene::standing(&human());
+        let site = human().site_index("r_ankle").unwrap();
+        let position = human().site_position(&poses, site) + Vec3::from_array(offset);
+        let relation = [PositionRelation { site, position, weight: 1.0, source: 0 }];
+        let mut tracker = tracker(settled(), &poses);
+        for stamp in 0..10 {
+            tracker.step(&Frame { positions: &relation, ..Frame::empty(f64::from(stamp)) }).unwrap();
+        }
+        prop_assert!((tracker.estimate().sites[site] - position).length() < 1e-3);
+        prop_assert!(tracker.estimate().joint_gaps.iter().all(|gap| *gap < 2e-3));
+    }
+
+    #[test]
+    fn a_ray_gives_no_pull_along_itself(along in -1.5..1.5_f64) {
+        let poses = scene::standing(&human());
+        let site = human().site_index("l_wrist").unwrap();
+        let target = human().site_position(&poses, site);
+        let direction = Vec3::new(1.0, 0.2, -0.1);
+        // Where on the line the ray starts does not matter, as long as the site is before it.
+        let ray = [RayRelation { site, origin: target - direction * (2.0 + along), direction, weight: 5.0, source: 0 }];
+        let mut tracker = tracker(settled(), &poses);
+        tracker.step(&Frame { rays: &ray, ..Frame::empty(0.0) }).unwrap();
+        prop_assert!(largest_distance(&tracker.estimate().sites, &sites(&human(), &poses)) < 1e-6);
+    }
+
+    #[test]
+    fn limbs_without_data_are_carried_by_their_bands(seed: u64, motion in small_motion(0.08, 0.03)) {
+        let before = scene::standing(&human());
+        let after = moved(&before, &motion);
+        let mut noise = scene::Noise(seed);
+        let (forearm, calf) = (human().limb_index("l_forearm").unwrap(), human().limb_index("r_calf").unwrap());
+        // Every point is known to be on its limb; two limbs have none.
+        let points = scene::surface_points(&human(), &after, 900, 0.005, &mut noise);
+        let mut by_limb = vec![Vec::new(); 10];
+        for point in points {
+            let distance = |limb: &usize| {
+                let local = after[*limb].inverse_transform_point(Vec3::from_array(point));
+                human().limbs()[*limb].shape.closest_point(local).signed_distance.abs()
+            };
+            let nearest = (0..10).min_by(|first, second| distance(first).total_cmp(&distance(second))).unwrap();
+            by_limb[nearest].push(point);
+        }
+        by_limb[forearm].clear();
+        by_limb[calf].clear();
+        let on_limb = |limb: usize| Cloud { scope: Scope::Limb(limb), ..scene::cloud(&by_limb[limb]) };
+        let mut clouds: Vec<Cloud> = (0..10).map(on_limb).collect();
+        let lonely = [(after[forearm] * Vec3::new(0.03, 0.0, 0.1)).to_array()];
+        for count in [0, 1] {
+            clouds[forearm] = Cloud { scope: Scope::Limb(forearm), ..scene::cloud(&lonely[..count]) };
+            let mut tracker = tracker(settled(), &before);
+            for stamp in 0..3 {
+                tracker.step(&scene::with_cloud(f64::from(stamp), &clouds)).unwrap();
+            }
+            let estimate = tracker.estimate();
+            prop_assert_eq!([estimate.limb_points[forearm], estimate.limb_points[calf]], [count, 0]);
+            for limb in [forearm, calf] {
+                prop_assert!(estimate.joint_gaps[limb] < 0.01, "gap {} m", estimate.joint_gaps[limb]);
+                let turned = estimate.world_from_limb[limb].rotation.angle_between(after[limb].rotation);
+                prop_assert!(turned < [0.7, 1.2][count], "{} turned by {turned} rad with {count} points", human().limbs()[limb].name);
+            }
+            let off = largest_distance(&estimate.sites, &sites(&human(), &after));
+            prop_assert!(off < 0.2, "a site is {off} m off");
+        }
+    }
+
+    #[test]
+    fn only_the_proportions_of_weights_matter(seed: u64, factor in 0.01..1000.0_f64, motion in small_motion(0.05, 0.03)) {
+        let before = scene::standing(&human());
+        let points = scene::surface_points(&human(), &moved(&before, &motion), 600, 0.005, &mut scene::Noise(seed));
+        let site = human().site_index("l_wrist").unwrap();
+        let run = |factor: f64| {
+            let cloud = [Cloud { weight: factor, ..scene::cloud(&points) }];
+            let position = sites(&human(), &before)[site] + Vec3::Y * 0.02;
+            let positions = [PositionRelation { site, position, weight: 20.0 * factor, source: 1 }];
+            let mut tracker = tracker(Config { max_steps: 6, ..settled() }, &before);
+            tracker.step(&Frame { clouds: &cloud, positions: &positions, ..Frame::empty(0.0) }).unwrap().sites.clone()
+        };
+        prop_assert!(largest_distance(&run(1.0), &run(factor)) < 1e-5);
+    }
+
+    #[test]
+    fn a_weight_is_a_multiplicity(seed: u64, times in 2..6_usize, motion in small_motion(0.05, 0.03)) {
+        let before = scene::standing(&human());
+        let points = scene::surface_points(&human(), &moved(&before, &motion), 300, 0.005, &mut scene::Noise(seed));
+        let (heavy, light) = points.split_at(100);
+        let run = |clouds: &[Cloud]| {
+            let mut tracker = tracker(Config { max_steps: 6, ..settled() }, &before);
+            tracker.step(&scene::with_cloud(0.0, clouds)).unwrap().sites.clone()
+        };
+        let repeated = heavy.repeat(times);
+        let weighted = Cloud { weight: times as f64, ..scene::cloud(heavy) };
+        let difference = largest_distance(
+            &run(&[scene::cloud(&repeated), scene::cloud(light)]),
+            &run(&[weighted, scene::cloud(light)]),
+        );
+        prop_assert!(difference < 1e-5, "{difference} m");
+    }
+
+    #[test]
+    fn the_place_in_the_world_does_not_matter(seed: u64, motion in small_motion(0.05, 0.02)) {
+        let mut noise = scene::Noise(seed);
+        let before = scene::standing(&human());
+        let points = scene::surface_points(&human(), &moved(&before, &motion), 600, 0.005, &mut noise);
+        let other_from_world = Pose::from_parts(noise.vector(4.0), Quat::from_scaled_axis(noise.vector(2.5)));
+        let run = |other: Pose| {
+            // Known to be on the body: the box of the whole body lies along the axes of the world.
+            let clouds = [Cloud { scope: Scope::Body, world_from_sensor: other, ..scene::cloud(&points) }];
+            let mut tracker = tracker(Config { max_steps: 6, ..settled() }, &moved(&before, &other));
+            let estimate = tracker.step(&scene::with_cloud(0.0, &clouds)).unwrap();
+            estimate.sites.iter().map(|site| other.inverse_transform_point(*site)).collect::<Vec<_>>()
+        };
+        let difference = largest_distance(&run(Pose::identity()), &run(other_from_world));
+        prop_assert!(difference < 1e-3, "{difference} m");
+    }
+
+    #[test]
+    fn changes_of_the_body_keep_the_track(seed: u64, factor in 0.93..1.07_f64) {
+        let mut noise = scene::Noise(seed);
+        let before = scene::standing(&human());
+        let points = scene::surface_points(&human(), &before, 1000, 0.005, &mut noise);
+        let clouds = [scene::cloud(&points)];
+        let mut tracker = tracker(Config { solver: SolverKind::Limbwise, ..Config::default() }, &before);
+        let mut stamp = 0.0;
+        let mut follow = |tracker: &mut Tracker| {
+            let gaps = &tracker.estimate().joint_gaps;
+            assert!(gaps.iter().all(|gap| *gap < 1e-9), "a change opened a joint: {gaps:?}");
+            assert_eq!(tracker.estimate().status, Status::Tracking);
+            stamp += 1.0;
+            let estimate = tracker.step(&scene::with_cloud(stamp, &clouds)).unwrap();
+            assert_eq!((estimate.status, estimate.stamp), (Status::Tracking, stamp));
+            largest_distance(&estimate.sites[..5], &sites(&human(), &before)[..5])
+        };
+        tracker.scale(factor).unwrap();
+        prop_assert!(follow(&mut tracker) < 0.1);
+        tracker.scale(1.0 / factor).unwrap();
+        let forearm = human().limbs()[3].shape;
+        tracker.set_shape("l_forearm", forearm.scaled(factor).unwrap()).unwrap();
+        prop_assert!(follow(&mut tracker) < 0.05);
+        let held = TaperedEllipticCylinder::new(0.2, 0.1, 0.1, 0.1, 0.1).unwrap();
+        let joint = Joint {
+            name: "grip".into(),
+            parent_from_joint: Pose::from_parts(Vec3::Z * forearm.length(), Quat::IDENTITY),
+            limb_from_joint: Pose::identity(),
+            semi_axes: [0.05, 0.05],
+            weight: 1.0,
+            limits: None,
+            motion: 0.3,
+        };
+        tracker.add_limb("box", "l_forearm", held, joint, vec![("box_end".into(), Vec3::Z * 0.2)]).unwrap();
+        let end = tracker.body().site_index("box_end").unwrap();
+        let (hand, top) = (tracker.estimate().world_from_limb[3], tracker.estimate().sites[end]);
+        prop_assert!((top - hand * Vec3::new(0.0, 0.0, forearm.length() + 0.2)).length() < 1e-9);
+        prop_assert!(follow(&mut tracker) < 0.05);
+        tracker.remove_limb("box").unwrap();
+        prop_assert!(tracker.body().site_index("box_end").is_err());
+        prop_assert!(follow(&mut tracker) < 0.05);
+        tracker.remove_limb("r_thigh").unwrap();
+        prop_assert_eq!(tracker.body().limbs().len(), 8);
+        prop_assert!(follow(&mut tracker) < 0.05);
+    }
+}

@@ -1,0 +1,257 @@
+//! What is refused, and that a refusal leaves no trace.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod scene;
+
+use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
+use voodoo_core::config::{RawValue, Value};
+use voodoo_core::frame::{
+    Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
+};
+use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::{Body, BodyError, Config, ConfigError, TaperedEllipticCylinder, TrackError, Tracker};
+
+fn started() -> (Tracker, Vec<[f64; 3]>) {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    tracker.reset_pose(&scene::standing(&body)).unwrap();
+    (tracker, scene::surface_points(&body, &scene::standing(&body), 400, 0.01, &mut scene::Noise(1)))
+}
+
+/// Refuses `bad` after one good frame, naming `what`, and goes on as if it had never come.
+#[track_caller]
+fn refused(bad: &Frame, what: &str) {
+    let ((mut seen, points), (mut spared, _)) = (started(), started());
+    let clouds = [scene::cloud(&points)];
+    for tracker in [&mut seen, &mut spared] {
+        tracker.step(&scene::with_cloud(1.0, &clouds)).unwrap();
+    }
+    let before = scene::bits(seen.estimate());
+    let error = seen.step(bad).unwrap_err();
+    assert!(error.to_string().contains(what), "expected {what:?} in {error}");
+    assert_eq!(scene::bits(seen.estimate()), before, "the refusal changed the estimate");
+    for stamp in [2.0, 3.0] {
+        let frame = scene::with_cloud(stamp, &clouds);
+        let (seen, spared) = (seen.step(&frame).unwrap(), spared.step(&frame).unwrap());
+        assert_eq!(scene::bits(seen), scene::bits(spared), "the refusal left a trace");
+    }
+}
+
+#[test]
+fn bad_stamps_are_refused() {
+    refused(&Frame::empty(f64::NAN), "stamp");
+    refused(&Frame::empty(f64::INFINITY), "stamp");
+    refused(&Frame::empty(1.0), "after 1 s");
+    refused(&Frame::empty(0.5), "found 0.5 s");
+}
+
+#[test]
+fn bad_clouds_are_refused() {
+    let good = [[2.4, 0.0, 1.0]; 5];
+    let base = scene::cloud(&good);
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut points = good;
+        points[3][1] = value;
+        refused(&scene::with_cloud(2.0, &[base, scene::cloud(&points)]), "points[1].points");
+        let single = points.map(|point| point.map(|value| value as f32));
+        refused(&scene::with_cloud(2.0, &[Cloud { points: PointSlice::F32(&single), ..base }]), "row 3");
+    }
+    for weight in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        refused(&scene::with_cloud(2.0, &[Cloud { weight, ..base }]), "points[0].weight");
+    }
+    for world_from_sensor in [
+        Pose::from_parts(Vec3::new(0.0, f64::NAN, 0.0), Quat::IDENTITY),
+        Pose::from_parts(Vec3::ZERO, Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)),
+        Pose::from_parts(Vec3::ZERO, Quat::from_xyzw(f64::NAN, 0.0, 0.0, 1.0)),
+    ] {
+        refused(&scene::with_cloud(2.0, &[Cloud { world_from_sensor, ..base }]), "points[0].world_from_sensor");
+    }
+    refused(&scene::with_cloud(2.0, &[Cloud { scope: Scope::Limb(10), ..base }]), "points[0].limb");
+}
+
+#[test]
+fn bad_images_are_refused() {
+    let pixels = [2400_u16; 12];
+    let base = DepthImage {
+        pixels: DepthPixels::U16(&pixels),
+        width: 4,
+        height: 3,
+        metres_per_unit: 0.001,
+        intrinsics: [100.0, 100.0, 1.5, 1.0],
+        rays: None,
+        world_from_sensor: scene::DepthCamera::world_from_sensor(),
+        weight: 1.0,
+        source: 0,
+    };
+    let rays = [[0.0_f32; 2]; 11];
+    for (image, what) in [
+        (DepthImage { width: 5, ..base }, "depth[0].image"),
+        (DepthImage { width: 0, height: 0, pixels: DepthPixels::U16(&[]), ..base }, "depth[0].image"),
+        (DepthImage { metres_per_unit: 0.0, ..base }, "depth[0].metres_per_unit"),
+        (DepthImage { metres_per_unit: f64::NAN, ..base }, "depth[0].metres_per_unit"),
+        (DepthImage { intrinsics: [0.0, 1.0, 1.0, 1.0], ..base }, "depth[0].camera"),
+        (DepthImage { intrinsics: [1.0, 1.0, f64::NAN, 1.0], ..base }, "depth[0].camera"),
+        (DepthImage { rays: Some(&rays), ..base }, "depth[0].rays"),
+        (DepthImage { weight: -2.0, ..base }, "depth[0].weight"),
+        (
+            DepthImage { world_from_sensor: Pose::from_parts(Vec3::NAN, Quat::IDENTITY), ..base },
+            "depth[0].world_from_sensor",
+        ),
+    ] {
+        refused(&Frame { images: &[image], ..Frame::empty(2.0) }, what);
+    }
+}
+
+#[test]
+fn bad_sites_and_floors_are_refused() {
+    let sites = Body::human(1.75, HumanModel::Papers).unwrap().sites().len();
+    let position = PositionRelation { site: 0, position: Vec3::ZERO, weight: 1.0, source: 0 };
+    for (bad, what) in [
+        (PositionRelation { site: sites, ..position }, "positions[0].site"),
+        (PositionRelation { position: Vec3::NAN, ..position }, "positions[0].position"),
+        (PositionRelation { weight: f64::NAN, ..position }, "positions[0].weight"),
+    ] {
+        refused(&Frame { positions: &[bad], ..Frame::empty(2.0) }, what);
+    }
+    let ray = RayRelation { site: 0, origin: Vec3::ZERO, direction: Vec3::X, weight: 1.0, source: 0 };
+    for (bad, what) in [
+        (RayRelation { site: sites, ..ray }, "rays[0].site"),
+        (RayRelation { origin: Vec3::INFINITY, ..ray }, "rays[0].origin"),
+        (RayRelation { direction: Vec3::ZERO, ..ray }, "rays[0].direction"),
+        (RayRelation { direction: Vec3::NAN, ..ray }, "rays[0].direction"),
+        (RayRelation { weight: 0.0, ..ray }, "rays[0].weight"),
+    ] {
+        refused(&Frame { rays: &[bad], ..Frame::empty(2.0) }, what);
+    }
+    for (normal, offset) in [(Vec3::Z * 2.0, 0.0), (Vec3::NAN, 0.0), (Vec3::Z, f64::NAN)] {
+        refused(&Frame { ground: Some(Ground { normal, offset }), ..Frame::empty(2.0) }, "ground");
+    }
+}
+
+#[test]
+fn a_tracker_without_a_pose_refuses_every_frame() {
+    let mut tracker = Tracker::new(Body::human(1.75, HumanModel::Papers).unwrap(), Config::default()).unwrap();
+    assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+}
+
+#[test]
+fn a_refused_reset_changes_nothing() {
+    let (mut tracker, points) = started();
+    tracker.step(&scene::with_cloud(1.0, &[scene::cloud(&points)])).unwrap();
+    let before = scene::bits(tracker.estimate());
+    let body = tracker.body().clone();
+    assert!(matches!(tracker.reset(&[(0, Vec3::ZERO)], true), Err(TrackError::Underdetermined(_))));
+    let line = [0, 1, 2].map(|index| (index, Vec3::Z * index as f64));
+    assert!(matches!(tracker.reset(&line, true), Err(TrackError::Underdetermined(_))));
+    assert!(tracker.reset(&[(99, Vec3::ZERO)], true).unwrap_err().to_string().contains("99"));
+    assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
+    assert!(tracker.reset_pose(&[Pose::identity()]).unwrap_err().to_string().contains("10 limbs"));
+    assert!(tracker.scale(0.0).is_err() && tracker.scale(f64::NAN).is_err());
+    assert!(tracker.remove_limb("torso").is_err() && tracker.remove_limb("tail").is_err());
+    assert_eq!(tracker.body(), &body);
+    assert_eq!(scene::bits(tracker.estimate()), before);
+}
+
+fn limb(name: &str, parent: Option<usize>) -> Limb {
+    let joint = Joint {
+        name: format!("{name}_joint"),
+        parent_from_joint: Pose::identity(),
+        limb_from_joint: Pose::identity(),
+        semi_axes: [0.0; 2],
+        weight: 1.0,
+        limits: None,
+        motion: 0.3,
+    };
+    Limb {
+        name: name.into(),
+        shape: TaperedEllipticCylinder::new(0.3, 0.05, 0.05, 0.04, 0.04).unwrap(),
+        parent: parent.map(|parent| (parent, joint)),
+        match_caps: [true; 2],
+    }
+}
+
+fn with_joint(change: impl Fn(&mut Joint)) -> Vec<Limb> {
+    let mut limbs = vec![limb("a", None), limb("b", Some(0))];
+    if let Some((_, joint)) = &mut limbs[1].parent {
+        change(joint);
+    }
+    limbs
+}
+
+#[test]
+fn bad_bodies_are_refused_by_key() {
+    let refused = |limbs: Vec<Limb>, sites: Vec<Site>, what: &str| {
+        let error = Body::new("thing", limbs, sites).unwrap_err().to_string();
+        assert!(error.contains(what), "expected {what:?} in {error}");
+    };
+    let site = |name: &str, limb, position| Site { name: name.into(), limb, position };
+    assert!(Body::new("thing", with_joint(|_| {}), vec![site("s", 1, Vec3::ZERO)]).is_ok());
+    assert_eq!(Body::new("thing", vec![], vec![]).unwrap_err(), BodyError::Empty);
+    refused(vec![limb("", None)], vec![], "a name");
+    refused(vec![limb("a", None), limb("a", Some(0))], vec![], "limbs.a");
+    refused(vec![limb("a", None), limb("b", None)], vec![], "limbs.b.parent");
+    refused(vec![limb("a", Some(0))], vec![], "limbs.a.parent");
+    refused(vec![limb("a", None), limb("b", Some(2)), limb("c", Some(0))], vec![], "limbs.b.parent");
+    refused(with_joint(|joint| joint.weight = 0.0), vec![], "limbs.b.joint.weight");
+    refused(with_joint(|joint| joint.weight = f64::NAN), vec![], "limbs.b.joint.weight");
+    refused(with_joint(|joint| joint.semi_axes[1] = -0.1), vec![], "limbs.b.joint.semi_axes");
+    refused(with_joint(|joint| joint.semi_axes[0] = f64::INFINITY), vec![], "limbs.b.joint.semi_axes");
+    refused(with_joint(|joint| joint.parent_from_joint.translation.x = f64::NAN), vec![], "parent_from_joint");
+    refused(with_joint(|joint| joint.limb_from_joint.rotation.w = 3.0), vec![], "limb_from_joint");
+    refused(with_joint(|_| {}), vec![site("s", 2, Vec3::ZERO)], "sites.s.limb");
+    refused(with_joint(|_| {}), vec![site("s", 0, Vec3::NAN)], "sites.s.position");
+    refused(with_joint(|_| {}), vec![site("s", 0, Vec3::ZERO), site("s", 1, Vec3::ZERO)], "sites.s");
+    for stature in [0.29, 3.01, f64::NAN, -1.7] {
+        assert!(Body::human(stature, HumanModel::Papers).unwrap_err().to_string().contains("stature"));
+    }
+}
+
+#[test]
+fn joints_have_the_bands_of_their_kind() {
+    for (semi_axes, kind, count) in [
+        ([0.0, 0.0], JointKind::Universal, 1),
+        ([0.02, 0.0], JointKind::Hinge, 2),
+        ([0.0, 0.02], JointKind::Hinge, 2),
+        ([0.02, 0.03], JointKind::Elliptic, 4),
+    ] {
+        let limbs = with_joint(|joint| joint.semi_axes = semi_axes);
+        let joint = &limbs[1].parent.as_ref().unwrap().1;
+        let points: Vec<Vec3> = joint.band_points().collect();
+        assert_eq!((joint.kind(), joint.band_count(), points.len()), (kind, count, count));
+        assert!(points.iter().sum::<Vec3>().length() < 1e-12, "the bands lie about the centre");
+        for point in points {
+            let (a, b) = (point.x.abs(), point.y.abs());
+            assert!([a, b] == [0.0; 2] || [a, 0.0] == [semi_axes[0], b] || [0.0, b] == [a, semi_axes[1]]);
+        }
+    }
+    let human = Body::human(1.75, HumanModel::Papers).unwrap();
+    let bands: usize = human.limbs().iter().filter_map(|limb| Some(limb.parent.as_ref()?.1.band_count())).sum();
+    assert_eq!((human.limbs().len(), bands), (10, 4 + 2 * (1 + 2 + 4 + 2)), "neck; shoulders, elbows, hips, knees");
+}
+
+#[test]
+fn configuration_entries_keep_their_ranges() {
+    for field in Config::default().fields() {
+        let mut config = Config::default();
+        let mut set = |value: RawValue| config.set(field.name, &value);
+        if let Some((low, high)) = field.range {
+            assert!(set(RawValue::Number(low)).is_ok() && set(RawValue::Number(high)).is_ok(), "{}", field.name);
+            for bad in [low - 1.0, high + 1.0, f64::NAN, f64::INFINITY] {
+                let error = set(RawValue::Number(bad)).unwrap_err();
+                assert!(matches!(&error, ConfigError::Value { key, .. } if *key == field.name), "{error}");
+            }
+        }
+        match field.default {
+            Value::Whole(_) => assert!(set(RawValue::Number(1.5)).is_err()),
+            Value::Word(word) => {
+                assert!(set(RawValue::Word("surely not".into())).is_err());
+                assert!(set(RawValue::Word(word.into())).is_ok());
+            }
+            Value::Switch(_) => assert!(set(RawValue::Number(1.0)).is_err()),
+            Value::Real(_) => assert!(set(RawValue::Word("1".into())).is_err()),
+        }
+        assert!(!field.doc.is_empty());
+    }
+    let unknown = Config::default().set("colour", &RawValue::Switch(true)).unwrap_err();
+    assert_eq!(unknown, ConfigError::UnknownKey("colour".into()));
+}

@@ -1,0 +1,62 @@
+"""Joint angles in the convention of ROS4HRI's human_description (REP-155), from the rotations of the bones."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+
+from voodoo.export.skeleton import FloatArray, Skeleton
+
+
+def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
+    """Names of the joints that the body has, and their angles (F, N) [rad].
+
+    Shoulder: R = Rz(-s y) Rx(s p) Rz(s r); hip: R = Rz(-y) Rx(s p) Ry(-r); head: R = Rx(r) Rz(y) Ry(-p), with s = 1
+    on the left, -1 on the right, R = parent_from_child. Elbow and knee: the turn about the axis -y, elbows flex to
+    positive, knees to negative angles; what is left of their rotation is not in the angle (it is in /tf). The waist
+    is 0: the torso is one limb.
+    """
+    local = posed.local()
+    index = {bone.name: number for number, bone in enumerate(posed.bones)}
+    columns: dict[str, FloatArray] = {}
+    if "torso" in index:
+        columns["waist"] = np.zeros(len(posed.stamps))
+    if "head" in index:
+        r, y, p = _euler(local[:, index["head"]], "XZY")
+        columns |= {"r_head": r, "y_head": y, "p_head": -p}
+    for side, s in (("l", 1.0), ("r", -1.0)):
+        if f"{side}_upperarm" in index:
+            a, b, c = _euler(local[:, index[f"{side}_upperarm"]], "ZXZ")
+            if s < 0.0:  # the other of the two solutions, so that abduction is positive on both sides
+                a, b, c = _wrapped(a + np.pi), -b, _wrapped(c - np.pi)
+            columns |= {f"{side}_y_shoulder": -s * a, f"{side}_p_shoulder": s * b, f"{side}_r_shoulder": s * c}
+        if f"{side}_forearm" in index:
+            columns[f"{side}_elbow"] = -_turn_about_y(local[:, index[f"{side}_forearm"]])
+        if f"{side}_thigh" in index:
+            a, b, c = _euler(local[:, index[f"{side}_thigh"]], "ZXY")
+            columns |= {f"{side}_y_hip": -a, f"{side}_p_hip": s * b, f"{side}_r_hip": -c}
+        if f"{side}_calf" in index:
+            columns[f"{side}_knee"] = -_turn_about_y(local[:, index[f"{side}_calf"]])
+    values = np.column_stack(list(columns.values())) if columns else np.empty((len(posed.stamps), 0))
+    return tuple(columns), values
+
+
+def _euler(turns: FloatArray, order: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    with warnings.catch_warnings():
+        # A hanging arm has no direction to the side; scipy then sets the third angle to zero, which is one right
+        # answer.
+        warnings.filterwarnings("ignore", message="Gimbal lock")
+        angles = Rotation.from_matrix(turns).as_euler(order)
+    return angles[:, 0], angles[:, 1], angles[:, 2]
+
+
+def _wrapped(angles: FloatArray) -> FloatArray:
+    return np.asarray((angles + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def _turn_about_y(turns: FloatArray) -> FloatArray:
+    """Angle of the twist about y in the swing-twist decomposition."""
+    quaternions = Rotation.from_matrix(turns).as_quat()
+    return _wrapped(2.0 * np.arctan2(quaternions[:, 1], quaternions[:, 3]))

@@ -1,0 +1,235 @@
+"""A ROS 2 bag (MCAP) of a track: /tf, joint states and markers, for RViz, Foxglove and a robot's own nodes.
+
+Names follow REP-155 and the human_description package of ROS4HRI: frames `body_<id>`, `torso_<id>`, `head_<id>`,
+`l_shoulder_<id>` (the upper arm), `l_elbow_<id>` (the forearm), `l_wrist_<id>`, `l_hip_<id>`, `l_knee_<id>`,
+`l_ankle_<id>` and the same for `r_`; joints `l_y_shoulder_<id>`, `l_p_shoulder_<id>`... All frames have x forward, y
+left, z up when the person stands at rest (REP-103). The parent of `body_<id>` is the recording's root frame (REP-105).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+
+from voodoo.body import Body
+from voodoo.errors import VoodooError
+from voodoo.export.joint_angles import joint_angles
+from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
+from voodoo.results import Track
+
+FRAMES = {
+    "torso": "torso", "head": "head",
+    **{f"{s}_{limb}": f"{s}_{joint}" for s in "lr" for limb, joint in
+       {"upperarm": "shoulder", "forearm": "elbow", "thigh": "hip", "calf": "knee"}.items()},
+}  # fmt: skip
+"""REP-155 frame of each limb of the default human; other limbs keep their own name."""
+
+_STORE = get_typestore(Stores.ROS2_HUMBLE)
+_CYLINDER, _SPHERES, _ADD = 1, 7, 0
+
+
+def write_bag(
+    path: str | Path, track: Track, body: Body, *, root_frame: str, person: str = "voodoo", markers: bool = True
+) -> None:
+    """Write a new bag folder.
+
+    Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
+    `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints).
+
+    Args:
+        path: the folder, which must not exist.
+        track: with limb poses.
+        body: in the sizes it was tracked with.
+        root_frame: frame of the track, e.g. "base_link".
+        person: REP-155 id.
+        markers: also write the markers.
+
+    Raises:
+        VoodooError: the folder exists, an empty name, or a track without limb poses or of another body.
+        OSError: the bag cannot be written.
+    """
+    path = Path(path)
+    if path.exists():
+        raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
+    if not root_frame or not person.isidentifier():
+        raise VoodooError(f"root_frame, person: expected names, found {root_frame!r} and {person!r}")
+    posed = skeleton(track, body)
+    names, angles = joint_angles(posed)
+    topic = f"/humans/bodies/{person}"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connect = {
+            name: writer.add_connection(name, kind, typestore=_STORE)
+            for name, kind in (
+                ("/tf", "tf2_msgs/msg/TFMessage"),
+                (f"{topic}/joint_states", "sensor_msgs/msg/JointState"),
+                (f"{topic}/markers", "visualization_msgs/msg/MarkerArray"),
+            )
+            if markers or not name.endswith("markers")
+        }
+        for index, stamp in enumerate(track.stamps):
+            nanoseconds = round(float(stamp) * 1e9)
+            header = _header(nanoseconds, root_frame)
+            messages: dict[str, Any] = {
+                "/tf": _new(
+                    "tf2_msgs/msg/TFMessage",
+                    transforms=_transforms(track, posed, index, root_frame, person, nanoseconds),
+                ),
+                f"{topic}/joint_states": _new(
+                    "sensor_msgs/msg/JointState",
+                    header=_header(nanoseconds, f"body_{person}"),
+                    name=[f"{name}_{person}" for name in names],
+                    position=angles[index],
+                    velocity=np.empty(0),
+                    effort=np.empty(0),
+                ),
+                f"{topic}/markers": _new(
+                    "visualization_msgs/msg/MarkerArray", markers=_markers(track, body, index, header)
+                ),
+            }
+            for name, connection in connect.items():
+                message = messages[name]
+                writer.write(connection, nanoseconds, _STORE.serialize_cdr(message, message.__msgtype__))
+
+
+def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[str, tuple[str | None, FloatArray]]:
+    """Frames of one instant: name -> (parent, root_from_frame (4, 4)); the parent of `body_` is None, the root
+    frame."""
+    sites = dict(zip(track.joint_names, track.joints[index], strict=True))
+    bones = posed.bones
+    limb_frames = [f"{FRAMES.get(bone.name, bone.name)}_{person}" for bone in bones]
+    body_frame = f"body_{person}"
+    trunk = posed.rotations[index, 0]
+    frames: dict[str, tuple[str | None, FloatArray]] = {
+        body_frame: (None, _pose(trunk, _middle(sites, "hip", posed.heads[index, 0])))
+    }
+    for number, bone in enumerate(bones):
+        place = posed.heads[index, number]
+        if bone.parent is None:
+            parent, place = body_frame, _middle(sites, "shoulder", place)
+        elif bone.name.endswith("_thigh"):
+            parent = body_frame  # as in human_description; the torso is rigid, so it is the same
+        else:
+            parent = limb_frames[bone.parent]
+        if bone.name == "head" and "head_center" in sites:
+            place = sites["head_center"]
+        frames[limb_frames[number]] = (parent, _pose(posed.rotations[index, number], place))
+        for limb, site in (("_forearm", "_wrist"), ("_calf", "_ankle")):
+            name = bone.name.removesuffix(limb) + site
+            if bone.name.endswith(limb) and name in sites:
+                frames[f"{name}_{person}"] = (limb_frames[number], _pose(posed.rotations[index, number], sites[name]))
+    return frames
+
+
+def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, person: str, nanoseconds: int) -> list[Any]:
+    frames = frame_poses(track, posed, index, person)
+    result = []
+    for name, (parent, pose) in frames.items():
+        relative = pose if parent is None else np.linalg.inv(frames[parent][1]) @ pose
+        x, y, z = (float(value) for value in relative[:3, 3])
+        qx, qy, qz, qw = (float(value) for value in Rotation.from_matrix(relative[:3, :3]).as_quat())
+        result.append(
+            _new(
+                "geometry_msgs/msg/TransformStamped",
+                header=_header(nanoseconds, parent or root_frame),
+                child_frame_id=name,
+                transform=_new(
+                    "geometry_msgs/msg/Transform",
+                    translation=_new("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
+                    rotation=_new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+                ),
+            )
+        )
+    return result
+
+
+def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
+    result = []
+    for number, (limb, pose) in enumerate(zip(body.limbs, track.world_from_limb[index], strict=True)):
+        middle = pose[:3, :3] @ np.array([0.0, 0.0, limb.shape.length / 2]) + pose[:3, 3]
+        size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
+        rgb = (0.9, 0.6, 0.3) if limb.name.startswith("l_") else (0.3, 0.6, 0.9)
+        turn = Rotation.from_matrix(pose[:3, :3]).as_quat()
+        result.append(_marker(header, "limbs", number, _CYLINDER, middle, turn, size, rgb, []))
+    points = [_point(position) for position in track.joints[index]]
+    still = np.array([0.0, 0.0, 0.0, 1.0])
+    result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
+    return result
+
+
+def _marker(
+    header: Any,  # noqa: ANN401
+    namespace: str,
+    number: int,
+    kind: int,
+    place: FloatArray,
+    turn: FloatArray,
+    size: tuple[float, float, float],
+    rgb: tuple[float, float, float],
+    points: list[Any],
+) -> Any:  # noqa: ANN401
+    x, y, z, w = (float(value) for value in turn)
+    no_image = _new(
+        "sensor_msgs/msg/CompressedImage", header=_header(0, ""), format="", data=np.empty(0, dtype=np.uint8)
+    )
+    return _new(
+        "visualization_msgs/msg/Marker",
+        header=header,
+        ns=namespace,
+        id=number,
+        type=kind,
+        action=_ADD,
+        pose=_new(
+            "geometry_msgs/msg/Pose",
+            position=_point(place),
+            orientation=_new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
+        ),
+        scale=_new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
+        color=_new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=0.6),
+        lifetime=_new("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
+        frame_locked=False,
+        points=points,
+        colors=[],
+        texture_resource="",
+        texture=no_image,
+        uv_coordinates=[],
+        text="",
+        mesh_resource="",
+        mesh_file=_new("visualization_msgs/msg/MeshFile", filename="", data=np.empty(0, dtype=np.uint8)),
+        mesh_use_embedded_materials=False,
+    )
+
+
+def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
+    return _STORE.types[kind](**fields)
+
+
+def _header(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
+    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+    return _new(
+        "std_msgs/msg/Header",
+        stamp=_new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest),
+        frame_id=frame,
+    )
+
+
+def _point(position: FloatArray) -> Any:  # noqa: ANN401
+    x, y, z = (float(value) for value in position)
+    return _new("geometry_msgs/msg/Point", x=x, y=y, z=z)
+
+
+def _pose(turn: FloatArray, place: FloatArray) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, place
+    return pose
+
+
+def _middle(sites: dict[str, FloatArray], joint: str, otherwise: FloatArray) -> FloatArray:
+    both = [sites.get(f"{side}_{joint}") for side in "lr"]
+    if both[0] is None or both[1] is None:
+        return otherwise
+    return np.asarray((both[0] + both[1]) / 2.0)

@@ -1,0 +1,125 @@
+"""A track as a skeleton whose bones all point the same way when the body stands at rest.
+
+Limb frames have z along the limb. Animation formats and robot descriptions want frames that agree at rest: x forward,
+y to the left, z up (REP-103). Their orientation is `world_from_limb` times the inverse of the limb's orientation at
+rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+
+from voodoo.body import Body
+from voodoo.errors import VoodooError
+from voodoo.results import Track
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Bone:
+    """One limb at rest, in the standing frame (x forward, y left, z up, origin at the root limb's frame).
+
+    Args:
+        name: of the limb.
+        parent: index of the parent bone, None for the root.
+        joint: name of the joint to the parent, or of the limb for the root.
+        head: (3,) where it is joined to its parent [m]; the origin of the limb's frame for the root.
+        tip: (3,) middle of its distal end [m].
+        rest: (3, 3) standing_from_limb orientation.
+        head_in_limb: (3,) the same place as `head` in the limb's frame [m].
+    """
+
+    name: str
+    parent: int | None
+    joint: str
+    head: FloatArray
+    tip: FloatArray
+    rest: FloatArray
+    head_in_limb: FloatArray
+
+
+def bones(body: Body) -> tuple[Bone, ...]:
+    """The bones of a body at rest, parents first."""
+    result: list[Bone] = []
+    poses: list[tuple[FloatArray, FloatArray]] = []
+    _, limbs, _ = body.core.parts()
+    names = [limb[0] for limb in limbs]
+    for name, parent, shape, joint, _ in limbs:
+        if parent is None or joint is None:
+            turn, shift, place, above, joint_name = np.eye(3), np.zeros(3), np.zeros(3), None, name
+        else:
+            above = names.index(parent)
+            joint_name, on_parent, on_limb = joint[:3]
+            parent_turn, parent_shift = poses[above]
+            parent_from_joint = Rotation.from_rotvec(on_parent[1]).as_matrix()
+            limb_from_joint = Rotation.from_rotvec(on_limb[1]).as_matrix()
+            turn = parent_turn @ parent_from_joint @ limb_from_joint.T
+            place = np.asarray(on_limb[0], dtype=np.float64)
+            shift = parent_turn @ np.asarray(on_parent[0]) + parent_shift - turn @ place
+        poses.append((turn, shift))
+        head = turn @ place + shift
+        tip = turn @ np.array([0.0, 0.0, shape.length]) + shift
+        result.append(Bone(name, above, joint_name, head, tip, turn, place))
+    return tuple(result)
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """A track on its bones: F frames, L bones.
+
+    Args:
+        bones: the body at rest.
+        stamps: (F,) [s].
+        rotations: (F, L, 3, 3) world_from_bone: the identity when the body stands at rest and looks along x.
+        heads: (F, L, 3) where each bone is joined to its parent, on the bone's side [m].
+    """
+
+    bones: tuple[Bone, ...]
+    stamps: FloatArray
+    rotations: FloatArray
+    heads: FloatArray
+
+    def local(self) -> FloatArray:
+        """(F, L, 3, 3) rotations relative to the parent; those of the root are relative to the world."""
+        result = self.rotations.copy()
+        for index, bone in enumerate(self.bones):
+            if bone.parent is not None:
+                result[:, index] = self.rotations[:, bone.parent].transpose(0, 2, 1) @ self.rotations[:, index]
+        return result
+
+
+def skeleton(track: Track, body: Body) -> Skeleton:
+    """The track on the bones of `body`.
+
+    Raises:
+        VoodooError: the track has no limb poses (it was read from a .csv), or is of another body.
+    """
+    if track.limb_names != body.limb_names:
+        found = ", ".join(track.limb_names) or "none (a .csv has no limb poses; use .npz)"
+        raise VoodooError(f"track: expected poses of the limbs {', '.join(body.limb_names)}, found {found}")
+    parts = bones(body)
+    turn = track.world_from_limb[:, :, :3, :3]
+    rest = np.array([bone.rest for bone in parts])
+    places = np.array([bone.head_in_limb for bone in parts])
+    heads = np.einsum("flij,lj->fli", turn, places) + track.world_from_limb[:, :, :3, 3]
+    return Skeleton(parts, track.stamps, turn @ rest.transpose(0, 2, 1), heads)
+
+
+def mean_interval(stamps: FloatArray) -> float:
+    """Time between two frames [s], for formats with a constant rate; 1/30 s for a single frame.
+
+    Raises:
+        VoodooError: stamps that do not rise.
+    """
+    if len(stamps) < 2:
+        return 1.0 / 30.0
+    steps = np.diff(stamps)
+    if (steps <= 0.0).any():
+        raise VoodooError("stamps: expected rising times, found others")
+    return float(np.median(steps))

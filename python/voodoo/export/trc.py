@@ -1,0 +1,52 @@
+"""TRC, the marker format of OpenSim: named positions over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from voodoo.errors import VoodooError
+from voodoo.export.skeleton import mean_interval
+from voodoo.markers import Z_UP_FROM_Y_UP
+from voodoo.results import Track
+
+
+def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None, y_up: bool = True) -> None:
+    """Write the joints and sites of a track as markers, in metres.
+
+    Args:
+        path: .trc file.
+        track: any.
+        names: which joints and sites; None means all.
+        y_up: turn from z up (REP-103) to OpenSim's Y up: (X, Y, Z) = (y, z, x); False keeps the axes.
+
+    Raises:
+        VoodooError: a name that is not in the track, none at all, or stamps that do not rise.
+        OSError: the file cannot be written.
+    """
+    chosen = list(track.joint_names if names is None else names)
+    unknown = [name for name in chosen if name not in track.joint_names]
+    if unknown or not chosen:
+        raise VoodooError(
+            f"names: expected some of {', '.join(track.joint_names)}, found {', '.join(unknown) or 'none'}"
+        )
+    path = Path(path)
+    rate = round(1.0 / mean_interval(track.stamps), 6)
+    positions = track.joints[:, [track.joint_names.index(name) for name in chosen]]
+    if y_up:
+        positions = positions @ Z_UP_FROM_Y_UP
+    numbers = range(1, len(chosen) + 1)
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate:g}\t{rate:g}\t{len(track)}\t{len(chosen)}\tm\t{rate:g}\t1\t{len(track)}",
+        "Frame#\tTime\t" + "\t\t\t".join(chosen) + "\t\t",
+        "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in numbers),
+        "",
+    ]
+    # OpenSim starts its clock near zero; epoch seconds would lose their fraction in it.
+    for index, (stamp, row) in enumerate(zip(track.stamps - track.stamps[0], positions, strict=True), start=1):
+        lines.append(f"{index}\t{stamp:.6f}\t" + "\t".join(f"{value:.6f}" for value in np.ravel(row)))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,0 +1,155 @@
+"""Folders of Pose2Sim: 2-D keypoints of several calibrated cameras, and the triangulation to compare with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from voodoo.errors import MeasurementError, RecordingError
+from voodoo.keypoints import layout_of, read_openpose_json
+from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
+from voodoo.recordings.measurements import KeypointImage, RecordedFrame
+from voodoo.recordings.recording import (
+    Recording,
+    RecordingInfo,
+    Reference,
+    SensorInfo,
+    Start,
+    mean_rate,
+    reference_words,
+)
+from voodoo.sensors.camera_files import read_camera_toml
+
+SITES = {
+    f"{side}{joint}": f"{side.lower()}_{site}"
+    for side in "LR"
+    for joint, site in {
+        "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist", "Hip": "hip", "Knee": "knee", "Ankle": "ankle",
+    }.items()
+} | {"Neck": "skullbase", "Head": "skull_tip"}  # fmt: skip
+"""Pose2Sim's marker names for BODY_25B (its neck is the upper neck) and our sites."""
+
+FRAME = "world"
+
+
+class Pose2SimRecording(Recording):
+    """A folder of Pose2Sim::
+
+        Calib_*.toml                     cameras, see read_camera_toml; world Z up, metres
+        keypoints/cam01_json/*.json      OpenPose files, one an image, sorted by name; or pose/cam01_json as Pose2Sim
+        has it *.trc                            optional: triangulated joints, Y up
+
+    Cameras and keypoint folders belong together in the order of their names. There is one frame for each image
+    number; it holds the keypoints of all cameras. Stamps are k / rate. The reference, and the start, are the .trc
+    with the shortest name (the unfiltered one): markerless triangulation from the same keypoints, `reference.exact`
+    is False.
+
+    Args:
+        path: the folder.
+        layout: of the keypoints, see voodoo.keypoints.LAYOUTS.
+        rate: images per second.
+        cameras: names to use, as in the calibration file; None means all.
+
+    Raises:
+        RecordingError: a part is missing or not of that form.
+    """
+
+    def __init__(
+        self, path: Path, layout: str = "body25b", rate: float = 60.0, cameras: tuple[str, ...] | None = None
+    ) -> None:
+        """Read calibration, the names of the keypoint files and the reference; see the class."""
+        self.path = path
+        self.name = path.name
+        self.root_frame = FRAME
+        try:
+            layout_of(layout)
+        except MeasurementError as error:
+            raise RecordingError(f"{path}: {error}") from error
+        if not 0.0 < rate < 1e4:
+            raise RecordingError(f"{path}: rate: expected images per second > 0, found {rate!r}")
+        self.layout, self.rate = layout, rate
+        calibration = sorted(path.glob("Calib*.toml"))
+        if len(calibration) != 1:
+            raise RecordingError(f"{path}: expected one Calib*.toml, found {len(calibration)}")
+        placed = read_camera_toml(calibration[0])
+        folders = next((found for part in ("keypoints", "pose") if (found := sorted((path / part).glob("*_json")))), [])
+        if len(folders) != len(placed):
+            raise RecordingError(
+                f"{path}: expected a folder keypoints/*_json for each of {len(placed)} cameras, found {len(folders)}"
+            )
+        names = [camera.name for camera in placed]
+        unknown = sorted(set(cameras or ()) - set(names))
+        if unknown or cameras == ():
+            raise RecordingError(f"{path}: cameras: expected some of {', '.join(names)}, found {cameras}")
+        chosen = [pair for pair in zip(placed, folders, strict=True) if cameras is None or pair[0].name in cameras]
+        self.cameras = tuple(camera for camera, _ in chosen)
+        self._files = [sorted(folder.glob("*.json")) for _, folder in chosen]
+        counts = {len(files) for files in self._files}
+        if len(counts) != 1 or counts == {0}:
+            raise RecordingError(f"{path}: expected as many keypoint files for every camera, found {sorted(counts)}")
+        self.reference = self._read_reference()
+        self.start = None if self.reference is None else _start(self.reference)
+
+    def _read_reference(self) -> Reference | None:
+        files = sorted(self.path.glob("*.trc"), key=lambda file: (len(file.name), file.name))
+        if not files:
+            return None
+        markers = read_trc(files[0], world_from_file=Z_UP_FROM_Y_UP)
+        names, positions = markers.of(SITES)
+        # Rows are images; the file's own time starts at 1 / rate for image 0.
+        return Reference(np.arange(len(positions)) / self.rate, names, positions, exact=False)
+
+    def __len__(self) -> int:
+        """Number of images of each camera."""
+        return len(self._files[0])
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Keypoints of all cameras, image by image; see Recording."""
+        for index in range(len(self)):
+            stamp = index / self.rate
+            yield RecordedFrame(
+                stamp,
+                tuple(
+                    KeypointImage(
+                        sensor=placed.name,
+                        stamp=stamp,
+                        people=tuple(read_openpose_json(files[index], layout=self.layout)),
+                        layout=self.layout,
+                        camera=placed.camera,
+                        root_from_sensor=placed.world_from_sensor,
+                    )
+                    for placed, files in zip(self.cameras, self._files, strict=True)
+                ),
+            )
+
+    def info(self) -> RecordingInfo:
+        """Summarize."""
+        duration = (len(self) - 1) / self.rate
+        rate = mean_rate(len(self), duration)
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader="pose2sim",
+            frames=len(self),
+            start_stamp=0.0,
+            duration=duration,
+            rate_hz=rate,
+            root_frame=FRAME,
+            sensors=tuple(
+                SensorInfo(placed.name, "keypoints", placed.name, len(self), rate, f"{self.layout} keypoints")
+                for placed in self.cameras
+            ),
+            reference=reference_words(self.reference),
+            notes=("the reference is triangulated from the same keypoints: it tests consistency, not accuracy",),
+        )
+
+
+def _start(reference: Reference) -> Start:
+    joints = {}
+    for name, position in zip(reference.names, reference.positions[0], strict=True):
+        if np.isfinite(position).all():
+            x, y, z = (float(value) for value in position)
+            joints[name] = (x, y, z)
+    return Start(joints=joints)

@@ -1,0 +1,1 @@
+"""From what sensors deliver to the measurements of a Frame."""

@@ -1,0 +1,29 @@
+"""One-to-one assignment of unlabelled candidates to predicted sites."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
+
+from voodoo.sensors.pixels import FloatArray
+
+
+def assign(cost: FloatArray, *, gate: float) -> list[tuple[int, int]]:
+    """Pairs (site, candidate), each used once at most, that lie within the gate.
+
+    As many pairs as possible within the gate, and of those the ones with the least sum of squared distances; a
+    candidate or site without a partner stays alone.
+
+    Args:
+        cost: (S, C) distances [m]; infinite or NaN = impossible.
+        gate: [m].
+    """
+    if cost.size == 0:
+        return []
+    squared = np.where(np.isfinite(cost) & (cost <= gate), cost, np.inf) ** 2
+    # Beyond the gate a pair is as good as none; the price of none is one no sum within the gate can reach.
+    none = gate**2 * (min(cost.shape) + 1.0)
+    rows, columns = linear_sum_assignment(np.where(np.isfinite(squared), squared, none))
+    return [
+        (int(row), int(column)) for row, column in zip(rows, columns, strict=True) if np.isfinite(squared[row, column])
+    ]

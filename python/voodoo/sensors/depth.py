@@ -1,0 +1,135 @@
+"""What is dropped from a depth image before it becomes points: flying pixels at depth edges, and what is out of
+range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.camera import Camera
+from voodoo.errors import MeasurementError
+from voodoo.sensors.pixels import FloatArray, in_sensor
+
+DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class DepthFilter:
+    """Drops pixels that are not surface.
+
+    A flying pixel of a time-of-flight camera mixes the light of two surfaces and hangs between them, so it has
+    neighbours clearly nearer AND clearly farther along one of the four lines through it. A pixel of a slanted surface
+    has that too, but with equal steps: it is kept when it lies near the middle of two neighbours that are less than
+    `slant` apart. A pixel that has no neighbour at its own depth at all is a flying one as well.
+
+    Args:
+        edge: depths that differ by more than this belong to different surfaces [m], at 1 m; it grows with the depth.
+        slant: two opposite neighbours farther apart than this are two surfaces [m], at 1 m; it grows with the depth.
+        nearest, farthest: range limits along the optical axis [m] (K06 III-A: 0.5 to 7.5 m).
+
+    Raises:
+        MeasurementError: limits that leave nothing, or an edge that is not above zero.
+    """
+
+    edge: float = 0.03
+    slant: float = 0.08
+    nearest: float = 0.3
+    farthest: float = 7.5
+
+    def __post_init__(self) -> None:
+        """Check the limits."""
+        if not (0.0 <= self.nearest < self.farthest and self.edge > 0.0 and self.slant >= 2.0 * self.edge):
+            raise MeasurementError(
+                "depth filter: expected 0 <= nearest < farthest and 0 < 2 edge <= slant, found nearest "
+                f"{self.nearest!r}, farthest {self.farthest!r}, edge {self.edge!r}, slant {self.slant!r}"
+            )
+
+    def apply(self, image: DepthArray, *, metres_per_unit: float = 0.001) -> DepthArray:
+        """A copy of the image (H, W) with 0 where a pixel is dropped.
+
+        Args:
+            image: uint16 or float32; 0 and NaN mean "no return".
+            metres_per_unit: of the image.
+        """
+        kept = image.copy()
+        kept[self.dropped(image, metres_per_unit=metres_per_unit)] = 0
+        return kept
+
+    def dropped(self, image: DepthArray, *, metres_per_unit: float = 0.001) -> npt.NDArray[np.bool_]:
+        """(H, W): True for pixels that returned something that is not used.
+
+        Raises:
+            MeasurementError: not a 2-D uint16 or float32 array.
+        """
+        if image.ndim != 2 or image.dtype not in (np.uint16, np.float32):
+            raise MeasurementError(f"depth: expected (H, W) uint16 or float32, found {image.dtype} of {image.shape}")
+        z = image.astype(np.float32) * np.float32(metres_per_unit)
+        returned = np.isfinite(z) & (z > 0.0)
+        z[~returned] = 0.0
+        outside = returned & ((z < self.nearest) | (z > self.farthest))
+        return outside | (returned & self._flying(z))
+
+    def _flying(self, z: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+        height, width = z.shape
+        # One ring of "no return" around, so that the borders need no special case.
+        framed = cv2.copyMakeBorder(z, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0.0)
+        edge, slant = self.edge * np.maximum(z, 1.0), self.slant * np.maximum(z, 1.0)
+        flying = np.zeros(z.shape, dtype=np.bool_)
+        lonely = np.ones(z.shape, dtype=np.bool_)
+        for dv, du in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            before = framed[1 - dv : 1 - dv + height, 1 - du : 1 - du + width]
+            after = framed[1 + dv : 1 + dv + height, 1 + du : 1 + du + width]
+            low, high = np.minimum(before, after), np.maximum(before, after)
+            flying |= (low > 0.0) & (z - low > edge) & (high - z > edge) & (high - low > slant)
+            lonely &= (np.abs(before - z) > edge) & (np.abs(after - z) > edge)
+        return flying | lonely
+
+
+def body_mask(
+    depth: DepthArray,
+    *,
+    depth_camera: Camera,
+    world_from_depth: FloatArray,
+    metres_per_unit: float,
+    color_camera: Camera,
+    world_from_color: FloatArray,
+    joints: npt.ArrayLike,
+    margin: float = 0.30,
+    step: int = 1,
+) -> npt.NDArray[np.bool_]:
+    """Where, in a colour image, a depth camera beside it saw something within the box around the body.
+
+    Args:
+        depth: (H, W) uint16 or float32; 0 and NaN mean "no return".
+        depth_camera, world_from_depth: calibration and (4, 4) pose.
+        metres_per_unit: of `depth`.
+        color_camera, world_from_color: calibration and (4, 4) pose of the colour camera.
+        joints: (N, 3) predicted positions of the body [m].
+        margin: enlargement of their box [m].
+        step: every step-th row and column of the depth image is used.
+
+    Returns:
+        (H, W) of the colour image. The gaps between the depth pixels are closed; what no depth camera saw is False.
+    """
+    places = np.asarray(joints, dtype=np.float64)
+    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
+    z = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
+    rays = depth_camera.rays()[::step, ::step]
+    valid = np.isfinite(z) & (z > 0.0)
+    points = np.column_stack([rays[valid] * z[valid, None], z[valid]]) @ world_from_depth[:3, :3].T.astype(np.float32)
+    points = points + world_from_depth[:3, 3].astype(np.float32)
+    points = points[((points > low) & (points < high)).all(axis=1)]
+    mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
+    if not len(points):
+        return mask.astype(bool)
+    pixels = color_camera.project(in_sensor(world_from_color, points))
+    pixels = np.round(pixels[np.isfinite(pixels).all(axis=1)]).astype(np.int64)
+    inside = (pixels >= 0).all(axis=1) & (pixels < (color_camera.width, color_camera.height)).all(axis=1)
+    mask[pixels[inside, 1], pixels[inside, 0]] = 1
+    # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
+    size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
+    return np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)

@@ -1,0 +1,246 @@
+"""From recorded measurements to the tracker's Frame: prediction, gates, agreement of rays, weights from standard
+deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from voodoo._core import Estimate, Frame
+from voodoo.errors import MeasurementError
+from voodoo.keypoints import KeypointReport, KeypointSensor, nearest_person
+from voodoo.recordings import (
+    ColorImage,
+    DepthImage,
+    KeypointImage,
+    LaserScan,
+    Measurement,
+    PointCloud,
+    RecordedFrame,
+    Recording,
+)
+from voodoo.sensors.depth import DepthFilter, body_mask
+from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.model import (
+    PLANAR_LASER,
+    POINTS_SHARING,
+    TIME_OF_FLIGHT,
+    PixelNoise,
+    RangeNoise,
+    SensorModel,
+)
+from voodoo.sensors.pixels import FloatArray, in_sensor
+from voodoo.sensors.rays import SiteRay, add_rays, agreed
+from voodoo.sensors.skin import SkinSettings, SkinTracker
+from voodoo.tracker import Tracker
+
+INPUTS = ("depth", "points", "scan", "keypoints", "skin")
+"""Kinds of measurements a front end can use."""
+
+
+@dataclass(frozen=True)
+class FrontEndSettings:
+    """What is used, and how much it is believed.
+
+    Args:
+        use: kinds from INPUTS; measurements of other kinds are left out.
+        model: standard deviation to weight.
+        depth_noise: of depth images and point clouds. The weight is that at the predicted range of the body; it is
+            relative, so a point of the body at that range weighs `(reference_sigma / sigma)^2 / sharing`.
+        scan_noise: of laser scans.
+        sharing: neighbouring depth pixels that share one error.
+        scan_sharing: the same for a scan, whose beams lie farther apart.
+        keypoint_noise: of 2-D keypoints.
+        min_confidence: keypoints believed less are not used.
+        gate_radius, gate_growth, gate_widest: see SiteGate.
+        agreement: scale [m] of `agreed`; 0 switches it off.
+        depth_filter: what is dropped from depth images; None takes them as they are.
+        skin: settings of the skin-colour cue.
+        ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
+        lost_points: a forearm with fewer matched points has lost its hand.
+
+    Raises:
+        MeasurementError: an unknown kind.
+    """
+
+    use: tuple[str, ...] = INPUTS
+    model: SensorModel = field(default_factory=SensorModel)
+    depth_noise: RangeNoise = TIME_OF_FLIGHT
+    scan_noise: RangeNoise = PLANAR_LASER
+    sharing: float = POINTS_SHARING
+    scan_sharing: float = 4.0
+    keypoint_noise: PixelNoise = field(default_factory=PixelNoise)
+    min_confidence: float = 0.1
+    gate_radius: float = 0.15
+    gate_growth: float = 0.5
+    gate_widest: float = 0.40
+    agreement: float = 0.08
+    depth_filter: DepthFilter | None = field(default_factory=DepthFilter)
+    skin: SkinSettings = field(default_factory=SkinSettings)
+    ground_z: float | None = None
+    lost_points: int = 10
+
+    def __post_init__(self) -> None:
+        """Check the kinds."""
+        unknown = sorted(set(self.use) - set(INPUTS))
+        if unknown or not self.use:
+            raise MeasurementError(f"use: expected some of {', '.join(INPUTS)}, found {', '.join(unknown) or 'none'}")
+
+
+class FrontEnd:
+    """Feeds one tracker from recorded measurements of any kind.
+
+    Args:
+        tracker: already reset to the first pose.
+        settings: see FrontEndSettings.
+    """
+
+    def __init__(self, tracker: Tracker, *, settings: FrontEndSettings | None = None) -> None:
+        """Take up the tracker's current estimate as the first prediction."""
+        self.tracker = tracker
+        self.settings = settings or FrontEndSettings()
+        self.reports: dict[str, KeypointReport] = {}
+        self.skin: dict[str, SkinTracker] = {}
+        self.rays: list[SiteRay] = []
+        self._predictor = SitePredictor()
+        chosen = self.settings
+        self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
+        self._predictor.update(float("nan"), tracker.estimate.joints)
+
+    def step(self, recorded: RecordedFrame) -> Estimate:
+        """Make the frame, step the tracker, and learn from the estimate.
+
+        Raises:
+            MeasurementError: a measurement that cannot be used; the tracker is unchanged.
+            RecordingError: a picture that cannot be decoded.
+        """
+        estimate = self.tracker.step(self.frame(recorded))
+        self._predictor.update(recorded.stamp, estimate.joints)
+        for item in recorded.measurements:
+            if isinstance(item, ColorImage) and item.sensor in self.skin:
+                self.skin[item.sensor].learn(item.image, item.camera, item.root_from_sensor, estimate)
+        return estimate
+
+    def frame(self, recorded: RecordedFrame) -> Frame:
+        """The tracker's frame, without stepping."""
+        frame = Frame(stamp=recorded.stamp)
+        if self.settings.ground_z is not None:
+            frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
+        predicted = self._predictor.predict(recorded.stamp)
+        self.rays = []
+        depth = next((item for item in recorded.measurements if isinstance(item, DepthImage)), None)
+        for item in recorded.measurements:
+            if isinstance(item, ColorImage):
+                if "skin" in self.settings.use:
+                    self._add_skin(item, predicted, depth if "depth" in self.settings.use else None)
+            else:
+                self._add(frame, item, predicted)
+        if self.settings.agreement > 0.0:
+            self.rays = agreed(self.rays, predicted=predicted, scale=self.settings.agreement)
+        add_rays(frame, self.rays, model=self.settings.model)
+        return frame
+
+    def _add(self, frame: Frame, item: Measurement, predicted: Mapping[str, FloatArray]) -> None:
+        use = self.settings.use
+        if isinstance(item, DepthImage) and "depth" in use:
+            image = item.image
+            if self.settings.depth_filter is not None:
+                image = self.settings.depth_filter.apply(image, metres_per_unit=item.metres_per_unit)
+            frame.add_depth(
+                image,
+                camera=item.camera,
+                metres_per_unit=item.metres_per_unit,
+                world_from_sensor=item.root_from_sensor,
+                weight=self._points_weight(item, predicted),
+                source=item.sensor,
+            )
+        elif isinstance(item, PointCloud) and "points" in use:
+            weight = self._points_weight(item, predicted)
+            frame.add_points(item.points, world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
+        elif isinstance(item, LaserScan) and "scan" in use:
+            sigma = self.settings.scan_noise.sigma(self._range(item, predicted))
+            weight = self.settings.model.weight(sigma, sharing=self.settings.scan_sharing)
+            frame.add_points(item.points(), world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
+        elif isinstance(item, KeypointImage) and "keypoints" in use:
+            self._add_keypoints(item, predicted, frame.stamp)
+
+    def _add_skin(self, item: ColorImage, predicted: Mapping[str, FloatArray], depth: DepthImage | None) -> None:
+        skin = self.skin.setdefault(item.sensor, SkinTracker(self.settings.skin))
+        # The picture is older or newer than the frame: the ray is moved along with its site.
+        then = self._predictor.predict(item.stamp)
+        body = None
+        if depth is not None:
+            body = body_mask(
+                depth.image,
+                depth_camera=depth.camera,
+                world_from_depth=depth.root_from_sensor,
+                metres_per_unit=depth.metres_per_unit,
+                color_camera=item.camera,
+                world_from_color=item.root_from_sensor,
+                joints=list(then.values()),
+                step=max(depth.camera.width // 200, 1),
+            )
+        rays = skin.observe(
+            item.image, item.camera, item.root_from_sensor, then, body=body, lost=self._lost(), source=item.sensor
+        )
+        for ray in rays:
+            moved = ray.origin + (predicted[ray.site] - then[ray.site])
+            self.rays.append(SiteRay(ray.site, moved, ray.direction, ray.sigma, ray.source, ray.trust))
+
+    def _lost(self) -> list[str]:
+        """Hands whose forearm had too few points in the last step to say where it is."""
+        points = self.tracker.estimate.limb_points
+        return [f"{side}_hand" for side in "lr" if points.get(f"{side}_forearm", 0) < self.settings.lost_points]
+
+    def _add_keypoints(self, item: KeypointImage, predicted: Mapping[str, FloatArray], stamp: float) -> None:
+        place: dict[str, Any] = {
+            "layout": item.layout,
+            "camera": item.camera,
+            "world_from_sensor": item.root_from_sensor,
+        }
+        person = nearest_person(item.people, predicted=predicted, **place)
+        if person is None:
+            self.reports[item.sensor] = KeypointReport()
+            return
+        sensor = KeypointSensor(
+            **place,
+            source=item.sensor,
+            noise=self.settings.keypoint_noise,
+            model=self.settings.model,
+            min_confidence=self.settings.min_confidence,
+        )
+        report, rays, _ = sensor.observe(person, stamp=stamp, predicted=predicted, gate=self._gate)
+        self.reports[item.sensor] = report
+        self.rays += rays
+
+    def _range(self, item: DepthImage | PointCloud | LaserScan, predicted: Mapping[str, FloatArray]) -> float:
+        body = np.mean(list(predicted.values()), axis=0)
+        return max(float(np.linalg.norm(in_sensor(item.root_from_sensor, body[None])[0])), 0.1)
+
+    def _points_weight(self, item: DepthImage | PointCloud, predicted: Mapping[str, FloatArray]) -> float:
+        sigma = self.settings.depth_noise.sigma(self._range(item, predicted))
+        return self.settings.model.weight(sigma, sharing=self.settings.sharing)
+
+
+def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFrame]:
+    """The frames of a recording, each with the measurements that follow it within `wait` seconds.
+
+    A colour picture taken a few milliseconds after a depth image belongs to it, not to the next one a whole period
+    later; the price is a latency of at most `wait`. The stamp of a frame stays that of its own measurement.
+
+    Raises:
+        RecordingError: damage in the recording.
+    """
+    held: RecordedFrame | None = None
+    for recorded in recording:
+        if held is not None:
+            early = tuple(item for item in recorded.measurements if item.stamp - held.stamp <= wait)
+            yield RecordedFrame(held.stamp, held.measurements + early)
+            late = tuple(item for item in recorded.measurements if item.stamp - held.stamp > wait)
+            recorded = RecordedFrame(recorded.stamp, late)
+        held = recorded
+    if held is not None:
+        yield held

@@ -1,0 +1,87 @@
+"""Single pixels and the rays behind them."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.camera import Camera
+from voodoo.errors import MeasurementError
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+_ROUND_TRIP_PX = 0.1
+
+
+def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:
+    """Undistorted x/z, y/z of pixels at any subpixel position.
+
+    Args:
+        camera: calibration.
+        pixels: (N, 2) coordinates (u, v).
+
+    Returns:
+        (N, 2); NaN where the lens model cannot be inverted (it does not come back to the pixel within 0.1 px).
+
+    Raises:
+        MeasurementError: the shape is not (N, 2).
+    """
+    pixels = np.asarray(pixels, dtype=np.float64)
+    if pixels.ndim != 2 or pixels.shape[1] != 2:
+        raise MeasurementError(f"pixels: expected shape (N, 2), found {pixels.shape}")
+    if not camera.distorted or not len(pixels):
+        return np.asarray((pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy))
+    until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
+    coefficients = np.array(camera.distortion or (0.0,) * 4)
+    source = np.ascontiguousarray(pixels[:, None, :])
+    undistort = cv2.fisheye.undistortPoints if camera.model == "equidistant" else cv2.undistortPoints
+    found = undistort(source, camera.matrix, coefficients, criteria=until)
+    xy = np.array(found, dtype=np.float64).reshape(-1, 2)
+    with np.errstate(all="ignore"):
+        error = np.abs(camera.project(np.column_stack([xy, np.ones(len(xy))])) - pixels).max(axis=1)
+    xy[~(error < _ROUND_TRIP_PX)] = np.nan
+    return xy
+
+
+def world_rays(
+    camera: Camera, world_from_sensor: npt.ArrayLike, pixels: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Focal point (3,) [m] and unit directions (N, 3), in the world, of the rays behind pixels (N, 2).
+
+    Raises:
+        MeasurementError: wrong shapes.
+    """
+    pose = rigid(world_from_sensor)
+    xy = normalized(camera, pixels)
+    directions = np.column_stack([xy, np.ones(len(xy))]) @ pose[:3, :3].T
+    return pose[:3, 3], directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def rigid(world_from_sensor: npt.ArrayLike) -> FloatArray:
+    """A (4, 4) array, checked.
+
+    Raises:
+        MeasurementError: another shape, not finite, or no rigid transform.
+    """
+    pose = np.asarray(world_from_sensor, dtype=np.float64)
+    if pose.shape != (4, 4) or not np.isfinite(pose).all():
+        raise MeasurementError(f"world_from_sensor: expected a finite (4, 4) array, found shape {pose.shape}")
+    turn = pose[:3, :3]
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) or np.linalg.det(turn) < 0.0:
+        raise MeasurementError(f"world_from_sensor: expected a rotation in its upper left 3x3, found {turn.tolist()}")
+    return pose
+
+
+def in_sensor(world_from_sensor: FloatArray, points: npt.ArrayLike) -> FloatArray:
+    """World points (N, 3) in the sensor's frame."""
+    return np.asarray((np.asarray(points, dtype=np.float64) - world_from_sensor[:3, 3]) @ world_from_sensor[:3, :3])
+
+
+def ray_distance(origin: FloatArray, directions: FloatArray, points: FloatArray) -> FloatArray:
+    """Distances (N,) [m] of points (N, 3) to rays with unit directions (N, 3); behind the origin, to the origin."""
+    offset = points - origin
+    along = np.maximum((offset * directions).sum(axis=-1), 0.0)
+    return np.asarray(np.linalg.norm(offset - along[..., None] * directions, axis=-1))

@@ -1,0 +1,98 @@
+"""The colour of one person's skin in the light of the moment: a histogram that is learnt and forgets."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import gaussian_filter  # type: ignore[import-untyped]
+
+ByteImage = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
+Histogram = npt.NDArray[np.float32]
+
+LUMA_BINS, CHROMA_BINS = 8, 64
+"""Bins of Y, and of either chroma axis, of YCrCb. Luma is coarse: it parts a face from a dark poster of the same
+hue."""
+_SHAPE = (LUMA_BINS, CHROMA_BINS, CHROMA_BINS)
+_SIZE = LUMA_BINS * CHROMA_BINS**2
+_SMOOTHING = (0.7, 0.8, 0.8)
+
+_PRIOR_CENTRE, _PRIOR_SPREAD = (150.0, 110.0), (8.0, 8.0)
+"""Chroma (Cr, Cb) of human skin of any tone under white light, and its spread."""
+
+
+class SkinColour:
+    """Decides by the ratio of two histograms, skin's and everything else's.
+
+    Args:
+        forgetting: share of the old histograms that a picture leaves.
+        ratio: skin has to be this many times as likely as the rest.
+        darkest: pixels with less luma than this have no reliable chroma.
+    """
+
+    def __init__(self, *, forgetting: float = 0.95, ratio: float = 2.0, darkest: int = 30) -> None:
+        """Start with the colours of all skins against evenly spread ones."""
+        self.forgetting = forgetting
+        self.ratio = ratio
+        self.darkest = darkest
+        axis = (np.arange(CHROMA_BINS, dtype=np.float32) + 0.5) * (256 / CHROMA_BINS)
+        cr = ((axis - _PRIOR_CENTRE[0]) / _PRIOR_SPREAD[0]) ** 2
+        cb = ((axis - _PRIOR_CENTRE[1]) / _PRIOR_SPREAD[1]) ** 2
+        chroma = np.exp(-0.5 * (cr[:, None] + cb[None, :]))
+        prior = np.broadcast_to(chroma, _SHAPE).astype(np.float32)
+        self.skin: Histogram = prior / prior.sum()
+        self.rest: Histogram = np.full(_SHAPE, 1.0 / _SIZE, dtype=np.float32)
+        self._pictures = 0
+
+    def classify(self, image: ByteImage) -> Mask:
+        """(H, W): True where a BGR image (H, W, 3) has the colour of skin; single pixels are removed."""
+        table = (self.skin > self.ratio * self.rest).astype(np.uint8).ravel()
+        return np.asarray(cv2.medianBlur(table[self._bins(image)], 3), dtype=bool) & self._lit(image)
+
+    def learn(self, image: ByteImage, inside: Mask, *, outside: Mask, body: Mask | None = None) -> bool:
+        """Learn from the pixels where skin must be, and from those far from it.
+
+        Args:
+            image: (H, W, 3) BGR.
+            inside: (H, W) where head and hands are. Only pixels whose colour is near to what skin was are learnt.
+            outside: (H, W) where no head or hand is.
+            body: (H, W) where the body is, if known: half of the rest is learnt from its clothes.
+
+        Returns:
+            Whether there was enough skin to learn from.
+        """
+        bins = self._bins(image)
+        near = (self.skin > 0.5 * self.ratio * self.rest).ravel()
+        chosen = inside & near[bins] & self._lit(image)
+        if int(chosen.sum()) < 20:
+            return False
+        # The first pictures make the general skin this person's; later ones follow slowly.
+        keep = np.float32(self.forgetting if self._pictures >= 5 else 0.5)
+        self.skin = keep * self.skin + (1 - keep) * _histogram(bins[chosen])
+        rest = _histogram(bins[outside])
+        if body is not None and (clothes := outside & body).any():
+            rest = 0.5 * rest + 0.5 * _histogram(bins[clothes])
+        # A colour seen nowhere yet is not skin.
+        rest = 0.95 * rest + np.float32(0.05 / _SIZE)
+        self.rest = keep * self.rest + (1 - keep) * rest
+        self._pictures += 1
+        return True
+
+    def _lit(self, image: ByteImage) -> Mask:
+        # Green carries most of the luma; a threshold needs no more.
+        return np.asarray(image[..., 1] >= self.darkest // 2) & (image.max(axis=2) >= self.darkest)
+
+    @staticmethod
+    def _bins(image: ByteImage) -> npt.NDArray[np.int32]:
+        """(H, W) number of the bin of each pixel."""
+        planes = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)).astype(np.int32)
+        chroma = (planes[..., 1] >> 2) * CHROMA_BINS + (planes[..., 2] >> 2)
+        return np.asarray((planes[..., 0] >> 5) * CHROMA_BINS**2 + chroma, dtype=np.int32)
+
+
+def _histogram(bins: npt.NDArray[np.int32]) -> Histogram:
+    """Share of each bin, smoothed: the colours between those seen count too."""
+    counts = np.bincount(bins, minlength=_SIZE).reshape(_SHAPE).astype(np.float32)
+    counts = gaussian_filter(counts, _SMOOTHING, truncate=2.5)
+    return np.asarray(counts / max(float(counts.sum()), 1.0), dtype=np.float32)

@@ -1,0 +1,211 @@
+"""Depth edges, and skin colour that stays with its owner."""
+
+import cv2
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo import Camera, MeasurementError
+from voodoo.sensors.assignment import assign
+from voodoo.sensors.depth import DepthFilter, body_mask
+from voodoo.sensors.skin import SkinSettings, SkinTracker, candidates
+
+CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+# at the origin of a world whose z points up, looking along x
+POSE = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]])
+SKIN, WALL, SHIRT = (120, 150, 205), (150, 140, 130), (160, 70, 40)  # BGR
+Z = 2.5
+
+
+class Pose:
+    """What a SkinTracker reads of an estimate."""
+
+    status = "tracking"
+
+    def __init__(self, head, left, right):
+        self.joints = {"head_center": at(head), "l_hand": at(left), "r_hand": at(right)}
+
+
+def at(pixel, z=Z):
+    """World position behind a pixel at depth z."""
+    camera_point = np.array([(pixel[0] - CAMERA.cx) / CAMERA.fx * z, (pixel[1] - CAMERA.cy) / CAMERA.fy * z, z])
+    return POSE[:3, :3] @ camera_point + POSE[:3, 3]
+
+
+def picture(head, left, right, *, forearm=None, door=None, light=(1.0, 1.0, 1.0), seed=0):
+    """A shirt, a face and two hands; a bare left forearm to the elbow `forearm`, and a door of skin's colour."""
+    image = np.full((240, 320, 3), WALL, np.uint8)
+    if door is not None:
+        cv2.rectangle(image, door[:2], door[2:], SKIN, -1)
+    cv2.rectangle(image, (130, 80), (190, 180), SHIRT, -1)
+    cv2.circle(image, head, 10, SKIN, -1)
+    if forearm is not None:
+        cv2.line(image, forearm, left, SKIN, 9)
+    for hand in (left, right):
+        cv2.circle(image, hand, 6, SKIN, -1)
+    noise = np.random.default_rng(seed).normal(0, 3, image.shape)
+    return np.clip(image * np.array(light) + noise, 0, 255).astype(np.uint8)
+
+
+def learnt(skin, frames=8, **parts):
+    head, left, right = (160, 60), (110, 120), (210, 120)
+    pose = Pose(head, left, right)
+    for seed in range(frames):
+        image = picture(head, left, right, seed=seed, **parts)
+        skin.observe(image, CAMERA, POSE, pose.joints)
+        skin.learn(image, CAMERA, POSE, pose)
+    return head, left, right
+
+
+def pixel_error(skin, site, pixel):
+    return np.linalg.norm(np.subtract(skin.assigned[site].pixel, pixel))
+
+
+def test_hands_and_face_are_found_and_named():
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    moved = ((162, 61), (104, 113), (214, 128))
+    rays = skin.observe(picture(*moved, seed=99), CAMERA, POSE, Pose(head, left, right).joints)
+    assert {ray.site for ray in rays} == {"head_center", "l_hand", "r_hand"}
+    for site, pixel in zip(("head_center", "l_hand", "r_hand"), moved, strict=True):
+        assert pixel_error(skin, site, pixel) < 2.0
+
+
+def test_a_hidden_hand_gets_no_ray_and_the_other_keeps_its_own():
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    image = picture(head, left, left, seed=5)  # the right hand is not there
+    rays = skin.observe(image, CAMERA, POSE, Pose(head, left, right).joints)
+    assert {ray.site for ray in rays} == {"head_center", "l_hand"}
+
+
+def test_a_bare_forearm_does_not_take_the_hand_away():
+    skin = SkinTracker()
+    head, left, right = learnt(skin, forearm=(135, 160))
+    moved = (105, 115)
+    skin.observe(picture(head, moved, right, forearm=(133, 157), seed=7), CAMERA, POSE, Pose(head, left, right).joints)
+    assert pixel_error(skin, "l_hand", moved) < 9.0  # 7 cm; the forearm's middle is 25 pixels away
+
+
+def test_a_door_of_the_same_colour_takes_nothing_away():
+    skin = SkinTracker()
+    door = (20, 60, 90, 235)
+    head, left, right = learnt(skin, frames=60, door=door)
+    behind = (100, 125)  # the hand goes to the door, then in front of it
+    joints = Pose(head, left, right).joints
+    skin.observe(picture(head, behind, right, door=door, seed=3), CAMERA, POSE, joints)
+    assert pixel_error(skin, "l_hand", behind) < 4.0
+    rays = skin.observe(
+        picture(head, (60, 150), right, door=door, seed=4), CAMERA, POSE, Pose(head, (60, 150), right).joints
+    )
+    for ray in rays:
+        if ray.site == "l_hand":  # better no ray than one to the door's middle
+            assert pixel_error(skin, "l_hand", (60, 150)) < 10.0
+
+
+def test_the_colour_follows_the_light():
+    skin, blind = SkinTracker(), SkinTracker()
+    head, left, right = learnt(skin)
+    learnt(blind)
+    pose = Pose(head, left, right)
+    for step in range(120):
+        light = (1.0 + 0.004 * step, 1.0, 1.0 - 0.0025 * step)
+        image = picture(head, left, right, light=light, seed=step)
+        skin.observe(image, CAMERA, POSE, pose.joints)
+        skin.learn(image, CAMERA, POSE, pose)
+    last = picture(head, left, right, light=light, seed=500)
+    assert len(skin.observe(last, CAMERA, POSE, pose.joints)) == 3
+    assert len(blind.observe(last, CAMERA, POSE, pose.joints)) < 3  # without learning the light has taken the cue away
+
+
+def test_lost_tracking_teaches_nothing():
+    skin = SkinTracker()
+    pose = Pose((160, 60), (110, 120), (210, 120))
+    pose.status = "lost"
+    before = skin.colour.skin.copy()
+    skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
+    np.testing.assert_array_equal(before, skin.colour.skin)
+    assert not skin.settled
+
+
+def test_candidates_skip_noise_and_doors():
+    mask = np.zeros((240, 320), bool)
+    mask[10:12, 10:12] = True
+    mask[40:52, 40:52] = True
+    mask[0:240, 200:320] = True
+    found = candidates(mask, palm_px=5.4)
+    assert [item.pixel for item in found] == [(45.5, 45.5)]
+
+
+def test_assignment_is_one_to_one_and_gated():
+    cost = np.array([[0.05, 0.09], [0.06, 0.5], [np.nan, np.inf]])
+    assert sorted(assign(cost, gate=0.2)) == [(0, 1), (1, 0)]  # both get one, although 0 likes 0 best
+    assert assign(cost, gate=0.055) == [(0, 0)]
+    assert assign(np.empty((3, 0)), gate=1.0) == []
+
+
+def test_settings_and_images_are_checked():
+    with pytest.raises(MeasurementError, match="gate"):
+        SkinSettings(gate=0.0)
+    with pytest.raises(MeasurementError, match="240, 320"):
+        SkinTracker().observe(np.zeros((10, 10, 3), np.uint8), CAMERA, POSE, {})
+
+
+def test_flying_pixels_go_and_surfaces_stay():
+    depth = np.full((60, 80), 4000, np.uint16)
+    depth[:, 30:50] = 2000
+    depth[:, 29] = 3100  # between the two surfaces
+    depth[:, 50] = 2700
+    depth[10, 10] = 3000  # a lonely pixel
+    slope = (1500 + 12 * np.arange(80)).astype(np.uint16)
+    depth[40:] = slope  # a slanted surface
+    dropped = DepthFilter().dropped(depth)
+    assert dropped[1:38, 29].all() and dropped[1:38, 50].all() and dropped[10, 10]
+    assert not dropped[2:38, 31:49].any() and not dropped[2:38, 52:79].any()
+    assert not dropped[42:59, 2:78].any()
+    kept = DepthFilter(nearest=2.5, farthest=5.0).apply(depth)
+    assert (kept[5, 31:49] == 0).all() and kept[5, 60] == 4000
+    with pytest.raises(MeasurementError, match="uint16"):
+        DepthFilter().dropped(depth.astype(np.int32))
+    with pytest.raises(MeasurementError, match="nearest"):
+        DepthFilter(nearest=3.0, farthest=2.0)
+
+
+def test_body_mask_is_where_the_body_is():
+    depth_camera = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
+    depth = np.full((120, 160), 4.5, np.float32)
+    depth[30:90, 60:80] = Z
+    joints = [at((120, 60)), at((160, 180)), at((140, 120))]
+    mask = body_mask(
+        depth,
+        depth_camera=depth_camera,
+        world_from_depth=POSE,
+        metres_per_unit=1.0,
+        color_camera=CAMERA,
+        world_from_color=POSE,
+        joints=joints,
+    )
+    assert mask.shape == (240, 320)
+    assert mask[62:178, 122:158].all()
+    assert not mask[:, :110].any() and not mask[:, 175:].any()
+
+
+def test_the_front_end_runs_on_the_bundled_recording():
+    from voodoo.recordings import open_recording, sample_path
+    from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+
+    recording = open_recording(sample_path())
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    rays = 0
+    for recorded, _ in zip(paired(recording), range(30), strict=False):
+        # what was taken up to 10 ms after the depth image belongs to it
+        assert max(item.stamp for item in recorded.measurements) - recorded.stamp <= 0.010
+        estimate = front_end.step(recorded)
+        rays += len(front_end.rays)
+    assert estimate.status == "tracking"
+    assert rays > 30
+    assert any(name.startswith("/camera/color") for name in estimate.sources)
+    with pytest.raises(MeasurementError, match="sonar"):
+        FrontEndSettings(use=("sonar",))

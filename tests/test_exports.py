@@ -1,0 +1,195 @@
+"""BVH, TRC and ROS 2 bags, read back by readers that share no code with the writers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
+
+import voodoo
+from voodoo.errors import VoodooError
+from voodoo.export import write_bag, write_bvh, write_trc
+from voodoo.export.joint_angles import joint_angles
+from voodoo.export.skeleton import skeleton
+from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
+from voodoo.results import Track
+
+REST = {
+    "l_hip": (0, 0.09, 0.93), "r_hip": (0, -0.09, 0.93), "l_shoulder": (0, 0.2, 1.43), "r_shoulder": (0, -0.2, 1.43),
+    "l_elbow": (0, 0.2, 1.11), "r_elbow": (0, -0.2, 1.11), "l_wrist": (0, 0.2, 0.85), "r_wrist": (0, -0.2, 0.85),
+    "l_knee": (0, 0.09, 0.5), "r_knee": (0, -0.09, 0.5), "l_ankle": (0, 0.09, 0.07), "r_ankle": (0, -0.09, 0.07),
+    "vc7": (0, 0, 1.5), "skull_tip": (0, 0, 1.75),
+}  # fmt: skip
+
+
+def posed(changes, turn=0.0, shift=(0.0, 0.0, 0.0)):
+    """Estimates of one body: at rest with changes, all turned about the vertical and shifted."""
+    spin = Rotation.from_euler("z", turn).as_matrix()
+    joints = {name: spin @ np.array(p, float) + shift for name, p in (REST | changes).items()}
+    return joints
+
+
+@pytest.fixture(scope="module")
+def tracked():
+    body = voodoo.Body.human(height=1.75)
+    tracker = voodoo.Tracker(body, config=voodoo.Config(max_steps=30))
+    first = tracker.reset(joints=posed({}), fit_sizes=True)
+    body = tracker.body
+    poses = [
+        {},
+        {"l_wrist": (0.26, 0.2, 1.11), "r_elbow": (0, -0.52, 1.43), "r_wrist": (0, -0.78, 1.43)},
+        {"l_knee": (0.43, 0.09, 0.93), "l_ankle": (0.43, 0.09, 0.5)},
+    ]
+    estimates = []
+    for index, changes in enumerate(poses):
+        tracker.reset(joints=posed(changes, turn=0.3 * index, shift=(1.0, -0.5, 0.0)), fit_sizes=False)
+        frame = voodoo.Frame(stamp=1.7e9 + index / 30)
+        for name, place in posed(changes, turn=0.3 * index, shift=(1.0, -0.5, 0.0)).items():
+            frame.add_position(name, place, weight=10.0)
+        estimates.append(tracker.step(frame))
+    assert first.status == "tracking"
+    return Track.of(estimates), body
+
+
+def read_bvh(path: Path):
+    """A minimal independent BVH reader with forward kinematics: joint name -> (F, 3)."""
+    words = path.read_text().split()
+    at, stack, joints, channels = 0, [], [], []
+    while words[at] != "MOTION":
+        if words[at] in ("ROOT", "JOINT", "End"):
+            joints.append([words[at + 1] if words[at] != "End" else f"{joints[stack[-1]][0]}_end", None, None, []])
+            joints[-1][1] = stack[-1] if stack else None
+            at += 2
+        elif words[at] == "{":
+            stack.append(len(joints) - 1)
+            at += 1
+        elif words[at] == "}":
+            stack.pop()
+            at += 1
+        elif words[at] == "OFFSET":
+            joints[stack[-1]][2] = np.array([float(word) for word in words[at + 1 : at + 4]])
+            at += 4
+        elif words[at] == "CHANNELS":
+            count = int(words[at + 1])
+            joints[stack[-1]][3] = words[at + 2 : at + 2 + count]
+            channels += [(stack[-1], name) for name in joints[stack[-1]][3]]
+            at += 2 + count
+        else:
+            at += 1
+    frames, interval = int(words[at + 2]), float(words[at + 5])
+    table = np.array([float(word) for word in words[at + 6 :]]).reshape(frames, len(channels))
+    places = {joint[0]: np.empty((frames, 3)) for joint in joints}
+    for frame, row in enumerate(table):
+        world = []
+        for number, (name, parent, offset, _) in enumerate(joints):
+            turn, shift = np.eye(3), offset.copy()
+            for value, (owner, channel) in zip(row, channels, strict=True):
+                if owner == number and channel.endswith("rotation"):
+                    turn = turn @ Rotation.from_euler(channel[0].lower(), value, degrees=True).as_matrix()
+                elif owner == number:
+                    shift["XYZ".index(channel[0])] += value
+            above = (np.eye(3), np.zeros(3)) if parent is None else world[parent]
+            world.append((above[0] @ turn, above[1] + above[0] @ shift))
+            places[name][frame] = world[-1][1]
+    return places, interval
+
+
+def test_bvh_gives_the_joints_back_through_its_own_kinematics(tmp_path, tracked):
+    track, body = tracked
+    write_bvh(tmp_path / "pose.bvh", track, body)
+    places, interval = read_bvh(tmp_path / "pose.bvh")
+    assert interval == pytest.approx(1 / 30, abs=1e-6)
+    for bone, joint in {
+        "l_upperarm": "l_shoulder",
+        "r_forearm": "r_elbow",
+        "l_thigh": "l_hip",
+        "l_calf": "l_knee",
+    }.items():
+        world = places[bone][:, [2, 0, 1]] / 100.0  # X left, Y up, Z forward to x forward, y left, z up
+        error = np.linalg.norm(world - track.joints[:, track.joint_names.index(joint)], axis=1)
+        assert error.max() < 0.01, joint
+
+
+def test_bvh_at_rest_has_zero_rotations(tmp_path, tracked):
+    track, body = tracked
+    posed_track = skeleton(track, body)
+    upright = Rotation.from_matrix(posed_track.rotations[0]).magnitude()
+    assert upright.max() < 0.1
+    # turned by 0.3 rad a frame: the torso follows
+    turn = Rotation.from_matrix(posed_track.rotations[:, 0]).as_euler("ZYX")[:, 0]
+    np.testing.assert_allclose(turn, [0.0, 0.3, 0.6], atol=0.03)
+
+
+def test_joint_angles_have_the_signs_of_human_description(tracked):
+    track, body = tracked
+    names, angles = joint_angles(skeleton(track, body))
+    angle = {name: angles[:, index] for index, name in enumerate(names)}
+    assert angle["l_elbow"][1] == pytest.approx(np.pi / 2, abs=0.1)  # flexed forwards
+    assert angle["r_p_shoulder"][1] == pytest.approx(np.pi / 2, abs=0.1)  # abducted
+    assert angle["l_knee"][2] == pytest.approx(-np.pi / 2, abs=0.1)
+    assert angle["l_r_hip"][2] == pytest.approx(np.pi / 2, abs=0.1)  # thigh lifted forwards
+    assert abs(angle["l_elbow"][0]) < 0.1
+
+
+def test_trc_read_by_a_plain_table_reader(tmp_path, tracked):
+    track, _ = tracked
+    path = tmp_path / "pose.trc"
+    write_trc(path, track, names=("l_wrist", "r_ankle"))
+    lines = path.read_text().split("\n")
+    assert lines[2].split("\t")[:5] == ["30", "30", "3", "2", "m"]
+    assert [cell for cell in lines[3].split("\t") if cell] == ["Frame#", "Time", "l_wrist", "r_ankle"]
+    table = np.loadtxt(path, skiprows=6, delimiter="\t")
+    np.testing.assert_allclose(table[:, 1], [0, 1 / 30, 2 / 30], atol=1e-5)
+    wrist = track.joints[:, track.joint_names.index("l_wrist")]
+    np.testing.assert_allclose(table[:, 2:5], wrist[:, [1, 2, 0]], atol=1e-6)
+    # and by this package's reader
+    back = read_trc(path, world_from_file=Z_UP_FROM_Y_UP)
+    np.testing.assert_allclose(back.positions[:, 0], wrist, atol=1e-6)
+    with pytest.raises(VoodooError, match="l_wing"):
+        write_trc(path, track, names=("l_wing",))
+
+
+def test_bag_read_by_rosbags(tmp_path, tracked):
+    track, body = tracked
+    write_bag(tmp_path / "bag", track, body, root_frame="odom", person="ab12c")
+    poses, states, shapes = [], [], []
+    with AnyReader([tmp_path / "bag"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        for connection, stamp, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            {"/tf": poses, "/humans/bodies/ab12c/joint_states": states}.get(connection.topic, shapes).append(
+                (stamp, message)
+            )
+    assert len(poses) == len(states) == len(shapes) == len(track)
+    for index, (stamp, message) in enumerate(poses):
+        assert stamp == round(track.stamps[index] * 1e9)
+        world = {"odom": np.eye(4)}
+        for item in message.transforms:  # parents come first
+            t, q = item.transform.translation, item.transform.rotation
+            local = np.eye(4)
+            local[:3, :3] = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+            local[:3, 3] = (t.x, t.y, t.z)
+            world[item.child_frame_id] = world[item.header.frame_id] @ local
+        for frame, site in {
+            "l_wrist": "l_wrist",
+            "r_knee": "r_knee",
+            "head": "head_center",
+            "l_shoulder": "l_shoulder",
+        }.items():
+            place = track.joints[index, track.joint_names.index(site)]
+            np.testing.assert_allclose(world[f"{frame}_ab12c"][:3, 3], place, atol=0.01)
+        assert {"body_ab12c", "torso_ab12c", "r_ankle_ab12c"} <= set(world)
+    names = states[0][1].name
+    assert "l_y_shoulder_ab12c" in names and len(names) == len(states[0][1].position)
+    assert {marker.ns for marker in shapes[0][1].markers} == {"limbs", "joints"}
+    assert len(shapes[0][1].markers) == len(body.limbs) + 1
+    with pytest.raises(VoodooError, match="does not exist"):
+        write_bag(tmp_path / "bag", track, body, root_frame="odom")
+
+
+def test_a_track_without_limb_poses_is_refused(tmp_path, tracked):
+    track, body = tracked
+    track.save(tmp_path / "pose.csv")
+    with pytest.raises(VoodooError, match="npz"):
+        write_bvh(tmp_path / "pose.bvh", Track.load(tmp_path / "pose.csv"), body)

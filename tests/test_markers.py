@@ -1,0 +1,98 @@
+"""Marker files and markers on limbs."""
+
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo.errors import BodyError, MeasurementError, RecordingError
+from voodoo.markers import Z_UP_FROM_Y_UP, add_markers, body_with_markers, marker_offset, read_markers, read_trc
+
+TRC = (
+    "PathFileType\t4\t(X/Y/Z)\tx.trc\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
+    "100\t100\t2\t2\tmm\t100\t0\t2\n"
+    "Frame#\tTime\tA\t\t\tB\t\t\t\n"
+    "\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n"
+    "1\t0.00\t1\t2\t3\t\t\t\n"
+    "2\t0.01\t1\t2\t3\t4\t5\t6\n"
+)
+
+
+def test_trc_units_axes_and_missing_markers(tmp_path):
+    path = tmp_path / "x.trc"
+    path.write_text(TRC)
+    markers = read_trc(path, world_from_file=Z_UP_FROM_Y_UP)
+    assert (markers.names, markers.rate_hz) == (("A", "B"), 100.0)
+    np.testing.assert_allclose(markers.stamps, [0.0, 0.01])
+    np.testing.assert_allclose(markers.positions[1], [[0.003, 0.001, 0.002], [0.006, 0.004, 0.005]])
+    assert np.isnan(markers.positions[0, 1]).all() and np.isfinite(markers.positions[0, 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("PathFileType", "Path"), "first line"),
+        (("\tmm\t", "\tyd\t"), "Units"),
+        (("100\t100\t2", "100\t100\t3"), "3 frames"),
+        (("4\t5\t6", "4\tfive\t6"), "line 7"),
+        (("2\t0.01", "2\t0.00"), "rising"),
+        (("\tB\t", "\tA\t"), "different"),
+    ],
+)
+def test_damaged_trc_is_refused(tmp_path, change, message):
+    path = tmp_path / "x.trc"
+    path.write_text(TRC.replace(*change))
+    with pytest.raises(RecordingError, match=message):
+        read_markers(path)
+
+
+def test_c3d_round_trip_with_the_library_that_defines_it(tmp_path):
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed (pip install voodoo[c3d])")
+    content = ezc3d.c3d()
+    content["parameters"]["POINT"]["RATE"]["value"] = [50.0]
+    content["parameters"]["POINT"]["LABELS"]["value"] = ["LWRA", "RWRA"]
+    content["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    points = np.ones((4, 2, 5))
+    points[:3] = np.arange(30).reshape(3, 2, 5)
+    points[:3, 1, 2] = np.nan
+    content["data"]["points"] = points
+    content.write(str(tmp_path / "x.c3d"))
+    markers = read_markers(tmp_path / "x.c3d")
+    assert (markers.names, markers.rate_hz, len(markers.stamps)) == (("LWRA", "RWRA"), 50.0, 5)
+    np.testing.assert_allclose(markers.positions[3, 0], points[:3, 0, 3] / 1000.0, atol=1e-6)
+    assert np.isnan(markers.positions[2, 1]).all()
+    (tmp_path / "bad.c3d").write_bytes(b"not a c3d file")
+    with pytest.raises(RecordingError, match="c3d"):
+        read_markers(tmp_path / "bad.c3d")
+
+
+def test_a_marker_with_an_offset_pulls_its_limb():
+    joints = {
+        "l_hip": (0, 0.1, 0.9),
+        "r_hip": (0, -0.1, 0.9),
+        "l_shoulder": (0, 0.2, 1.4),
+        "r_shoulder": (0, -0.2, 1.4),
+    }
+    body = body_with_markers(voodoo.Body.human(height=1.75), {"BACK": ("torso", (-0.12, 0.0, 0.3))})
+    tracker = voodoo.Tracker(body, config=voodoo.Config(max_steps=50))
+    start = tracker.reset(joints=joints, fit_sizes=False)
+    position = start.joints["BACK"]
+    np.testing.assert_allclose(marker_offset(start.world_from_limb["torso"], position), (-0.12, 0.0, 0.3), atol=1e-6)
+    frame = voodoo.Frame(stamp=0.0)
+    for name in ("BACK", "l_hip", "r_hip", "l_shoulder", "r_shoulder"):
+        frame.add_position(name, start.joints[name] + [0.02, 0.01, 0.0], weight=100.0)
+    moved = tracker.step(frame)
+    assert np.linalg.norm(moved.joints["BACK"] - position - [0.02, 0.01, 0.0]) < 0.005
+    with pytest.raises(BodyError, match="tail"):
+        body_with_markers(body, {"X": ("tail", (0, 0, 0))})
+
+
+def test_add_markers_leaves_out_what_is_missing(tmp_path):
+    path = tmp_path / "x.trc"
+    path.write_text(TRC)
+    markers = read_trc(path)
+    sites = {"A": "l_wrist", "B": "r_wrist", "C": "vc7"}
+    assert add_markers(voodoo.Frame(stamp=0.0), markers, 0, sites=sites, weight=1.0) == ("l_wrist",)
+    assert add_markers(voodoo.Frame(stamp=0.0), markers, 1, sites=sites, weight=1.0) == ("l_wrist", "r_wrist")
+    with pytest.raises(MeasurementError, match="0 to 1"):
+        add_markers(voodoo.Frame(stamp=0.0), markers, 2, sites=sites, weight=1.0)

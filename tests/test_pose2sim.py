@@ -1,0 +1,96 @@
+"""Pose2Sim folders, and the body carried by rays alone."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo.errors import RecordingError
+from voodoo.recordings import open_recording
+from voodoo.sensors.camera_files import read_camera_toml
+from voodoo.sensors.rays import SiteRay, agreed
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))
+import fusion_pose2sim
+
+CALIBRATION = """
+[cam_01]
+name = "left"
+size = [1088.0, 1920.0]
+matrix = [[1680.0, 0.0, 533.0], [0.0, 1681.0, 948.0], [0.0, 0.0, 1.0]]
+distortions = [-0.0007, 0.002, 0.0, 0.0]
+rotation = [1.5707963267948966, 0.0, 0.0]
+translation = [0.0, 1.0, 3.0]
+[metadata]
+error = 0.0
+"""
+
+
+def test_camera_toml(tmp_path):
+    path = tmp_path / "Calib.toml"
+    path.write_text(CALIBRATION)
+    (placed,) = read_camera_toml(path)
+    assert (placed.name, placed.camera.width, placed.camera.fy) == ("left", 1088, 1681.0)
+    # camera_from_world turns world y into the optical axis' opposite: the camera looks along -z' = world y
+    np.testing.assert_allclose(placed.world_from_sensor[:3, 3], [0.0, -3.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(placed.world_from_sensor[:3, 2], [0.0, 1.0, 0.0], atol=1e-12)
+    path.write_text(CALIBRATION.replace("rotation", "turn"))
+    with pytest.raises(RecordingError, match=r"cam_01.*no rotation"):
+        read_camera_toml(path)
+
+
+def test_rays_that_disagree_lose_their_trust():
+    point = np.array([0.1, 0.2, 1.0])
+    origins = np.array([[-3.0, 0, 1], [0, -3, 1], [3, 0.5, 1.2], [0, 3, 0.8]])
+    towards = point - origins
+    towards[3] += [0.4, 0.0, 0.0]  # this camera's network is 40 cm off
+    rays = [
+        SiteRay("l_wrist", origin, way / np.linalg.norm(way), 0.02, f"cam{index}")
+        for index, (origin, way) in enumerate(zip(origins, towards, strict=True))
+    ]
+    trust = [ray.trust for ray in agreed(rays, predicted={"l_wrist": point + 0.05})]
+    assert min(trust[:3]) > 0.9 and trust[3] < 0.1
+    two = agreed(rays[2:], predicted={"l_wrist": point})
+    assert [ray.trust for ray in two] == [1.0, 1.0]
+
+
+@pytest.fixture(scope="module")
+def folder(voodoo_data):
+    path = voodoo_data / "pose2sim"
+    if not path.is_dir():
+        pytest.skip(f"the Pose2Sim recording is not at {path}")
+    return path
+
+
+def test_recording(folder):
+    recording = open_recording(folder)
+    assert (len(recording), recording.root_frame, len(recording.cameras)) == (100, "world", 4)
+    assert recording.start is not None and "l_knee" in recording.start["joints"]
+    assert recording.start["joints"]["l_shoulder"][2] > 1.3  # z is up
+    first = next(iter(recording))
+    assert [item.sensor for item in first.measurements] == ["cam_01", "cam_02", "cam_03", "cam_04"]
+    assert "keypoints" in str(recording.info())
+    with pytest.raises(RecordingError, match="cam_09"):
+        open_recording(folder, cameras=("cam_09",))
+    with pytest.raises(RecordingError, match="17 keypoints"):
+        next(iter(open_recording(folder, layout="coco17")))
+
+
+@pytest.mark.parametrize("solver", ["limbwise", "chain"])
+def test_rays_alone_follow_the_balancing_trial(folder, solver):
+    run = fusion_pose2sim.track(folder, "all", voodoo.Config(solver=solver))
+    assert run.errors.shape == (100, 12)
+    assert run.errors.mean() < 0.03
+
+
+def test_a_camera_less_and_random_pixels(folder):
+    config = voodoo.Config()
+    names = [camera.name for camera in open_recording(folder).cameras]
+    for missing in names:
+        kept = tuple(name for name in names if name != missing)
+        assert fusion_pose2sim.track(folder, missing, config, cameras=kept).errors.mean() < 0.045, missing
+    wrong = fusion_pose2sim.track(folder, "20 %", config, outliers=0.2)
+    assert wrong.errors[-10:].mean() < 0.05
+    assert all(estimate.status == "tracking" for estimate in wrong.estimates)

@@ -1,0 +1,68 @@
+"""What the README and the documentation tell a reader to run, runs."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import voodoo
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+VOODOO = [sys.executable, "-c", "from voodoo.cli import main; main()"]
+
+
+def blocks(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def run(command, cwd):
+    result = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+@pytest.mark.parametrize("code", blocks(README, "python"))
+def test_python_examples_run(code, tmp_path):
+    output = run([sys.executable, "-c", code], tmp_path)
+    assert output.startswith(("tracking", "degraded"))
+
+
+def test_the_two_commands_are_there_and_call_what_they_say():
+    first, second = (line.split()[0] for line in blocks(README, "sh")[0].splitlines())
+    assert (first, second) == ("scripts/demo", "scripts/test")
+    for name in (first, second, "scripts/setup", ".ci/run"):
+        assert (ROOT / name).stat().st_mode & 0o111, f"{name} is not executable"
+        run(["bash", "-n", name], ROOT)
+    assert "voodoo demo" in (ROOT / first).read_text() and "pytest" in (ROOT / second).read_text()
+    assert second in (ROOT / ".ci" / "run").read_text()
+
+
+def test_the_commands_on_a_recording_run(tmp_path):
+    """The README's `voodoo` lines, on a few frames of the bundled recording."""
+    recording = str(voodoo.recordings.sample_path())
+    for line in blocks(README, "sh")[1].splitlines():
+        words = line.split()
+        assert words[0] == ".venv/bin/voodoo"
+        run([*VOODOO, *(recording if word == "RECORDING" else word for word in words[1:])], tmp_path)
+    assert (tmp_path / "pose.csv").stat().st_size > 1000 and (tmp_path / "look.mp4").stat().st_size > 1000
+
+
+def test_the_readme_fits_two_screens_and_its_links_lead_somewhere():
+    assert len(README.splitlines()) <= 110
+    for document in [ROOT / "README.md", ROOT / "ARCHITECTURE.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)\)", document.read_text(encoding="utf-8")):
+            assert (document.parent / target).exists(), f"{document.name} links to {target}"
+
+
+def test_the_body_of_the_documentation_loads():
+    (text,) = blocks((ROOT / "docs" / "body.md").read_text(encoding="utf-8"), "toml")
+    assert voodoo.Body.from_toml(text).site_names == ("tip",)
+
+
+def test_the_lamp_is_tracked():
+    output = run([sys.executable, str(ROOT / "examples" / "track_lamp.py")], ROOT)
+    found = re.search(r"mean error of the bulb: ([\d.]+) mm", output)
+    assert found and float(found[1]) < 15.0, output
