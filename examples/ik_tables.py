@@ -40,7 +40,7 @@ def follow(
     """Positions (F, 3) of an elbow or knee. Known: all joints in the first frame; then the trunk, hence the shoulder or hip,
     and the wrist or ankle."""
     first, middle, last = (f"{side}_{name}" for name in LIMBS[joint])
-    tracker = voodoo.Tracker(voodoo.Body.human(height=height))
+    tracker = voodoo.Tracker(voodoo.Body.human(height=height, model="papers"))
     estimate = tracker.reset(joints={name: places[0] for name, places in truth.items()})
     limbs = [f"{side}_{name}" for name in (("upperarm", "forearm") if joint == "elbow" else ("thigh", "calf"))]
     chain = ik.Chain(tracker.body, limbs=limbs)

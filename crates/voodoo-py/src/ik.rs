@@ -217,7 +217,7 @@ impl PyChain {
         let segments = self.bones(py, segments, margin)?;
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
         let mut gradient = vec![0.0; self.model.freedoms()];
-        let h = Criterion { views: &views, segments: &segments }.evaluate(&self.model, &at, &mut gradient);
+        let (h, _) = Criterion { views: &views, segments: &segments }.evaluate(&self.model, &at, &mut gradient);
         Ok((h, frozen(py, gradient, &[self.model.freedoms()])?))
     }
 
