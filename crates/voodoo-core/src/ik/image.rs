@@ -57,15 +57,14 @@ impl Criterion<'_> {
     }
 
     /// The criterion, and its gradient by all unknowns into `gradient` (J10 eq. 7, 8). Samples no camera sees count zero.
-    /// Also the share of samples that lie outside.
-    pub fn evaluate(&self, model: &Model, at: &Kinematics, gradient: &mut [f64]) -> (f64, f64) {
+    pub fn evaluate(&self, model: &Model, at: &Kinematics, gradient: &mut [f64]) -> f64 {
         gradient.fill(0.0);
         let count = self.views.len() * self.segments.len() * SAMPLES;
         if count == 0 {
-            return (0.0, 0.0);
+            return 0.0;
         }
         let share = 1.0 / count as f64;
-        let (mut h, mut outside) = (0.0, 0_usize);
+        let mut h = 0.0;
         for segment in self.segments {
             let ends = segment.ends.map(|(part, point)| at.poses[part].transform_point(point));
             // Derivatives of h by the world positions of both ends.
@@ -80,7 +79,6 @@ impl Criterion<'_> {
                     let t = (sample as f64 + 0.5) / SAMPLES as f64;
                     let (value, slope) = view.outside(a + t * (b - a), segment.radius);
                     h += value;
-                    outside += usize::from(value > 0.0);
                     pull[0] += (1.0 - t) * slope;
                     pull[1] += t * slope;
                 }
@@ -99,7 +97,7 @@ impl Criterion<'_> {
                 }
             }
         }
-        (share * h, share * outside as f64)
+        share * h
     }
 }
 

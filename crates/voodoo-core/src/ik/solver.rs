@@ -12,8 +12,6 @@ use crate::geometry::Pose;
 const LEAST_DAMPING: f64 = 1e-10;
 /// Residual that a lower level may leave in a higher one, metres.
 const SETTLED: f64 = 1e-10;
-/// Share of the bones' length in the images, per radian, below which the gradient of `h` says little.
-const BLIND: f64 = 0.2;
 /// Turn that leaves a stationary pose with a residual, radians.
 const NUDGE: f64 = 0.05;
 
@@ -28,13 +26,16 @@ pub struct Options {
     pub still: f64,
     /// Share of the image step `h / |grad h|^2` to take, 0 to 1: alpha of J10 eq. 4 over that step.
     pub gain: f64,
+    /// Change of `h` per radian, as a share of the bones' length in the images, below which its gradient says little: damps the
+    /// image step where few samples lie outside, and along the line of sight. 0: Polyak's step undamped.
+    pub caution: f64,
     /// Largest change of an unknown in one step, radians.
     pub largest_turn: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, largest_turn: 0.5 }
+        Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, caution: 0.4, largest_turn: 0.5 }
     }
 }
 
@@ -65,9 +66,6 @@ pub struct Solver {
     trial_gradient: Vec<f64>,
     h: f64,
     trial_h: f64,
-    /// Share of the samples that lie outside the silhouettes.
-    outside: f64,
-    trial_outside: f64,
     gain: f64,
     taken: Taken,
     damped: Damped,
@@ -221,9 +219,9 @@ impl Solver {
         self.trial_cost.clear();
         let costs = self.levels.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial_at));
         self.trial_cost.extend(costs);
-        (self.trial_h, self.trial_outside) = match problem.criterion {
+        self.trial_h = match problem.criterion {
             Some(criterion) if image => criterion.evaluate(problem.model, &self.trial_at, &mut self.trial_gradient),
-            _ => (0.0, 0.0),
+            _ => 0.0,
         };
     }
 
@@ -231,7 +229,7 @@ impl Solver {
         std::mem::swap(&mut self.at, &mut self.trial_at);
         std::mem::swap(&mut self.cost, &mut self.trial_cost);
         std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
-        (self.h, self.outside) = (self.trial_h, self.trial_outside);
+        self.h = self.trial_h;
     }
 
     /// One step of the first `count` levels, and of the image; the largest change of an unknown.
@@ -284,11 +282,11 @@ impl Solver {
 
     /// The image's part: `-alpha (I - J^+ J) grad h` (J10 eq. 4) with Polyak's step `alpha = gain h / |P grad h|^2`, since the
     /// least `h` is zero. Where the images hardly see the free motion (along the line of sight) the gradient is small and
-    /// says little, so `alpha = gain h / (|P grad h|^2 + (BLIND reach)^2)`; only samples outside count for the reach.
+    /// says little, so `alpha = gain h / (|P grad h|^2 + (caution reach)^2)`.
     fn image_part(&mut self, problem: &Problem, count: usize, angles: &[f64]) {
         let n = angles.len();
         self.inherit(count, n);
-        let blind = BLIND * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.at)) * self.outside;
+        let blind = problem.options.caution * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.at));
         for _ in 0..=n {
             self.part.copy_from_slice(&self.gradient);
             self.taken.project(&mut self.part);
