@@ -7,7 +7,7 @@ import pytest
 import voodoo
 from voodoo import Camera, MeasurementError
 from voodoo.sensors.assignment import assign
-from voodoo.sensors.depth import DepthFilter, body_mask
+from voodoo.sensors.depth import BodyView, DepthFilter, body_view
 from voodoo.sensors.skin import SkinSettings, SkinTracker, candidates
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -77,6 +77,19 @@ def test_a_hidden_hand_gets_no_ray_and_the_other_keeps_its_own():
     image = picture(head, left, left, seed=5)  # the right hand is not there
     rays = skin.observe(image, CAMERA, POSE, Pose(head, left, right).joints)
     assert {ray.site for ray in rays} == {"head_center", "l_hand"}
+
+
+def test_a_hand_behind_the_body_does_not_jump_to_what_is_in_front():
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    joints = Pose(head, left, right).joints
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
+    image = picture(head, left, right, seed=11)
+    assert len(skin.observe(image, CAMERA, POSE, joints, body=body)) == 3
+    joints["l_hand"] = at(left, Z + 0.4)
+    rays = skin.observe(image, CAMERA, POSE, joints, body=body)
+    assert {ray.site for ray in rays} == {"head_center", "r_hand"}
 
 
 def test_a_bare_forearm_does_not_take_the_hand_away():
@@ -171,12 +184,12 @@ def test_flying_pixels_go_and_surfaces_stay():
         DepthFilter(nearest=3.0, farthest=2.0)
 
 
-def test_body_mask_is_where_the_body_is():
+def test_body_view_is_where_the_body_is():
     depth_camera = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
     depth = np.full((120, 160), 4.5, np.float32)
     depth[30:90, 60:80] = Z
     joints = [at((120, 60)), at((160, 180)), at((140, 120))]
-    mask = body_mask(
+    view = body_view(
         depth,
         depth_camera=depth_camera,
         world_from_depth=POSE,
@@ -185,6 +198,9 @@ def test_body_mask_is_where_the_body_is():
         world_from_color=POSE,
         joints=joints,
     )
+    mask = view.mask
+    assert view.depth_at((140.0, 120.0), 8.0) == pytest.approx(Z)
+    assert view.depth_at((300.0, 120.0), 8.0) is None
     assert mask.shape == (240, 320)
     assert mask[62:178, 122:158].all()
     assert not mask[:, :110].any() and not mask[:, 175:].any()

@@ -31,9 +31,9 @@ def posed(changes, turn=0.0, shift=(0.0, 0.0, 0.0)):
     return joints
 
 
-@pytest.fixture(scope="module")
-def tracked():
-    body = voodoo.Body.human(height=1.75)
+@pytest.fixture(scope="module", params=["papers", "full"])
+def tracked(request):
+    body = voodoo.Body.human(height=1.75, model=request.param)
     tracker = voodoo.Tracker(body, config=voodoo.Config(max_steps=30))
     first = tracker.reset(joints=posed({}), fit_sizes=True)
     body = tracker.body

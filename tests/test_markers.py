@@ -73,7 +73,7 @@ def test_a_marker_with_an_offset_pulls_its_limb():
         "l_shoulder": (0, 0.2, 1.4),
         "r_shoulder": (0, -0.2, 1.4),
     }
-    body = body_with_markers(voodoo.Body.human(height=1.75), {"BACK": ("torso", (-0.12, 0.0, 0.3))})
+    body = body_with_markers(voodoo.Body.human(height=1.75, model="papers"), {"BACK": ("torso", (-0.12, 0.0, 0.3))})
     tracker = voodoo.Tracker(body, config=voodoo.Config(max_steps=50))
     start = tracker.reset(joints=joints, fit_sizes=False)
     position = start.joints["BACK"]

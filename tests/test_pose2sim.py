@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import voodoo
 from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
 from voodoo.sensors.camera_files import read_camera_toml
@@ -80,13 +79,13 @@ def test_recording(folder):
 
 @pytest.mark.parametrize("solver", ["limbwise", "chain"])
 def test_rays_alone_follow_the_balancing_trial(folder, solver):
-    run = fusion_pose2sim.track(folder, "all", voodoo.Config(solver=solver))
+    run = fusion_pose2sim.track(folder, "all", fusion_pose2sim.CONFIG.model_copy(update={"solver": solver}))
     assert run.errors.shape == (100, 12)
     assert run.errors.mean() < 0.03
 
 
 def test_a_camera_less_and_random_pixels(folder):
-    config = voodoo.Config()
+    config = fusion_pose2sim.CONFIG
     names = [camera.name for camera in open_recording(folder).cameras]
     for missing in names:
         kept = tuple(name for name in names if name != missing)

@@ -303,6 +303,8 @@ class Options:
         tolerance: a residual below this is zero [m].
         still: a step that changes no angle by more ends the search [rad].
         gain: share of the step h / |P grad h|^2 of the image criterion, above 0 to 1: alpha of J10 eq. 4.
+        caution: damping of the image step where few samples lie outside, or the cameras look along the motion: the change
+            of h per radian, as a share of the bones' length in the images, that counts; 0 trusts every pixel.
         largest_turn: largest change of an angle in one step [rad].
         margin: how deep bones shall lie inside the silhouettes, in radii of their limbs; 0 is J10's criterion.
         bones: the segments that are projected; None: joint to joint.
@@ -312,6 +314,7 @@ class Options:
     tolerance: float = 1e-6
     still: float = 1e-6
     gain: float = 1.0
+    caution: float = 0.4
     largest_turn: float = 0.5
     margin: float = 0.0
     bones: tuple[Bone, ...] | None = field(default=None)
@@ -328,6 +331,7 @@ class Options:
             ("tolerance", 0.0, 1.0),
             ("still", 0.0, 1.0),
             ("gain", 1e-6, 1.0),
+            ("caution", 0.0, 10.0),
             ("largest_turn", 1e-6, math.pi),
             ("margin", 0.0, 2.0),
         ):
@@ -335,9 +339,9 @@ class Options:
             if not (isinstance(value, (int, float)) and low <= value <= high):
                 raise MeasurementError(f"{name}: expected {low:g} to {high:g}, found {value!r}")
 
-    def parts(self) -> tuple[int, float, float, float, float]:
+    def parts(self) -> tuple[int, float, float, float, float, float]:
         """The options as the core takes them."""
-        return (self.steps, self.tolerance, self.still, self.gain, self.largest_turn)
+        return (self.steps, self.tolerance, self.still, self.gain, self.caution, self.largest_turn)
 
 
 def solve(

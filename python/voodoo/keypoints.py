@@ -259,7 +259,7 @@ def window_depth(
     values = values[np.isfinite(values) & (values > 0.0)]
     if len(values) < max(window.size // 4, 1):
         return None
-    near = float(np.quantile(values, 0.2))
+    near = float(np.quantile(values, 0.2, method="lower"))
     surface = values[np.abs(values - near) <= EDGE_M]
     return float(np.median(surface))
 

@@ -15,8 +15,8 @@ type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 type GoalParts = (String, String, [f64; 6], f64, usize);
 /// site, site, radius
 type SegmentParts = (String, String, f64);
-/// steps, tolerance, still, gain, largest turn
-type OptionParts = (usize, f64, f64, f64, f64);
+/// steps, tolerance, still, gain, caution, largest turn
+type OptionParts = (usize, f64, f64, f64, f64, f64);
 
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
 pub struct PyView {
@@ -68,8 +68,8 @@ pub struct PyChain {
     model: Model,
 }
 
-fn options((steps, tolerance, still, gain, largest_turn): OptionParts) -> Options {
-    Options { steps, tolerance, still, gain, largest_turn }
+fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> Options {
+    Options { steps, tolerance, still, gain, caution, largest_turn }
 }
 
 impl PyChain {

@@ -18,29 +18,31 @@ def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
     positive, knees to negative angles; what is left of their rotation is not in the angle (it is in /tf). The waist
     is 0: the torso is one limb.
     """
-    local = posed.local()
-    index = {bone.name: number for number, bone in enumerate(posed.bones)}
-    columns: dict[str, FloatArray] = {}
-    if "torso" in index:
-        columns["waist"] = np.zeros(len(posed.stamps))
-    if "head" in index:
-        r, y, p = _euler(local[:, index["head"]], "XZY")
+    turns = {bone.name: posed.rotations[:, number] for number, bone in enumerate(posed.bones)}
+    root = turns[posed.bones[0].name]
+    trunk = turns.get("thorax", root)
+    columns: dict[str, FloatArray] = {"waist": _turn_about_y(_relative(root, trunk))}
+    if "head" in turns:
+        r, y, p = _euler(_relative(trunk, turns["head"]), "XZY")
         columns |= {"r_head": r, "y_head": y, "p_head": -p}
     for side, s in (("l", 1.0), ("r", -1.0)):
-        if f"{side}_upperarm" in index:
-            a, b, c = _euler(local[:, index[f"{side}_upperarm"]], "ZXZ")
+        if f"{side}_upperarm" in turns:
+            a, b, c = _euler(_relative(trunk, turns[f"{side}_upperarm"]), "ZXZ")
             if s < 0.0:  # the other of the two solutions, so that abduction is positive on both sides
                 a, b, c = _wrapped(a + np.pi), -b, _wrapped(c - np.pi)
             columns |= {f"{side}_y_shoulder": -s * a, f"{side}_p_shoulder": s * b, f"{side}_r_shoulder": s * c}
-        if f"{side}_forearm" in index:
-            columns[f"{side}_elbow"] = -_turn_about_y(local[:, index[f"{side}_forearm"]])
-        if f"{side}_thigh" in index:
-            a, b, c = _euler(local[:, index[f"{side}_thigh"]], "ZXY")
+        if {f"{side}_upperarm", f"{side}_forearm"} <= turns.keys():
+            columns[f"{side}_elbow"] = -_turn_about_y(_relative(turns[f"{side}_upperarm"], turns[f"{side}_forearm"]))
+        if f"{side}_thigh" in turns:
+            a, b, c = _euler(_relative(root, turns[f"{side}_thigh"]), "ZXY")
             columns |= {f"{side}_y_hip": -a, f"{side}_p_hip": s * b, f"{side}_r_hip": -c}
-        if f"{side}_calf" in index:
-            columns[f"{side}_knee"] = -_turn_about_y(local[:, index[f"{side}_calf"]])
-    values = np.column_stack(list(columns.values())) if columns else np.empty((len(posed.stamps), 0))
-    return tuple(columns), values
+        if {f"{side}_thigh", f"{side}_calf"} <= turns.keys():
+            columns[f"{side}_knee"] = -_turn_about_y(_relative(turns[f"{side}_thigh"], turns[f"{side}_calf"]))
+    return tuple(columns), np.column_stack(list(columns.values()))
+
+
+def _relative(parent: FloatArray, child: FloatArray) -> FloatArray:
+    return np.asarray(parent.transpose(0, 2, 1) @ child)
 
 
 def _euler(turns: FloatArray, order: str) -> tuple[FloatArray, FloatArray, FloatArray]:

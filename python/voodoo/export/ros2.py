@@ -22,12 +22,13 @@ from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.results import Track
 
-FRAMES = {
-    "torso": "torso", "head": "head",
-    **{f"{s}_{limb}": f"{s}_{joint}" for s in "lr" for limb, joint in
-       {"upperarm": "shoulder", "forearm": "elbow", "thigh": "hip", "calf": "knee"}.items()},
+_SIDE = {
+    "upperarm": "shoulder", "forearm": "elbow", "hand": "wrist", "thigh": "hip", "calf": "knee", "foot": "ankle",
 }  # fmt: skip
-"""REP-155 frame of each limb of the default human; other limbs keep their own name."""
+FRAMES = {"pelvis": "waist", "thorax": "torso", "torso": "torso", "head": "head"} | {
+    f"{side}_{limb}": f"{side}_{joint}" for side in "lr" for limb, joint in _SIDE.items()
+}
+"""REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
 _CYLINDER, _SPHERES, _ADD = 1, 7, 0
@@ -108,20 +109,20 @@ def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[
         body_frame: (None, _pose(trunk, _middle(sites, "hip", posed.heads[index, 0])))
     }
     for number, bone in enumerate(bones):
-        place = posed.heads[index, number]
-        if bone.parent is None:
-            parent, place = body_frame, _middle(sites, "shoulder", place)
-        elif bone.name.endswith("_thigh"):
-            parent = body_frame  # as in human_description; the torso is rigid, so it is the same
-        else:
-            parent = limb_frames[bone.parent]
-        if bone.name == "head" and "head_center" in sites:
+        place, turn = posed.heads[index, number], posed.rotations[index, number]
+        parent = body_frame if bone.parent is None or bone.name.endswith("_thigh") else limb_frames[bone.parent]
+        if bone.name in ("torso", "thorax"):
+            place = _middle(sites, "shoulder", place)
+        elif bone.parent is None:
+            place = frames[body_frame][1][:3, 3]
+        elif bone.name == "head" and "head_center" in sites:
             place = sites["head_center"]
-        frames[limb_frames[number]] = (parent, _pose(posed.rotations[index, number], place))
-        for limb, site in (("_forearm", "_wrist"), ("_calf", "_ankle")):
-            name = bone.name.removesuffix(limb) + site
-            if bone.name.endswith(limb) and name in sites:
-                frames[f"{name}_{person}"] = (limb_frames[number], _pose(posed.rotations[index, number], sites[name]))
+        frames[limb_frames[number]] = (parent, _pose(turn, place))
+        # Without a hand or foot of its own the forearm or calf carries the wrist's or ankle's frame.
+        for limb, end, site in (("_forearm", "_hand", "_wrist"), ("_calf", "_foot", "_ankle")):
+            side = bone.name.removesuffix(limb)
+            if bone.name.endswith(limb) and side + end not in track.limb_names and side + site in sites:
+                frames[f"{side}{site}_{person}"] = (limb_frames[number], _pose(turn, sites[side + site]))
     return frames
 
 

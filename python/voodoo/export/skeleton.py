@@ -87,7 +87,7 @@ class Skeleton:
 
     def local(self) -> FloatArray:
         """(F, L, 3, 3) rotations relative to the parent; those of the root are relative to the world."""
-        result = self.rotations.copy()
+        result: FloatArray = self.rotations.copy()
         for index, bone in enumerate(self.bones):
             if bone.parent is not None:
                 result[:, index] = self.rotations[:, bone.parent].transpose(0, 2, 1) @ self.rotations[:, index]

@@ -55,7 +55,7 @@ class DepthFilter:
             image: uint16 or float32; 0 and NaN mean "no return".
             metres_per_unit: of the image.
         """
-        kept = image.copy()
+        kept: DepthArray = image.copy()
         kept[self.dropped(image, metres_per_unit=metres_per_unit)] = 0
         return kept
 
@@ -71,7 +71,7 @@ class DepthFilter:
         returned = np.isfinite(z) & (z > 0.0)
         z[~returned] = 0.0
         outside = returned & ((z < self.nearest) | (z > self.farthest))
-        return outside | (returned & self._flying(z))
+        return np.asarray(outside | (returned & self._flying(z)))
 
     def _flying(self, z: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
         height, width = z.shape
@@ -89,7 +89,32 @@ class DepthFilter:
         return flying | lonely
 
 
-def body_mask(
+@dataclass(frozen=True, eq=False)
+class BodyView:
+    """What a depth camera saw of the body, in the picture of a colour camera beside it.
+
+    Args:
+        mask: (H, W) of the picture: True where something near the body was seen.
+        pixels: (N, 2) of the points in the picture.
+        depths: (N,) of the points along the colour camera's optical axis [m].
+    """
+
+    mask: npt.NDArray[np.bool_]
+    pixels: FloatArray
+    depths: FloatArray
+
+    def depth_at(self, pixel: tuple[float, float], radius: float) -> float | None:
+        """Depth [m] of the nearest surface within `radius` pixels of a place, None with less than three points
+        there."""
+        near = ((self.pixels - pixel) ** 2).sum(axis=1) < radius**2
+        if int(near.sum()) < 3:
+            return None
+        depths = self.depths[near]
+        front = float(np.quantile(depths, 0.2, method="lower"))
+        return float(np.median(depths[np.abs(depths - front) < 0.1]))
+
+
+def body_view(
     depth: DepthArray,
     *,
     depth_camera: Camera,
@@ -100,7 +125,7 @@ def body_mask(
     joints: npt.ArrayLike,
     margin: float = 0.30,
     step: int = 1,
-) -> npt.NDArray[np.bool_]:
+) -> BodyView:
     """Where, in a colour image, a depth camera beside it saw something within the box around the body.
 
     Args:
@@ -113,7 +138,7 @@ def body_mask(
         step: every step-th row and column of the depth image is used.
 
     Returns:
-        (H, W) of the colour image. The gaps between the depth pixels are closed; what no depth camera saw is False.
+        Mask of the colour image and the points; the gaps between the depth pixels are closed in the mask.
     """
     places = np.asarray(joints, dtype=np.float64)
     low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
@@ -124,12 +149,14 @@ def body_mask(
     points = points + world_from_depth[:3, 3].astype(np.float32)
     points = points[((points > low) & (points < high)).all(axis=1)]
     mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
-    if not len(points):
-        return mask.astype(bool)
-    pixels = color_camera.project(in_sensor(world_from_color, points))
-    pixels = np.round(pixels[np.isfinite(pixels).all(axis=1)]).astype(np.int64)
-    inside = (pixels >= 0).all(axis=1) & (pixels < (color_camera.width, color_camera.height)).all(axis=1)
-    mask[pixels[inside, 1], pixels[inside, 0]] = 1
+    in_color = in_sensor(world_from_color, points)
+    pixels = color_camera.project(in_color)
+    seen = np.isfinite(pixels).all(axis=1)
+    pixels, in_color = pixels[seen], in_color[seen]
+    whole = np.round(pixels).astype(np.int64)
+    inside = (whole >= 0).all(axis=1) & (whole < (color_camera.width, color_camera.height)).all(axis=1)
+    mask[whole[inside, 1], whole[inside, 0]] = 1
     # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
-    return np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
+    grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
+    return BodyView(grown, pixels, in_color[:, 2])

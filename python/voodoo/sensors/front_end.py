@@ -22,7 +22,7 @@ from voodoo.recordings import (
     RecordedFrame,
     Recording,
 )
-from voodoo.sensors.depth import DepthFilter, body_mask
+from voodoo.sensors.depth import DepthFilter, body_view
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import (
     PLANAR_LASER,
@@ -173,7 +173,7 @@ class FrontEnd:
         then = self._predictor.predict(item.stamp)
         body = None
         if depth is not None:
-            body = body_mask(
+            body = body_view(
                 depth.image,
                 depth_camera=depth.camera,
                 world_from_depth=depth.root_from_sensor,

@@ -28,10 +28,11 @@ from voodoo._core import Estimate
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
 from voodoo.sensors.assignment import assign
+from voodoo.sensors.depth import BodyView
 from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
 from voodoo.sensors.rays import SiteRay
-from voodoo.sensors.skin_colour import SkinColour
+from voodoo.sensors.skin_colour import Colours, SkinColour
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
@@ -50,10 +51,13 @@ class SkinSettings:
         sites: site -> standard deviation [m] of a region's centre from it. A face is the front of the head.
         gate: a candidate farther than this from the predicted site is not it [m].
         lost_gate: the same for a site whose limb nothing else measures.
+        depth_gate: with a depth image, a candidate must be as deep as its site up to its gate and this [m]: the
+            surface is not the site.
         ambiguity: a second candidate that is not this many times as far as the first makes both useless.
         noise: of a region's centre in the image; its spread is that of the site.
         static_seconds: what has skin's colour for so long away from head and hands is background [s].
         settled_frames: pictures to learn from before the cue is used.
+        learn_every: of the pictures after those, every n-th is learnt from.
 
     Raises:
         MeasurementError: a number that is not above zero.
@@ -64,14 +68,17 @@ class SkinSettings:
     )
     gate: float = 0.12
     lost_gate: float = 0.35
+    depth_gate: float = 0.10
     ambiguity: float = 1.5
     noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.0))
     static_seconds: float = 1.0
     settled_frames: int = 1
+    learn_every: int = 3
 
     def __post_init__(self) -> None:
         """Check the numbers."""
         numbers = {"gate": self.gate, "lost_gate": self.lost_gate, "static_seconds": self.static_seconds, **self.sites}
+        numbers["learn_every"] = float(self.learn_every)
         for name, value in numbers.items():
             if not (math.isfinite(value) and value > 0.0):
                 raise MeasurementError(f"skin {name}: expected a number > 0, found {value!r}")
@@ -104,6 +111,9 @@ class SkinTracker:
         self.candidates: list[Candidate] = []
         self.assigned: dict[str, Candidate] = {}
         self._skin: Mask | None = None
+        self._seen: Mask | None = None
+        self._colours: tuple[ByteImage, Colours] | None = None
+        self._pictures = 0
         self._body: Mask | None = None
         self._static: npt.NDArray[np.float32] | None = None
         self._learnt = 0
@@ -120,7 +130,7 @@ class SkinTracker:
         world_from_sensor: npt.ArrayLike,
         predicted: Mapping[str, FloatArray],
         *,
-        body: Mask | None = None,
+        body: BodyView | None = None,
         lost: Collection[str] = (),
         source: str = "skin",
     ) -> list[SiteRay]:
@@ -131,7 +141,8 @@ class SkinTracker:
             camera: calibration.
             world_from_sensor: (4, 4).
             predicted: site name -> (3,) in the world at the time of the picture.
-            body: (H, W), True where a depth camera saw something near the body; None: not known.
+            body: what a depth camera saw near the body; None: not known. A candidate must then lie at about the depth
+                of its site, so that a hand hidden behind the body does not jump to what is in front.
             lost: sites whose limb nothing else measures.
             source: name for `Estimate.sources`.
 
@@ -141,10 +152,12 @@ class SkinTracker:
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
         places = self._places(camera, pose, predicted)
-        skin = self.colour.classify(image)
-        self._body = body
+        self._colours = (image, Colours.of(image))
+        self._seen = self.colour.classify(self._colours[1])
+        skin = self._seen.copy()
+        self._body = None if body is None else body.mask
         if body is not None:
-            skin &= body
+            skin &= body.mask
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
         self._skin = skin
@@ -163,6 +176,14 @@ class SkinTracker:
         no_hand = np.flatnonzero([not item.hand for item in self.candidates])
         hands = np.flatnonzero([not site.startswith("head") for site in sites])
         cost[np.ix_(hands, no_hand)] = np.inf
+        if body is not None:
+            reach = 1.5 * PALM_M * focal / nearest
+            depths = [body.depth_at(item.pixel, reach) for item in self.candidates]
+            for row, site in enumerate(sites):
+                limit = self.settings.depth_gate + (self.settings.lost_gate if site in lost else self.settings.gate)
+                for column, depth in enumerate(depths):
+                    if depth is None or abs(depth - places[site][1]) > limit:
+                        cost[row, column] = np.inf
         gates = np.array([self.settings.lost_gate if site in lost else self.settings.gate for site in sites])
         pixels = np.array([item.pixel for item in self.candidates])
         rays = []
@@ -211,16 +232,23 @@ class SkinTracker:
             cv2.circle(near, centre, max(round(2.5 * radius), 2), 1, -1)
             if site in self.assigned or not self.settled:
                 cv2.circle(inside, centre, max(round(0.8 * radius), 1), 1, -1)
-        if self.colour.learn(image, inside.astype(bool), outside=~near.astype(bool), body=self._body):
+        self._pictures += 1
+        if self._seen is not None:
+            self._learn_static(self._seen, ~near.astype(bool), rate_hz)
+        # Light does not change from picture to picture; learning is the dearest part.
+        if self.settled and self._pictures % self.settings.learn_every:
+            return
+        known = self._colours
+        colours = known[1] if known is not None and known[0] is image else Colours.of(image)
+        if self.colour.learn(colours, inside.astype(bool), outside=~near.astype(bool), body=self._body):
             self._learnt += 1
-        if self._skin is not None:
-            seen = self.colour.classify(image)
-            if self._static is None or self._static.shape != seen.shape:
-                self._static = np.zeros(seen.shape, dtype=np.float32)
-            # A running mean of "skin's colour, and no head or hand near": half of it is reached after static_seconds.
-            share = 1.0 - 0.5 ** (1.0 / (self.settings.static_seconds * rate_hz))
-            away = ~near.astype(bool)
-            self._static[away] += share * (seen[away].astype(np.float32) - self._static[away])
+
+    def _learn_static(self, seen: Mask, away: Mask, rate_hz: float) -> None:
+        """A running mean of "skin's colour, and no head or hand near": half of it is reached after static_seconds."""
+        if self._static is None or self._static.shape != seen.shape:
+            self._static = np.zeros(seen.shape, dtype=np.float32)
+        share = np.float32(1.0 - 0.5 ** (1.0 / (self.settings.static_seconds * rate_hz)))
+        self._static += away * share * (seen - self._static)
 
     def _places(
         self, camera: Camera, pose: FloatArray, positions: Mapping[str, npt.NDArray[np.float64]]

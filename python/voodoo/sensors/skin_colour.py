@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -22,20 +24,34 @@ _PRIOR_CENTRE, _PRIOR_SPREAD = (150.0, 110.0), (8.0, 8.0)
 """Chroma (Cr, Cb) of human skin of any tone under white light, and its spread."""
 
 
+@dataclass(frozen=True, eq=False)
+class Colours:
+    """A picture as histogram bins (H, W), and where it is light enough to have a colour (H, W), 1 or 0."""
+
+    bins: npt.NDArray[np.int32]
+    lit: ByteImage
+
+    @classmethod
+    def of(cls, image: ByteImage, *, darkest: int = 30) -> Colours:
+        """Those of a BGR picture (H, W, 3); pixels with less luma than `darkest` have no reliable chroma."""
+        planes = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb))
+        luma, cr, cb = (np.asarray(plane, dtype=np.uint8) for plane in planes)
+        chroma = ((cr >> 2).astype(np.int32) << 6) | (cb >> 2)
+        return cls(((luma >> 5).astype(np.int32) << 12) | chroma, (luma >= darkest).astype(np.uint8))
+
+
 class SkinColour:
     """Decides by the ratio of two histograms, skin's and everything else's.
 
     Args:
         forgetting: share of the old histograms that a picture leaves.
         ratio: skin has to be this many times as likely as the rest.
-        darkest: pixels with less luma than this have no reliable chroma.
     """
 
-    def __init__(self, *, forgetting: float = 0.95, ratio: float = 2.0, darkest: int = 30) -> None:
+    def __init__(self, *, forgetting: float = 0.86, ratio: float = 2.0) -> None:
         """Start with the colours of all skins against evenly spread ones."""
         self.forgetting = forgetting
         self.ratio = ratio
-        self.darkest = darkest
         axis = (np.arange(CHROMA_BINS, dtype=np.float32) + 0.5) * (256 / CHROMA_BINS)
         cr = ((axis - _PRIOR_CENTRE[0]) / _PRIOR_SPREAD[0]) ** 2
         cb = ((axis - _PRIOR_CENTRE[1]) / _PRIOR_SPREAD[1]) ** 2
@@ -45,16 +61,16 @@ class SkinColour:
         self.rest: Histogram = np.full(_SHAPE, 1.0 / _SIZE, dtype=np.float32)
         self._pictures = 0
 
-    def classify(self, image: ByteImage) -> Mask:
-        """(H, W): True where a BGR image (H, W, 3) has the colour of skin; single pixels are removed."""
+    def classify(self, colours: Colours) -> Mask:
+        """(H, W): True where a picture has the colour of skin; single pixels are removed."""
         table = (self.skin > self.ratio * self.rest).astype(np.uint8).ravel()
-        return np.asarray(cv2.medianBlur(table[self._bins(image)], 3), dtype=bool) & self._lit(image)
+        return np.asarray(cv2.medianBlur(table[colours.bins] & colours.lit, 3), dtype=bool)
 
-    def learn(self, image: ByteImage, inside: Mask, *, outside: Mask, body: Mask | None = None) -> bool:
+    def learn(self, colours: Colours, inside: Mask, *, outside: Mask, body: Mask | None = None) -> bool:
         """Learn from the pixels where skin must be, and from those far from it.
 
         Args:
-            image: (H, W, 3) BGR.
+            colours: of the picture.
             inside: (H, W) where head and hands are. Only pixels whose colour is near to what skin was are learnt.
             outside: (H, W) where no head or hand is.
             body: (H, W) where the body is, if known: half of the rest is learnt from its clothes.
@@ -62,9 +78,9 @@ class SkinColour:
         Returns:
             Whether there was enough skin to learn from.
         """
-        bins = self._bins(image)
+        bins = colours.bins
         near = (self.skin > 0.5 * self.ratio * self.rest).ravel()
-        chosen = inside & near[bins] & self._lit(image)
+        chosen = inside & near[bins] & colours.lit.astype(bool)
         if int(chosen.sum()) < 20:
             return False
         # The first pictures make the general skin this person's; later ones follow slowly.
@@ -78,17 +94,6 @@ class SkinColour:
         self.rest = keep * self.rest + (1 - keep) * rest
         self._pictures += 1
         return True
-
-    def _lit(self, image: ByteImage) -> Mask:
-        # Green carries most of the luma; a threshold needs no more.
-        return np.asarray(image[..., 1] >= self.darkest // 2) & (image.max(axis=2) >= self.darkest)
-
-    @staticmethod
-    def _bins(image: ByteImage) -> npt.NDArray[np.int32]:
-        """(H, W) number of the bin of each pixel."""
-        planes = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)).astype(np.int32)
-        chroma = (planes[..., 1] >> 2) * CHROMA_BINS + (planes[..., 2] >> 2)
-        return np.asarray((planes[..., 0] >> 5) * CHROMA_BINS**2 + chroma, dtype=np.int32)
 
 
 def _histogram(bins: npt.NDArray[np.int32]) -> Histogram:

@@ -1,0 +1,124 @@
+"""Sensors that drop out, freeze, come late or stand where they do not: the others carry on, and the report shows it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo.metrics import JOINTS
+from voodoo.recordings import ColorImage, DepthImage, LaserScan, RecordedFrame, open_recording, sample_path
+from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+
+FRAMES = 40
+
+
+def run(change=lambda index, items: items, use=("depth", "scan", "skin")):
+    """Mean error of the twelve joints [m], and the estimates, with changed measurements."""
+    recording = open_recording(sample_path())
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(use=use, ground_z=0.0))
+    reference = recording.reference
+    columns = [reference.names.index(name) for name in JOINTS]
+    errors, estimates = [], []
+    for index, (recorded, _) in enumerate(zip(paired(recording), range(FRAMES), strict=False)):
+        items = tuple(change(index, list(recorded.measurements)))
+        estimate = front_end.step(RecordedFrame(recorded.stamp, items))
+        found = np.array([estimate.joints[name] for name in JOINTS])
+        errors.append(np.linalg.norm(found - reference.positions[index, columns], axis=1).mean())
+        estimates.append(estimate)
+    assert np.isfinite(errors).all()
+    return float(np.mean(errors)), estimates
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return run()
+
+
+def of(estimate, part):
+    """(given, matched, residual) of the source whose name holds `part`, None when it gave nothing."""
+    return next((row for name, row in estimate.sources.items() if part in name), None)
+
+
+def test_all_sensors_contribute(whole):
+    error, estimates = whole
+    assert error < 0.10
+    for part in ("depth", "scan", "color"):
+        assert any(of(estimate, part) is not None and of(estimate, part)[1] > 0 for estimate in estimates), part
+
+
+def test_random_dropouts(whole):
+    chance = np.random.default_rng(7)
+    error, estimates = run(lambda index, items: [item for item in items if chance.random() > 0.3])
+    assert error < whole[0] + 0.03
+    assert any(of(estimate, "depth") is None for estimate in estimates)
+
+
+def test_a_sensor_that_stops_and_comes_back(whole):
+    error, estimates = run(
+        lambda index, items: [i for i in items if not (isinstance(i, DepthImage) and 20 <= index < 26)]
+    )
+    assert all(of(estimate, "depth") is None for estimate in estimates[20:26])
+    assert of(estimates[-1], "depth")[1] > 300
+    assert error < whole[0] + 0.05
+
+
+def test_a_frozen_laser(whole):
+    first = []
+
+    def freeze(index, items):
+        first.extend(item for item in items if isinstance(item, LaserScan) and not first)
+        return [replace(first[0], stamp=i.stamp) if isinstance(i, LaserScan) else i for i in items]
+
+    error, _ = run(freeze)
+    assert error < whole[0] + 0.03
+
+
+def test_a_picture_that_is_100_ms_late(whole):
+    held = []
+
+    def late(index, items):
+        held.extend(item for item in items if isinstance(item, ColorImage))
+        rest = [item for item in items if not isinstance(item, ColorImage)]
+        return rest + ([held.pop(0)] if len(held) > 3 else [])
+
+    error, _ = run(late)
+    assert error < whole[0] + 0.03
+
+
+def test_a_laser_with_wrong_extrinsics(whole):
+    turn = np.eye(4)
+    turn[:2, :2] = [[0.94, -0.342], [0.342, 0.94]]  # 20 degrees: a metre off at the person
+    turn[:3, :3] /= np.cbrt(np.linalg.det(turn[:3, :3]))
+    u, _, v = np.linalg.svd(turn[:3, :3])
+    turn[:3, :3] = u @ v
+
+    def wrong(index, items):
+        return [
+            replace(i, root_from_sensor=i.root_from_sensor @ turn) if isinstance(i, LaserScan) else i for i in items
+        ]
+
+    error, estimates = run(wrong)
+    assert error < whole[0] + 0.03
+    # the report shows that its points are not on the body
+    right = np.mean([of(e, "scan")[1] for e in whole[1] if of(e, "scan")])
+    off = np.mean([of(e, "scan")[1] for e in estimates if of(e, "scan")])
+    assert off < 0.5 * right
+
+
+def test_a_colour_camera_with_wrong_extrinsics(whole):
+    shift = np.eye(4)
+    shift[0, 3] = 0.25  # 25 cm to the side
+
+    def wrong(index, items):
+        return [
+            replace(i, root_from_sensor=i.root_from_sensor @ shift) if isinstance(i, ColorImage) else i for i in items
+        ]
+
+    error, estimates = run(wrong)
+    assert error < whole[0] + 0.03
+    rays = sum(of(estimate, "color")[0] for estimate in estimates if of(estimate, "color"))
+    full = sum(of(estimate, "color")[0] for estimate in whole[1] if of(estimate, "color"))
+    assert rays < 0.7 * full

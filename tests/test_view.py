@@ -1,0 +1,87 @@
+"""The Rerun file, verified by Rerun's own command line, and the geometry that is shown."""
+
+import builtins
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo.errors import VoodooError
+from voodoo.recordings import open_recording, sample_path
+from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+from voodoo.view import Viewer, bands, limb_mesh, nearest_limb
+
+
+@pytest.fixture(scope="module")
+def steps():
+    recording = open_recording(sample_path())
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    return tracker, front_end, [recorded for recorded, _ in zip(paired(recording), range(4), strict=False)]
+
+
+def test_file_holds_everything(tmp_path, steps):
+    pytest.importorskip("rerun", reason="Rerun is not installed (pip install voodoo[view])")
+    tracker, front_end, frames = steps
+    path = tmp_path / "track.rrd"
+    with Viewer(save=path) as viewer:
+        for recorded in frames:
+            estimate = front_end.step(recorded)
+            viewer.log(estimate, tracker.body, recorded=recorded, front_end=front_end, seconds=0.01)
+    command = Path(sys.executable).with_name("rerun")
+    verified = subprocess.run([command, "rrd", "verify", path], capture_output=True, text=True, check=False)
+    assert verified.returncode == 0, verified.stderr
+    shown = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
+    for entity in (
+        "/world/body/limbs/l_forearm", "/world/body/joints", "/world/body/bands", "/world/rays", "/world/laser/scan",
+        "/world/points/camera_depth_image_rect_raw", "/world/cameras/camera_color_image_raw_compressed/picture",
+        "/plots/residual_mm", "/plots/steps", "/plots/step_ms", "/plots/sources/scan/matched",
+    ):  # fmt: skip
+        assert entity in shown, entity
+
+
+def test_without_rerun_the_message_says_what_to_install(monkeypatch, tmp_path):
+    find = builtins.__import__
+
+    def without(name, *args, **kwargs):
+        if name == "rerun":
+            raise ImportError(name)
+        return find(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(VoodooError, match=r"pip install voodoo\[view\]"):
+        Viewer(save=tmp_path / "x.rrd")
+
+
+def test_wrong_suffix(tmp_path):
+    pytest.importorskip("rerun")
+    with pytest.raises(VoodooError, match=r"\.rrd"):
+        Viewer(save=tmp_path / "x.mp4")
+
+
+def test_limb_mesh_is_closed_and_looks_outwards():
+    shape = voodoo.TaperedEllipticCylinder(0.4, 0.1, 0.08, 0.05, 0.06)
+    vertices, triangles, normals = limb_mesh(shape)
+    corners = vertices[triangles].astype(float)
+    # The divergence theorem gives the volume of a closed surface that looks outwards.
+    volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+    t = np.linspace(0, 1, 1001)
+    exact = np.pi * 0.4 * np.mean((0.1 - 0.05 * t) * (0.08 - 0.02 * t))
+    assert volume == pytest.approx(exact, rel=0.02)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-5)
+    distances = shape.closest_points(vertices.astype(np.float64)).signed_distance
+    assert np.abs(distances[: 4 * 24]).max() < 1e-4
+
+
+def test_points_are_coloured_by_their_limb(steps):
+    tracker, _, _ = steps
+    estimate, body = tracker.estimate, tracker.body
+    middle = (estimate.joints["l_knee"] + estimate.joints["l_ankle"]) / 2
+    found = nearest_limb(middle + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]]), estimate, body)
+    assert body.limb_names[found[0]] == "l_calf"
+    assert found[1] == len(body.limbs)
+    assert len(bands(estimate, body)) == len(body.limbs) - 1
