@@ -105,7 +105,7 @@ def run_pink(
     now = pink.Configuration(model, data, start)
     frames = [model.getFrameId(f"site_{site}") for site in SITES]
     began = time.perf_counter()
-    for step in range(1, most + 1):
+    for step in range(1, most + 1):  # noqa: B007 - used after the loop
         velocity = pink.solve_ik(now, tasks, 1.0, solver="quadprog", damping=1e-8, limits=[])
         now.integrate_inplace(velocity, 1.0)
         worst = max(
@@ -149,7 +149,8 @@ def main() -> None:
     for name, rows in (("voodoo.ik", ours), ("pink", theirs)):
         steps, seconds, worst = np.array(rows).T
         print(
-            f"| {name} | {steps.mean():.1f} | {1e3 * seconds.mean():.3f} | {1e6 * seconds.sum() / steps.sum():.1f} | {1e6 * worst.max():.2f} |"
+            f"| {name} | {steps.mean():.1f} | {1e3 * seconds.mean():.3f} | {1e6 * seconds.sum() / steps.sum():.1f} "
+            f"| {1e6 * worst.max():.2f} |"
         )
     step = [np.sum([row[1] for row in rows]) / np.sum([row[0] for row in rows]) for rows in (theirs, ours)]
     posture = [np.sum([row[1] for row in rows]) for rows in (theirs, ours)]
