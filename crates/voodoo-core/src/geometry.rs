@@ -39,6 +39,13 @@ impl Points {
         self.z.clear();
     }
 
+    /// Makes room for `len` points in all.
+    pub fn reserve(&mut self, len: usize) {
+        for axis in [&mut self.x, &mut self.y, &mut self.z] {
+            axis.reserve(len.saturating_sub(axis.len()));
+        }
+    }
+
     /// Sets the number of points; new ones are zero.
     pub fn resize(&mut self, len: usize) {
         self.x.resize(len, 0.0);

@@ -63,6 +63,14 @@ impl Tracker {
     fn collect_open(&self, work: &mut Hypotheses) {
         work.open.clear();
         work.open_weight.clear();
+        work.near.clear();
+        work.near_weight.clear();
+        // Room for the worst case at once, not when the first hard frame comes.
+        let most = self.candidates.len();
+        work.open.reserve(most);
+        work.open_weight.reserve(most);
+        work.near.reserve(most);
+        work.near_weight.reserve(most);
         work.best.clear();
         work.best.resize(self.candidates.len(), f32::INFINITY);
         for matches in &self.correspondences.limbs {
