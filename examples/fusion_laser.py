@@ -123,7 +123,7 @@ def main() -> None:
     lines = [
         "Distance from the middle of the two legs to the clicked position (cm), person by person.",
         "",
-        "| person | clicks | seconds | way of the person / m | way of the robot / m | mean | last | within 25 cm |",
+        "| person | clicks | seconds | person moved / m | robot moved / m | mean | last | within 25 cm |",
         "|---|---|---|---|---|---|---|---|",
     ]
     paths = {}
@@ -139,7 +139,7 @@ def main() -> None:
             lines.append(head + "| | | no two legs at the start | | |")
             continue
         ways = [
-            float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+            float(np.linalg.norm(places[-1] - places[0]))
             for places in (truth[FIRST:], np.array([pose[:2, 3] for pose in poses[FIRST:]]))
         ]
         error = 100.0 * np.linalg.norm(found - truth[FIRST:], axis=1)
