@@ -110,6 +110,9 @@ class Frame:
     def add_points(self, points, **options):
         self.calls.append(("points", points.shape, options))
 
+    def set_ground(self, **options):
+        self.ground = options
+
 
 class Tracker:
     """Knows the answer: stands in `reference` displaced by `offset`, or stays where it was reset to."""

@@ -13,7 +13,7 @@ from voodoo import BodyError, ConfigError, MeasurementError, VoodooError
 
 @pytest.fixture(scope="module")
 def body():
-    return voodoo.Body.human(height=1.75)
+    return voodoo.Body.human(height=1.75, model="papers")
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +212,7 @@ def test_a_reset_needs_positions_that_fix_the_pose(body):
 
 
 def test_a_reset_reproduces_positions_and_sizes(body):
-    tall = voodoo.Body.human(height=1.9)
+    tall = voodoo.Body.human(height=1.9, model="papers")
     wanted = {name: position + np.array([3.0, -1.0, 0.5]) for name, position in standing_joints(tall).items()}
     tracker = voodoo.Tracker(body)
     estimate = tracker.reset(joints=wanted)
@@ -220,7 +220,9 @@ def test_a_reset_reproduces_positions_and_sizes(body):
         np.testing.assert_allclose(estimate.joints[name], position, atol=1e-6, err_msg=name)
     for limb, other in zip(tracker.body.limbs, tall.limbs, strict=True):
         assert limb.shape.length == pytest.approx(other.shape.length, abs=1e-6), limb.name
-    assert np.isnan(estimate.stamp) and body == voodoo.Body.human(height=1.75), "the given body is not changed"
+    assert np.isnan(estimate.stamp) and body == voodoo.Body.human(height=1.75, model="papers"), (
+        "the given body is not changed"
+    )
 
 
 def test_the_body_changes_between_frames(tracker, cloud):

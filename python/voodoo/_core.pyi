@@ -8,11 +8,13 @@ import numpy.typing as npt
 
 __all__ = [
     "Body",
+    "Chain",
     "ClosestPoints",
     "Estimate",
     "Frame",
     "TaperedEllipticCylinder",
     "Tracker",
+    "View",
     "__version__",
     "config_fields",
 ]
@@ -291,7 +293,7 @@ class Chain:
         segments: Sequence[tuple[str, str, float]] | None,
         margin: float,
         views: Sequence[View],
-        how: tuple[int, float, float, float, float],
+        how: tuple[int, float, float, float, float, float],
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], int, bool, float]: ...
     def solve_many(
         self,
@@ -302,7 +304,7 @@ class Chain:
         segments: Sequence[tuple[str, str, float]] | None,
         margin: float,
         views: Sequence[View],
-        how: tuple[int, float, float, float, float],
+        how: tuple[int, float, float, float, float, float],
     ) -> tuple[
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],

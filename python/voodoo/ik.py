@@ -151,7 +151,7 @@ class Silhouette:
 
 
 def signed_distance(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
-    """Distance (height, width) [px] to the border of a mask, negative inside; its zero is half-way between two pixels."""
+    """Distance (height, width) [px] to the border of a mask, negative inside; its zero is between two pixels."""
     if mask.all():
         return np.full(mask.shape, -float(max(mask.shape)), dtype=np.float32)
     if not mask.any():
@@ -192,8 +192,8 @@ class Posture:
         """The numbers that say how it went."""
         worst = max(self.residuals, default=0.0)
         return (
-            f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px of {self.images} "
-            f"images, {self.steps} steps, {'converged' if self.converged else 'not converged'})"
+            f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px "
+            f"of {self.images} images, {self.steps} steps, {'converged' if self.converged else 'not converged'})"
         )
 
 
@@ -206,8 +206,8 @@ class Chain:
         Args:
             body: any body.
             limbs: limb names; () for all of them. All but the first must hang on another one of them.
-            root: "free": the first limb's pose are six unknowns; "fixed": it stands still (a whole body) or turns in its
-                joint to a base that does (chosen limbs). None: free for a whole body, fixed for chosen limbs.
+            root: "free": the first limb's pose are six unknowns; "fixed": it stands still (a whole body) or turns in
+                its joint to a base that does (chosen limbs). None: free for a whole body, fixed for chosen limbs.
 
         Raises:
             BodyError: an unknown limb, or limbs that do not hang together.
@@ -265,7 +265,7 @@ class Chain:
         Args:
             world_from_limb: rigid (4, 4) of every limb of the body.
             world_from_base: where the chain is rooted.
-            closest: of the closed chain nearest to the pose in the least-squares sense; else only read each joint's turn.
+            closest: of the closed chain nearest to the pose in the least-squares sense; else only each joint's turn.
 
         Raises:
             MeasurementError: a limb is missing, or a matrix is not rigid.
@@ -303,6 +303,8 @@ class Options:
         tolerance: a residual below this is zero [m].
         still: a step that changes no angle by more ends the search [rad].
         gain: share of the step h / |P grad h|^2 of the image criterion, above 0 to 1: alpha of J10 eq. 4.
+        caution: damping of the image step where few samples lie outside, or the cameras look along the motion: the change
+            of h per radian, as a share of the bones' length in the images, that counts; 0 trusts every pixel.
         largest_turn: largest change of an angle in one step [rad].
         margin: how deep bones shall lie inside the silhouettes, in radii of their limbs; 0 is J10's criterion.
         bones: the segments that are projected; None: joint to joint.
@@ -312,6 +314,7 @@ class Options:
     tolerance: float = 1e-6
     still: float = 1e-6
     gain: float = 1.0
+    caution: float = 0.4
     largest_turn: float = 0.5
     margin: float = 0.0
     bones: tuple[Bone, ...] | None = field(default=None)
@@ -328,6 +331,7 @@ class Options:
             ("tolerance", 0.0, 1.0),
             ("still", 0.0, 1.0),
             ("gain", 1e-6, 1.0),
+            ("caution", 0.0, 10.0),
             ("largest_turn", 1e-6, math.pi),
             ("margin", 0.0, 2.0),
         ):
@@ -335,9 +339,9 @@ class Options:
             if not (isinstance(value, (int, float)) and low <= value <= high):
                 raise MeasurementError(f"{name}: expected {low:g} to {high:g}, found {value!r}")
 
-    def parts(self) -> tuple[int, float, float, float, float]:
+    def parts(self) -> tuple[int, float, float, float, float, float]:
         """The options as the core takes them."""
-        return (self.steps, self.tolerance, self.still, self.gain, self.largest_turn)
+        return (self.steps, self.tolerance, self.still, self.gain, self.caution, self.largest_turn)
 
 
 def solve(
@@ -352,16 +356,16 @@ def solve(
 ) -> Posture:
     """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, limits throughout.
 
-    Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing here is
-    ever NaN.
+    Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing
+    here is ever NaN.
 
     Args:
         chain: what moves; a body stands for the chain of all its limbs with a free root.
         targets: site name -> position (3,) [m], or Targets. Sites may occur more than once.
         images: silhouettes; empty ones take no part.
         start: angles (n,) or a posture to start from; None: at rest.
-        world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the chosen
-            limbs; None: identity.
+        world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
+            chosen limbs; None: identity.
         options: see Options.
         **changes: single fields of Options, e.g. `steps=30, margin=0.8`.
 
@@ -399,8 +403,8 @@ def solve(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Postures:
-    """N postures of `solve_many`: angles (N, n), joints (N, S, 3) [m] in the order of Chain.site_names, h (N,) [px], steps
-    (N,), converged (N,)."""
+    """N postures of `solve_many`: angles (N, n), joints (N, S, 3) [m] in the order of Chain.site_names, h (N,) [px],
+    steps (N,), converged (N,)."""
 
     angles: FloatArray
     joints: FloatArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
@@ -13,7 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo
+from voodoo.angles import angle_names as angle_names_of
+from voodoo.angles import angles_of
 from voodoo.errors import VoodooError, reading
+from voodoo.ik import Chain
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -33,6 +36,8 @@ class Track:
         joints: (F, J, 3) [m] in the recording's root frame.
         limb_names: L names; () when the track was read from a .csv, which has no limb poses.
         world_from_limb: (F, L, 4, 4) poses of the limb frames in the root frame.
+        angle_names: A names of joint angles, see voodoo.angles; () when none were asked for.
+        angles: (F, A) [rad].
     """
 
     stamps: FloatArray
@@ -42,11 +47,16 @@ class Track:
     joints: FloatArray
     limb_names: tuple[str, ...]
     world_from_limb: FloatArray
+    angle_names: tuple[str, ...] = ()
+    angles: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     def __post_init__(self) -> None:
         """Check that the arrays belong together and are finite: a result is never NaN."""
         frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
+        if not self.angle_names:
+            object.__setattr__(self, "angles", np.empty((frames, 0)))
         expected = {
+            "angles": (frames, len(self.angle_names)),
             "stamps": (frames,),
             "residual": (frames,),
             "joints": (frames, joints, 3),
@@ -71,8 +81,8 @@ class Track:
         return f"Track({len(self)} frames, {len(self.joint_names)} joints and sites, {len(self.limb_names)} limbs)"
 
     @classmethod
-    def of(cls, estimates: Sequence[voodoo.Estimate]) -> Track:
-        """Collect estimates of one body.
+    def of(cls, estimates: Sequence[voodoo.Estimate], *, body: voodoo.Body | None = None) -> Track:
+        """Collect estimates of one body; with the body also its joint angles.
 
         Raises:
             VoodooError: no estimate, one that is not finite, or one of another body.
@@ -83,7 +93,15 @@ class Track:
         for index, estimate in enumerate(estimates):
             if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
                 raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
+        angle_names: tuple[str, ...] = ()
+        angles = np.empty((len(estimates), 0))
+        if body is not None:
+            chain = Chain(body)
+            angles = np.array([angles_of(chain, estimate) for estimate in estimates], dtype=np.float64)
+            angle_names = angle_names_of(body)
         return cls(
+            angle_names=angle_names,
+            angles=angles,
             stamps=np.array([estimate.stamp for estimate in estimates], dtype=np.float64),
             status=tuple(str(estimate.status) for estimate in estimates),
             residual=np.array([estimate.residual for estimate in estimates], dtype=np.float64),
@@ -117,13 +135,13 @@ class Track:
     def _write_csv(self, path: Path) -> None:
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_header(self.joint_names))
-            for stamp, status, residual, joints in zip(
-                self.stamps, self.status, self.residual, self.joints, strict=True
+            writer.writerow(_header(self.joint_names, self.angle_names))
+            for stamp, status, residual, joints, angles in zip(
+                self.stamps, self.status, self.residual, self.joints, self.angles, strict=True
             ):
                 # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
                 row = [repr(float(stamp)), status, f"{residual:.6f}"]
-                writer.writerow(row + [f"{value:.6f}" for value in joints.ravel()])
+                writer.writerow(row + [f"{value:.6f}" for value in (*joints.ravel(), *angles)])
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as file:
@@ -136,6 +154,8 @@ class Track:
                 joints=self.joints,
                 limb_names=np.array(self.limb_names, dtype=np.str_),
                 world_from_limb=self.world_from_limb,
+                angle_names=np.array(self.angle_names, dtype=np.str_),
+                angles=self.angles,
             )
 
     @classmethod
@@ -156,14 +176,19 @@ class Track:
     def _read_csv(cls, path: Path) -> Track:
         with path.open(newline="", encoding="utf-8") as file:
             header, *rows = list(csv.reader(file)) or [[]]
-        names = tuple(cell.removesuffix("_x") for cell in header[3::3])
-        if header != _header(names):
+        first = next((i for i, cell in enumerate(header) if cell.endswith("_rad")), len(header))
+        names = tuple(cell.removesuffix("_x") for cell in header[3:first:3])
+        angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:])
+        if header != _header(names, angle_names):
             raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {header[:5]}")
         for line, row in enumerate(rows, start=2):
             if len(row) != len(header):
                 raise VoodooError(f"line {line}: expected {len(header)} cells, found {len(row)}")
-        joints = np.array([[float(cell) for cell in row[3:]] for row in rows], dtype=np.float64)
+        joints = np.array([[float(cell) for cell in row[3:first]] for row in rows], dtype=np.float64)
+        angles = np.array([[float(cell) for cell in row[first:]] for row in rows], dtype=np.float64)
         return cls(
+            angle_names=angle_names,
+            angles=angles.reshape(len(rows), len(angle_names)),
             stamps=np.array([float(row[0]) for row in rows], dtype=np.float64),
             status=tuple(row[1] for row in rows),
             residual=np.array([float(row[2]) for row in rows], dtype=np.float64),
@@ -187,6 +212,9 @@ class Track:
                 joints=content["joints"],
                 limb_names=tuple(str(value) for value in content["limb_names"]),
                 world_from_limb=content["world_from_limb"],
+                # Files of earlier versions have no angles.
+                angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
+                angles=content["angles"] if "angles" in content else np.empty((0, 0)),
             )
 
 
@@ -200,5 +228,6 @@ def check_suffix(path: Path) -> None:
         raise VoodooError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}, found {path.suffix!r}")
 
 
-def _header(names: Sequence[str]) -> list[str]:
-    return ["stamp_s", "status", "residual_m", *(f"{name}_{axis}" for name in names for axis in "xyz")]
+def _header(names: Sequence[str], angle_names: Sequence[str] = ()) -> list[str]:
+    places = [f"{name}_{axis}" for name in names for axis in "xyz"]
+    return ["stamp_s", "status", "residual_m", *places, *(f"{name}_rad" for name in angle_names)]

@@ -1,4 +1,4 @@
-"""Masks of the person in depth and colour pictures, for voodoo.ik: by connected depth, or against a still background."""
+"""Masks of the person in depth and colour pictures, for voodoo.ik: by connected depth or still background."""
 
 from __future__ import annotations
 
@@ -59,7 +59,16 @@ def from_depth(depth: DepthImage, known: Mapping[str, FloatArray], *, level: boo
             if distance[0] - _IN_FRONT_M <= here <= distance[0] + _BEHIND_M:
                 seeds.add(int(labels[v * width + u]))
     mask = np.isin(labels, list(seeds)) & solid
-    return np.asarray(mask.reshape(height, width), dtype=bool)
+    return filled(np.asarray(mask.reshape(height, width), dtype=bool))
+
+
+def filled(mask: Mask, *, hole: int = 40) -> Mask:
+    """A mask without cracks and without holes of up to `hole` pixels: sensors leave out single pixels, and a distance
+    transform takes each of them for background."""
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - closed, connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] <= hole
+    return np.asarray((closed != 0) | small[labels], dtype=bool)
 
 
 def _connected(z: FloatArray) -> npt.NDArray[np.int32]:

@@ -87,7 +87,10 @@ fn a_warm_step_allocates_nothing() {
     let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);
     // To and fro, so that the frames after the warm-up need no more memory than those before.
     frames.extend(frames.clone().into_iter().rev());
-    for config in scene::every_solver() {
+    for config in scene::every_solver()
+        .into_iter()
+        .flat_map(|config| [false, true].map(|hypotheses| Config { hypotheses, ..config.clone() }))
+    {
         assert_eq!(allocations(config.clone(), &frames), 0, "{config:?}");
         // The step itself allocates nothing here either; the queue through which rayon hands work to its threads takes a
         // new block for every 63 jobs, and a frame hands over at most one job an ICP step and one more.

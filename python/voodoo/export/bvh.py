@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+from scipy.spatial.transform import Rotation
 
 from voodoo.body import Body
 from voodoo.export.skeleton import Bone, FloatArray, mean_interval, skeleton

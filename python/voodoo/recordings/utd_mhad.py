@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.io  # type: ignore[import-untyped]
+import scipy.io
 
 from voodoo.camera import Camera
 from voodoo.errors import RecordingError, reading

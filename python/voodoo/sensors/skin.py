@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d  # type: ignore[import-untyped]
+from scipy.ndimage import maximum_filter1d
 
 from voodoo._core import Estimate
 from voodoo.camera import Camera

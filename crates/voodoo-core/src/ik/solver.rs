@@ -10,12 +10,8 @@ use crate::geometry::Pose;
 
 /// Least damping, m^2: small beside `J J^T` of anything a person can see, so that the last steps are Newton's.
 const LEAST_DAMPING: f64 = 1e-10;
-/// Most steps of the higher levels alone, against what the lower ones' finite steps left.
-const SETTLE: usize = 100;
 /// Residual that a lower level may leave in a higher one, metres.
 const SETTLED: f64 = 1e-10;
-/// Share of the bones' length in the images, per radian, below which the gradient of `h` says little.
-const BLIND: f64 = 0.2;
 /// Turn that leaves a stationary pose with a residual, radians.
 const NUDGE: f64 = 0.05;
 
@@ -30,13 +26,16 @@ pub struct Options {
     pub still: f64,
     /// Share of the image step `h / |grad h|^2` to take, 0 to 1: alpha of J10 eq. 4 over that step.
     pub gain: f64,
+    /// Change of `h` per radian, as a share of the bones' length in the images, below which its gradient says little: damps the
+    /// image step where few samples lie outside, and along the line of sight. 0: Polyak's step undamped.
+    pub caution: f64,
     /// Largest change of an unknown in one step, radians.
     pub largest_turn: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, largest_turn: 0.5 }
+        Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, caution: 0.4, largest_turn: 0.5 }
     }
 }
 
@@ -167,10 +166,10 @@ impl Solver {
         report.converged &= rest;
     }
 
-    /// Steps of the levels above alone; true when they are as good as before the phase.
+    /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they are as good as before the phase.
     fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
         for active in (1..=levels).rev() {
-            for _ in 0..SETTLE {
+            for _ in 0..problem.options.steps {
                 let reached = self.cost[..active].iter().all(|cost| *cost < SETTLED * SETTLED);
                 if reached || self.step(problem, active, false, true, angles) < 1e-12 {
                     break;
@@ -283,11 +282,11 @@ impl Solver {
 
     /// The image's part: `-alpha (I - J^+ J) grad h` (J10 eq. 4) with Polyak's step `alpha = gain h / |P grad h|^2`, since the
     /// least `h` is zero. Where the images hardly see the free motion (along the line of sight) the gradient is small and
-    /// says little, so `alpha = gain h / (|P grad h|^2 + (BLIND reach)^2)`.
+    /// says little, so `alpha = gain h / (|P grad h|^2 + (caution reach)^2)`.
     fn image_part(&mut self, problem: &Problem, count: usize, angles: &[f64]) {
         let n = angles.len();
         self.inherit(count, n);
-        let blind = BLIND * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.at));
+        let blind = problem.options.caution * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.at));
         for _ in 0..=n {
             self.part.copy_from_slice(&self.gradient);
             self.taken.project(&mut self.part);
@@ -324,7 +323,13 @@ impl Solver {
         let mut hit = None;
         for (i, [low, high]) in problem.model.limits().iter().enumerate() {
             let (from, by) = (angles[i] + step[i], self.part[i]);
-            let room = if by < -1e-15 { low - from } else if by > 1e-15 { high - from } else { continue };
+            let room = if by < -1e-15 {
+                low - from
+            } else if by > 1e-15 {
+                high - from
+            } else {
+                continue;
+            };
             if share * by.abs() > room.abs() {
                 share = (room / by).max(0.0);
                 hit = Some(i);
@@ -344,7 +349,11 @@ impl Solver {
         self.propose(problem, angles, last, 1.0);
         self.evaluate(problem, true);
         let Some(failed) = self.first_failure(n, count, image, slack, last) else {
-            self.trust[..count].iter_mut().for_each(|trust| *trust = (0.3 * *trust).max(1e-6));
+            for level in 0..count {
+                // Slow progress is the sign of a goal out of reach, where less damping would overshoot.
+                let shrink = if self.trial_cost[level] < 0.9 * self.cost[level] { 0.3 } else { 0.8 };
+                self.trust[level] = (shrink * self.trust[level]).max(1e-6);
+            }
             self.gain = (1.5 * self.gain).min(problem.options.gain);
             return self.take_trial(angles);
         };
@@ -360,7 +369,9 @@ impl Solver {
             }
             self.propose(problem, angles, stage, share);
             self.evaluate(problem, true);
-            if (share == 0.0 && slack) || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none() {
+            if (share == 0.0 && slack)
+                || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
+            {
                 return self.take_trial(angles);
             }
         }
@@ -394,7 +405,7 @@ impl Solver {
             };
             let limit = match self.best.get(level) {
                 Some(best) if !slack => (best + 0.1 * SETTLED).max(self.before[level]),
-                _ => self.before[level] * (1.0 + 1e-9) + rise + 1e-13,
+                _ => self.before[level] + rise + 1e-13,
             };
             // Written so that a NaN fails.
             if !(self.trial_cost[level].sqrt() <= limit) {
