@@ -1,9 +1,12 @@
-"""voodoo.ik against pink (pin-pink on Pinocchio): a body of 26 freedoms, ten point targets, the same start and tolerance.
+"""voodoo.ik against pink (pin-pink on Pinocchio): a body of 26 freedoms, ten point targets, the same start and
+tolerance.
 
     pip install pin-pink quadprog && python benches/compare_pink.py
 
-Both solve the same reachable postures from the same starts on one thread, called from Python, until the worst target is nearer
-than the tolerance. pink steps by its own solve_ik and integrate, with its model built from the voodoo chain, joint by joint.
+Both solve the same reachable postures from the same starts on one thread, called from Python, until the worst target
+is nearer
+than the tolerance. pink steps by its own solve_ik and integrate, with its model built from the voodoo chain, joint by
+joint.
 """
 
 from __future__ import annotations
@@ -22,11 +25,23 @@ import pinocchio as pin
 import voodoo
 from voodoo import ik
 
-SITES = ("l_hand", "r_hand", "l_elbow", "r_elbow", "l_shoulder", "l_ankle", "r_ankle", "l_knee", "r_knee", "head_center")
+SITES = (
+    "l_hand",
+    "r_hand",
+    "l_elbow",
+    "r_elbow",
+    "l_shoulder",
+    "l_ankle",
+    "r_ankle",
+    "l_knee",
+    "r_knee",
+    "head_center",
+)
 
 
 def body() -> voodoo.Body:
-    """Papers' human with an elbow of three freedoms less: 6 root, 3 neck, 2 x (3 shoulder, 1 elbow, 3 hip, 1 knee) = 25, and a
+    """Papers' human with an elbow of three freedoms less: 6 root, 3 neck, 2 x (3 shoulder, 1 elbow, 3 hip, 1 knee) =
+    25, and a
     hinge at the right wrist: 26."""
     text = voodoo.Body.human(1.75, model="papers").to_toml()
     text += """
@@ -81,7 +96,9 @@ def configuration(chain: ik.Chain, model: pin.Model, angles: np.ndarray) -> np.n
     return q
 
 
-def run_pink(model: pin.Model, start: np.ndarray, goals: np.ndarray, tolerance: float, most: int, gain: float) -> tuple[int, float, float]:
+def run_pink(
+    model: pin.Model, start: np.ndarray, goals: np.ndarray, tolerance: float, most: int, gain: float
+) -> tuple[int, float, float]:
     """Steps, seconds in the loop, and worst residual [m]."""
     data = model.createData()
     tasks = []
@@ -92,10 +109,14 @@ def run_pink(model: pin.Model, start: np.ndarray, goals: np.ndarray, tolerance: 
     now = pink.Configuration(model, data, start)
     frames = [model.getFrameId(f"site_{site}") for site in SITES]
     began = time.perf_counter()
-    for step in range(1, most + 1):
+    step = 0
+    while step < most:
+        step += 1
         velocity = pink.solve_ik(now, tasks, 1.0, solver="quadprog", damping=1e-8, limits=[])
         now.integrate_inplace(velocity, 1.0)
-        worst = max(np.linalg.norm(now.data.oMf[frame].translation - goal) for frame, goal in zip(frames, goals, strict=True))
+        worst = max(
+            np.linalg.norm(now.data.oMf[frame].translation - goal) for frame, goal in zip(frames, goals, strict=True)
+        )
         if worst < tolerance:
             break
     return step, time.perf_counter() - began, worst
@@ -109,8 +130,10 @@ def main() -> None:
     chain = ik.Chain(body())
     model = pinocchio_model(chain)
     n = len(chain.angle_names)
-    print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, pink {pink.__version__}, "
-          f"pinocchio {pin.__version__}, one thread; {n} freedoms (pinocchio: {model.nv}), {len(SITES)} targets")
+    print(
+        f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, pink {pink.__version__}, "
+        f"pinocchio {pin.__version__}, one thread; {n} freedoms (pinocchio: {model.nv}), {len(SITES)} targets"
+    )
     rng = np.random.default_rng(7)
     ours, theirs, positions = [], [], []
     for _ in range(arguments.postures):
@@ -131,7 +154,9 @@ def main() -> None:
     print("| | steps | ms a posture | us a step | worst residual, um |\n|---|---|---|---|---|")
     for name, rows in (("voodoo.ik", ours), ("pink", theirs)):
         steps, seconds, worst = np.array(rows).T
-        print(f"| {name} | {steps.mean():.1f} | {1e3 * seconds.mean():.3f} | {1e6 * seconds.sum() / steps.sum():.1f} | {1e6 * worst.max():.2f} |")
+        print(
+            f"| {name} | {steps.mean():.1f} | {1e3 * seconds.mean():.3f} | {1e6 * seconds.sum() / steps.sum():.1f} | {1e6 * worst.max():.2f} |"  # noqa: E501
+        )
     step = [np.sum([row[1] for row in rows]) / np.sum([row[0] for row in rows]) for rows in (theirs, ours)]
     posture = [np.sum([row[1] for row in rows]) for rows in (theirs, ours)]
     print(f"voodoo.ik is {step[0] / step[1]:.1f} times faster a step, {posture[0] / posture[1]:.1f} times a posture")

@@ -67,7 +67,7 @@ class Body:
         self.limb_names = tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height=1.75):
+    def human(cls, height=1.75, *, model="papers"):
         body = cls()
         body.height = height
         return body
@@ -109,6 +109,9 @@ class Frame:
 
     def add_points(self, points, **options):
         self.calls.append(("points", points.shape, options))
+
+    def set_ground(self, **options):
+        self.ground = options
 
 
 class Tracker:

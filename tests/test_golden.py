@@ -24,7 +24,7 @@ def tracked():
     config = voodoo.Config(solver="limbwise")
     positions, errors = {}, []
     truth = recording.reference
-    for frame in track(recording, start_tracker(recording, config=config)):
+    for frame in track(recording, start_tracker(recording, config=config, model="papers")):
         joints = frame.estimate.joints
         errors += [
             np.linalg.norm(joints[name] - place)

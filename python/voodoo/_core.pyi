@@ -271,9 +271,7 @@ class Chain:
     def forward(
         self, base: npt.ArrayLike, angles: npt.NDArray[np.float64]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
-    def jacobian(
-        self, base: npt.ArrayLike, angles: npt.NDArray[np.float64], site: str
-    ) -> npt.NDArray[np.float64]: ...
+    def jacobian(self, base: npt.ArrayLike, angles: npt.NDArray[np.float64], site: str) -> npt.NDArray[np.float64]: ...
     def criterion(
         self,
         base: npt.ArrayLike,
@@ -294,9 +292,7 @@ class Chain:
         margin: float,
         views: Sequence[View],
         how: tuple[int, float, float, float, float, float],
-    ) -> tuple[
-        npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], int, bool, float
-    ]: ...
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], int, bool, float]: ...
     def solve_many(
         self,
         base: npt.ArrayLike,

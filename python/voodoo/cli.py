@@ -21,7 +21,7 @@ from voodoo.overlay import Overlay, Picture, contact_sheet
 from voodoo.picture_writer import PictureWriter, save_picture
 from voodoo.recordings import LOADERS, Recording, open_recording, sample_path
 from voodoo.results import Track, check_suffix
-from voodoo.running import Init, start_tracker, track
+from voodoo.running import HumanModel, Init, start_tracker, track
 
 T = TypeVar("T")
 
@@ -48,6 +48,10 @@ _BodyOption = Annotated[
 _HeightOption = Annotated[
     float | None,
     typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in metres."),
+]
+_ModelOption = Annotated[
+    HumanModel,
+    typer.Option("--model", help="The default human: of sixteen limbs (full), or of the papers' ten."),
 ]
 _FrameOption = Annotated[
     str | None,
@@ -91,6 +95,7 @@ def track_command(
     ] = None,
     body: _BodyOption = None,
     height: _HeightOption = None,
+    model: _ModelOption = "full",
     config: _ConfigOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Result, .csv or .npz; by default NAME.csv in this folder.")
@@ -126,6 +131,7 @@ def track_command(
             init=None if init is None else Init.load(init),
             body=None if body is None else voodoo.Body.load(body),
             height=height,
+            model=model,
             config=_config(config),
         )
         result, _, _ = _run(source, tracker, overlay)
@@ -159,6 +165,59 @@ def demo_command(
         typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")
 
 
+@app.command("ik")
+def ik_command(
+    recording: _RecordingArgument,
+    targets: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Known positions: a result of voodoo track. By default the reference's."),
+    ] = None,
+    sites: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,...", help="The sites that are known: by default head, trunk, hands, ankles."),
+    ] = None,
+    pictures: Annotated[
+        str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), or none (plain).")
+    ] = "depth",
+    init: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Result, .csv or .npz; by default NAME_ik.csv in this folder.")
+    ] = None,
+    frame: _FrameOption = None,
+    loader: _LoaderOption = None,
+) -> None:
+    """Find postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
+
+    The result has the columns of voodoo track and NAME_rad for every joint angle. Sites that are not among the known
+    ones are
+    compared with the reference, if it has them.
+
+    [bold]Examples[/bold]
+
+    voodoo ik walk_bag/ --pictures none
+
+    voodoo ik walk_bag/ --targets pose.npz --sites l_hand,r_hand,head_center --out angles.csv
+    """
+    from voodoo.ik_recording import KNOWN, Positions, follow
+
+    with _clear_errors():
+        source = _open(recording, loader, frame)
+        target = out if out is not None else Path(f"{source.name}_ik.csv")
+        check_suffix(target)
+        positions = Positions.of(source, None if targets is None else Track.load(targets))
+        tracker = start_tracker(source, init=None if init is None else Init.load(init))
+        known = KNOWN if sites is None else tuple(name.strip() for name in sites.split(","))
+        result, errors = follow(source, tracker, positions, sites=known, pictures=pictures)  # type: ignore[arg-type]
+        result.save(target)
+        for name, values in errors.items():
+            if np.isfinite(values).any():
+                typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
+        typer.echo(f"{len(result)} frames, {_states(result)}; wrote {target}")
+
+
 @app.command("eval")
 def eval_command(
     recordings: Annotated[
@@ -172,6 +231,10 @@ def eval_command(
     only: Annotated[
         list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
     ] = None,
+    model: _ModelOption = "full",
+    depth_only: Annotated[
+        bool, typer.Option("--depth-only", help="Leave out everything but depth images (no laser, no clouds).")
+    ] = False,
     loader: _LoaderOption = None,
 ) -> None:
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
@@ -192,7 +255,7 @@ def eval_command(
         _config(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-        done = evaluate_all(paths, config_file=config, loader=loader, jobs=jobs)
+        done = evaluate_all(paths, config_file=config, loader=loader, model=model, depth_only=depth_only, jobs=jobs)
         ordered = sorted(_progress(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
         typer.echo(markdown(scores))
@@ -226,6 +289,7 @@ def config_command() -> None:
 def body_command(
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A body file to check and print.")] = None,
     height: _HeightOption = None,
+    model: _ModelOption = "full",
 ) -> None:
     """Print a body as TOML: the default human of a stature, or a file after checking it."""
     with _clear_errors():
@@ -234,7 +298,7 @@ def body_command(
         if file is not None:
             body = voodoo.Body.load(file)
         else:
-            body = voodoo.Body.human() if height is None else voodoo.Body.human(height=height)
+            body = voodoo.Body.human(1.75 if height is None else height, model=model)
         typer.echo(body.to_toml(), nl=False)
 
 

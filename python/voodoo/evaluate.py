@@ -23,7 +23,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.recordings import Recording, open_recording
 from voodoo.recordings.loaders import guess_loader
 from voodoo.results import Track
-from voodoo.running import start_tracker, track
+from voodoo.running import HumanModel, start_tracker, track
 from voodoo.witness import FrameWitness, Selection, witness
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -107,17 +107,24 @@ class FrameTable:
     step_s: FloatArray
 
 
-def evaluate(path: Path, *, config: voodoo.Config | None = None, loader: str | None = None) -> tuple[Score, FrameTable]:
-    """Track a recording from its own start and measure the result.
+def evaluate(
+    path: Path,
+    *,
+    config: voodoo.Config | None = None,
+    loader: str | None = None,
+    model: HumanModel = "full",
+    depth_only: bool = False,
+) -> tuple[Score, FrameTable]:
+    """Track a recording from its own start and measure the result; with `depth_only` from its depth images alone.
 
     Raises:
         VoodooError: it cannot be read, has no start, or a frame was refused.
     """
     recording = open_recording(path, loader=loader)
-    tracker = start_tracker(recording, config=config)
+    tracker = start_tracker(recording, config=config, model=model)
     selection = select_by(recording)
     steps = []
-    for frame in track(recording, tracker):
+    for frame in track(recording, tracker, depth_only=depth_only):
         estimate = frame.estimate
         truth = _truth_at(recording, estimate.stamp)
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
@@ -146,13 +153,21 @@ def select_by(recording: Recording) -> Selection:
 
 
 def evaluate_all(
-    paths: Sequence[Path], *, config_file: Path | None = None, loader: str | None = None, jobs: int = 1
+    paths: Sequence[Path],
+    *,
+    config_file: Path | None = None,
+    loader: str | None = None,
+    model: HumanModel = "full",
+    depth_only: bool = False,
+    jobs: int = 1,
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
     """Evaluate recordings in parallel processes; (index in `paths`, score, frames) as each is done, in any order.
 
     A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
     """
-    tasks = [(str(path), None if config_file is None else str(config_file), loader) for path in paths]
+    tasks = [
+        (str(path), None if config_file is None else str(config_file), loader, model, depth_only) for path in paths
+    ]
     if jobs == 1 or len(tasks) == 1:
         for index, task in enumerate(tasks):
             yield index, *_task(*task)
@@ -218,10 +233,12 @@ def _one_thread() -> None:
     cv2.setNumThreads(1)
 
 
-def _task(path: str, config_file: str | None, loader: str | None) -> tuple[Score, FrameTable | None]:
+def _task(
+    path: str, config_file: str | None, loader: str | None, model: HumanModel, depth_only: bool
+) -> tuple[Score, FrameTable | None]:
     try:
         config = None if config_file is None else voodoo.Config.load(config_file)
-        return evaluate(Path(path), config=config, loader=loader)
+        return evaluate(Path(path), config=config, loader=loader, model=model, depth_only=depth_only)
     except (VoodooError, OSError) as error:
         return Score(Path(path).name, Path(path), failure=str(error)), None
 

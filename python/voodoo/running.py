@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
@@ -14,6 +14,7 @@ import voodoo
 from voodoo.errors import VoodooError
 from voodoo.recordings import DepthImage, LaserScan, PointCloud, RecordedFrame, Recording
 
+HumanModel = Literal["papers", "full"]
 Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
 Position = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
@@ -85,6 +86,7 @@ def start_tracker(
     init: Init | None = None,
     body: voodoo.Body | None = None,
     height: float | None = None,
+    model: HumanModel = "full",
     config: voodoo.Config | None = None,
 ) -> voodoo.Tracker:
     """A tracker that stands in the first pose of the recording.
@@ -94,6 +96,7 @@ def start_tracker(
         init: first pose, and stature unless `height` is given.
         body: what to track; None means the default human.
         height: stature of the default human [m]; not together with `body`.
+        model: how finely that human is divided, see `voodoo.Body.human`.
         config: None means the defaults.
 
     Raises:
@@ -110,7 +113,7 @@ def start_tracker(
         )
     if body is None:
         height = height if height is not None else init.height_m
-        body = voodoo.Body.human() if height is None else voodoo.Body.human(height=height)
+        body = voodoo.Body.human(model=model) if height is None else voodoo.Body.human(height=height, model=model)
     tracker = voodoo.Tracker(body, config=config if config is not None else voodoo.Config())
     tracker.reset(joints=dict(init.joints), fit_sizes=True)
     return tracker
@@ -120,13 +123,16 @@ LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 
 
-def to_frame(recorded: RecordedFrame, *, scan_weight: float = 1.0, root_frame: str = "") -> voodoo.Frame:
+def to_frame(
+    recorded: RecordedFrame, *, scan_weight: float = 1.0, root_frame: str = "", depth_only: bool = False
+) -> voodoo.Frame:
     """The tracker's view of a recorded frame: depth images, clouds and laser scans; colour is not a measurement yet.
 
     Args:
         recorded: one instant of a recording.
         scan_weight: weight of a laser return relative to a depth pixel.
         root_frame: name of the root frame; in LEVEL_FRAMES the floor is known.
+        depth_only: leave out all but depth images.
 
     Raises:
         VoodooError: a measurement the tracker does not accept.
@@ -143,6 +149,8 @@ def to_frame(recorded: RecordedFrame, *, scan_weight: float = 1.0, root_frame: s
                 world_from_sensor=item.root_from_sensor,
                 source=item.sensor,
             )
+        elif depth_only:
+            continue
         elif isinstance(item, PointCloud):
             frame.add_points(item.points, world_from_sensor=item.root_from_sensor, source=item.sensor)
         elif isinstance(item, LaserScan):
@@ -152,7 +160,9 @@ def to_frame(recorded: RecordedFrame, *, scan_weight: float = 1.0, root_frame: s
     return frame
 
 
-def track(recording: Recording, tracker: voodoo.Tracker, *, scan_weight: float = 1.0) -> Iterator[TrackedFrame]:
+def track(
+    recording: Recording, tracker: voodoo.Tracker, *, scan_weight: float = 1.0, depth_only: bool = False
+) -> Iterator[TrackedFrame]:
     """Step the tracker through a recording.
 
     Between two yields `tracker` holds the model of the frame yielded last.
@@ -168,7 +178,9 @@ def track(recording: Recording, tracker: voodoo.Tracker, *, scan_weight: float =
     for index, recorded in enumerate(recording):
         began = time.perf_counter()
         try:
-            estimate = tracker.step(to_frame(recorded, scan_weight=scan_weight, root_frame=recording.root_frame))
+            estimate = tracker.step(
+                to_frame(recorded, scan_weight=scan_weight, root_frame=recording.root_frame, depth_only=depth_only)
+            )
         except VoodooError as error:
             raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
         yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began)

@@ -88,8 +88,7 @@ impl PyChain {
             .map(|(site, kind, v, weight, level)| {
                 let (part, point) = self.site(py, site)?;
                 let (first, second) = (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]));
-                let aim =
-                    if kind == "line" { Aim::Line { n: first, m: second } } else { Aim::Position(first) };
+                let aim = if kind == "line" { Aim::Line { n: first, m: second } } else { Aim::Position(first) };
                 Ok(Goal { part, point, aim, weight: *weight, level: *level })
             })
             .collect::<PyResult<Vec<_>>>()?;
@@ -119,8 +118,11 @@ impl PyChain {
         if angles.len() == self.model.freedoms() && angles.iter().all(|angle| angle.is_finite()) {
             return Ok(());
         }
-        let message =
-            format!("angles: expected {} finite numbers, found {}", self.model.freedoms(), short(&format!("{angles:?}")));
+        let message = format!(
+            "angles: expected {} finite numbers, found {}",
+            self.model.freedoms(),
+            short(&format!("{angles:?}"))
+        );
         Err(exception(py, "MeasurementError", message))
     }
 
@@ -178,11 +180,7 @@ impl PyChain {
     }
 
     /// Poses `(P, 4, 4)` of the limbs and positions `(S, 3)` of the sites.
-    fn forward<'py>(
-        &self,
-        base: &Bound<'py, PyAny>,
-        angles: Vec<f64>,
-    ) -> PyResult<(Array<'py>, Array<'py>)> {
+    fn forward<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>) -> PyResult<(Array<'py>, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
         let poses: Vec<f64> = at.poses.iter().flat_map(matrix).flatten().collect();

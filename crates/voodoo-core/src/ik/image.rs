@@ -70,10 +70,8 @@ impl Criterion<'_> {
             // Derivatives of h by the world positions of both ends.
             let mut forces = [Vec3::ZERO; 2];
             for view in self.views {
-                let (a, b) = (
-                    view.camera_from_world.transform_point(ends[0]),
-                    view.camera_from_world.transform_point(ends[1]),
-                );
+                let (a, b) =
+                    (view.camera_from_world.transform_point(ends[0]), view.camera_from_world.transform_point(ends[1]));
                 let mut pull = [Vec3::ZERO; 2];
                 for sample in 0..SAMPLES {
                     let t = (sample as f64 + 0.5) / SAMPLES as f64;

@@ -102,7 +102,11 @@ impl Model {
         let start = self.names.len();
         let parent = joint.and_then(|(index, _)| self.parts.iter().position(|part| part.limb == *index));
         if parent.is_none() && !self.parts.is_empty() {
-            return Err(value("limbs", "limbs that hang together, parents included", format!("{name} without its parent")));
+            return Err(value(
+                "limbs",
+                "limbs that hang together, parents included",
+                format!("{name} without its parent"),
+            ));
         }
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         let first = self.parts.is_empty();
@@ -186,7 +190,8 @@ impl Model {
                 Turn::Rigid => joint * part.joint_from_limb,
                 Turn::Hinge(axis) => {
                     let (sine, cosine) = (0.5 * value[0]).sin_cos();
-                    let rotation = crate::geometry::Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
+                    let rotation =
+                        crate::geometry::Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
                     let omega = joint.rotation * axis;
                     columns.push(Column { omega, v: joint.translation.cross(omega) });
                     Pose::from_parts(joint.translation, joint.rotation * rotation) * part.joint_from_limb

@@ -323,7 +323,13 @@ impl Solver {
         let mut hit = None;
         for (i, [low, high]) in problem.model.limits().iter().enumerate() {
             let (from, by) = (angles[i] + step[i], self.part[i]);
-            let room = if by < -1e-15 { low - from } else if by > 1e-15 { high - from } else { continue };
+            let room = if by < -1e-15 {
+                low - from
+            } else if by > 1e-15 {
+                high - from
+            } else {
+                continue;
+            };
             if share * by.abs() > room.abs() {
                 share = (room / by).max(0.0);
                 hit = Some(i);
@@ -363,7 +369,9 @@ impl Solver {
             }
             self.propose(problem, angles, stage, share);
             self.evaluate(problem, true);
-            if (share == 0.0 && slack) || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none() {
+            if (share == 0.0 && slack)
+                || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
+            {
                 return self.take_trial(angles);
             }
         }
@@ -399,14 +407,14 @@ impl Solver {
                 Some(best) if !slack => (best + 0.1 * SETTLED).max(self.before[level]),
                 _ => self.before[level] + rise + 1e-13,
             };
-            // Written so that a NaN fails.
-            if !(self.trial_cost[level].sqrt() <= limit) {
+            let residual = self.trial_cost[level].sqrt();
+            if residual.is_nan() || residual > limit {
                 return Some(level);
             }
         }
         if image && stage == self.levels.len() {
             let above = if stage == 0 { 0.0 } else { dot(&self.gradient, &self.stages[(stage - 1) * n..stage * n]) };
-            if !(self.trial_h <= self.h + above.max(0.0) + 1e-9) {
+            if self.trial_h.is_nan() || self.trial_h > self.h + above.max(0.0) + 1e-9 {
                 return Some(self.levels.len());
             }
         }
