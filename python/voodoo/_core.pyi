@@ -8,11 +8,13 @@ import numpy.typing as npt
 
 __all__ = [
     "Body",
+    "Chain",
     "ClosestPoints",
     "Estimate",
     "Frame",
     "TaperedEllipticCylinder",
     "Tracker",
+    "View",
     "__version__",
     "config_fields",
 ]

@@ -47,8 +47,8 @@ class Positions:
             return cls(result.stamps, result.joint_names, result.joints)
         if recording.reference is None:
             raise VoodooError(
-                f"{recording.name}: expected positions of known sites, found no reference in the recording; give a result "  # noqa: E501
-                "of voodoo track"
+                f"{recording.name}: expected positions of known sites, found no reference in the recording; "
+                "give a result of voodoo track"
             )
         return cls(recording.reference.stamps, recording.reference.names, recording.reference.positions)
 
@@ -84,9 +84,8 @@ def follow(
 
     Returns:
         The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
-        else
-        "tracking"; residual is the root mean square of the targets'. And the error (F,) [m] of every other site of `positions`,  # noqa: E501  # noqa: E501  # noqa: E501
-        NaN where unknown.
+        else "tracking"; residual is the root mean square of the targets'. And the error (F,) [m] of every other site
+        of `positions`, NaN where unknown.
 
     Raises:
         VoodooError: no known site at all, unknown words, damage in the recording.

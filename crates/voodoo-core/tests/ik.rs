@@ -1,4 +1,5 @@
 //! Inverse kinematics: derivatives against differences, twists, lines against rays, priorities, limits, singular cases.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use nalgebra::Matrix6;
 use proptest::prelude::*;
