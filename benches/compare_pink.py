@@ -1,9 +1,12 @@
-"""voodoo.ik against pink (pin-pink on Pinocchio): a body of 26 freedoms, ten point targets, the same start and tolerance.
+"""voodoo.ik against pink (pin-pink on Pinocchio): a body of 26 freedoms, ten point targets, the same start and
+tolerance.
 
     pip install pin-pink quadprog && python benches/compare_pink.py
 
-Both solve the same reachable postures from the same starts on one thread, called from Python, until the worst target is nearer
-than the tolerance. pink steps by its own solve_ik and integrate, with its model built from the voodoo chain, joint by joint.
+Both solve the same reachable postures from the same starts on one thread, called from Python, until the worst target
+is nearer
+than the tolerance. pink steps by its own solve_ik and integrate, with its model built from the voodoo chain, joint by
+joint.
 """
 
 from __future__ import annotations
@@ -37,7 +40,8 @@ SITES = (
 
 
 def body() -> voodoo.Body:
-    """Papers' human with an elbow of three freedoms less: 6 root, 3 neck, 2 x (3 shoulder, 1 elbow, 3 hip, 1 knee) = 25, and a
+    """Papers' human with an elbow of three freedoms less: 6 root, 3 neck, 2 x (3 shoulder, 1 elbow, 3 hip, 1 knee) =
+    25, and a
     hinge at the right wrist: 26."""
     text = voodoo.Body.human(1.75, model="papers").to_toml()
     text += """
@@ -105,7 +109,9 @@ def run_pink(
     now = pink.Configuration(model, data, start)
     frames = [model.getFrameId(f"site_{site}") for site in SITES]
     began = time.perf_counter()
-    for step in range(1, most + 1):  # noqa: B007 - used after the loop
+    step = 0
+    while step < most:
+        step += 1
         velocity = pink.solve_ik(now, tasks, 1.0, solver="quadprog", damping=1e-8, limits=[])
         now.integrate_inplace(velocity, 1.0)
         worst = max(
@@ -149,8 +155,7 @@ def main() -> None:
     for name, rows in (("voodoo.ik", ours), ("pink", theirs)):
         steps, seconds, worst = np.array(rows).T
         print(
-            f"| {name} | {steps.mean():.1f} | {1e3 * seconds.mean():.3f} | {1e6 * seconds.sum() / steps.sum():.1f} "
-            f"| {1e6 * worst.max():.2f} |"
+            f"| {name} | {steps.mean():.1f} | {1e3 * seconds.mean():.3f} | {1e6 * seconds.sum() / steps.sum():.1f} | {1e6 * worst.max():.2f} |"  # noqa: E501
         )
     step = [np.sum([row[1] for row in rows]) / np.sum([row[0] for row in rows]) for rows in (theirs, ours)]
     posture = [np.sum([row[1] for row in rows]) for rows in (theirs, ours)]

@@ -108,7 +108,7 @@ def plot(results: list[Result], solvers: list[str], file: Path) -> None:
             values = [100 * np.median([r.group(group) for r in chosen]) for group in GROUPS]
             axis.bar(np.arange(len(GROUPS)) + 0.2 * offset, values, width=0.19, label=mode)
         axis.set_xticks(np.arange(len(GROUPS)) + 0.3, list(GROUPS), rotation=20)
-        axis.set(title=solver, ylabel="median over the recordings of the mean error / cm", ylim=(0, 40))
+        axis.set(title=solver, ylabel="median of mean errors / cm", ylim=(0, 40))
         axis.legend()
         axis.grid(axis="y", alpha=0.3)
     figure.tight_layout()
@@ -116,20 +116,20 @@ def plot(results: list[Result], solvers: list[str], file: Path) -> None:
 
 
 def draw(results: list[Result], paths: list[Path], solver: str, file: Path) -> None:
-    """For each recording the frame in which depth alone has its hands farthest off, with the truth in white."""
+    """For each recording the frame in which fusion gains most at wrists and hands, with the truth in white."""
     rows = []
     for path in paths:
         recording = open_recording(path)
         chosen = {r.mode: r for r in results if r.solver == solver and r.recording == recording.name}
         hands = [chosen["depth"].names.index(name) for name in GROUPS["wrists and hands"]]
         gain = (chosen["depth"].errors - chosen["fused"].errors)[:, hands].mean(axis=1)
-        frame = int(gain.argmax())
-        picture = None
+        frame, picture = -1, None
         for index, recorded in enumerate(paired(recording)):
-            if index == frame:
-                picture = next((item for item in recorded.measurements if isinstance(item, ColorImage)), None)
+            shown = next((item for item in recorded.measurements if isinstance(item, ColorImage)), None)
+            if shown is not None and (frame < 0 or gain[index] > gain[frame]):
+                frame, picture = index, shown
         if picture is None:
-            continue
+            raise SystemExit(f"{recording.name}: expected colour pictures, found none")
         truth = dict(zip(recording.reference.names, recording.reference.positions[frame], strict=True))
         tiles = []
         for mode in ("depth", "2-D", "fused"):
@@ -168,7 +168,8 @@ def main() -> None:
     (options.out / "table.md").write_text(text, encoding="utf-8")
     print(text)
     plot(results, solvers, options.out / "groups.png")
-    draw(results, options.recordings, solvers[0], options.out / "frames.png")
+    for solver in solvers:
+        draw(results, options.recordings, solver, options.out / f"frames_{solver}.png")
 
 
 if __name__ == "__main__":

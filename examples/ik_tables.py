@@ -2,9 +2,10 @@
 
     python examples/ik_tables.py DATA [--out DIR]
 
-DATA is the folder that holds rendered/ and pose2sim/. A limb is J10's: two segments, two joints of three freedoms each.
-Known are the shoulder and the wrist (the hip and the ankle); the elbow (knee) is estimated, from the true one in the
-first frame on.
+DATA is the folder that holds rendered/ and pose2sim/. A limb is J10's: two segments, two joints of three freedoms
+each. Known
+are the shoulder and the wrist (the hip and the ankle); the elbow (knee) is estimated, from the true one in the first
+frame on.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ def rotation(local: np.ndarray, world: np.ndarray) -> np.ndarray:
 def follow(
     truth: dict[str, np.ndarray], height: float, side: str, joint: str, images: list[list[ik.Silhouette]], margin: float
 ) -> np.ndarray:
-    """Positions (F, 3) of an elbow or knee. Known: all joints in the first frame; then the trunk, hence the shoulder or
-    hip, and the wrist or ankle."""
+    """Positions (F, 3) of an elbow or knee. Known: all joints in the first frame; then the trunk, hence the shoulder
+    or hip,
+    and the wrist or ankle."""
     first, middle, last = (f"{side}_{name}" for name in LIMBS[joint])
     tracker = voodoo.Tracker(voodoo.Body.human(height=height, model="papers"))
     estimate = tracker.reset(joints={name: places[0] for name, places in truth.items()})
@@ -75,7 +77,8 @@ class Sequence:
 
 def rendered(path: Path) -> Sequence:
     """First view: the depth camera, person cut out by connected depth from head, hands, feet, shoulders and hips.
-    Second view: the body model at the true joints, seen by a camera 3 m to the person's side."""
+    Second
+    view: the body model at the true joints, seen by a camera 3 m to the person's side."""
     recording = voodoo.open_recording(path)
     reference = recording.reference
     truth = {name: reference.positions[:, i] for i, name in enumerate(reference.names)}
@@ -92,7 +95,7 @@ def rendered(path: Path) -> Sequence:
         # Optical axis towards -y of the root frame, x to the front's left, y down.
         pose = np.eye(4)
         pose[:3, :3] = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
-        pose[:3, 3] = root + np.array([0.0, 3.0, 0.2])
+        pose[:3, 3] = root + np.array((0.0, 3.0, 0.2))
         side = silhouette(tracker.body, estimate, CameraView(camera, pose), width=320, height=240).astype(np.uint8)
         # The model's limbs leave cracks at neck and shoulders that no person has.
         for end in ("l_shoulder", "r_shoulder", "skullbase"):

@@ -1,8 +1,10 @@
-"""J10's three experiments in a virtual plane (its figures 6, 7 and 8): a chain of four segments, with and without images.
+"""J10's three experiments in a virtual plane (its figures 6, 7 and 8): a chain of four segments, with and without
+images.
 
     python examples/ik_virtual.py [--out DIR]
 
-Writes experiment_1.png, _2.png and _3.png: above without, below with the image constraint; grey the start, red the chain, blue
+Writes experiment_1.png, _2.png and _3.png: above without, below with the image constraint; grey the start, red the
+chain, blue
 the end point it shall reach, white (experiment 3: black) the silhouette it shall lie in (the object it shall avoid).
 """
 
@@ -28,8 +30,9 @@ WORLD_FROM_CAMERA = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 0.35], [0, 0, -1.0, 3
 
 def planar_chain(segments: int = 4) -> ik.Chain:
     """Segments of 0.25 m in the x-y plane, hinged about z, the first at the origin; at rest all along y."""
-    text = 'name = "planar"\n[[limbs]]\nname = "base"\nshape = { length = 0.01, a0 = 0.01, b0 = 0.01, a1 = 0.01, b1 = 0.01 }\n'
-    # Hinges turn about the joint's x axis, limbs run along their z: a turn of -120 degrees about (1, 1, 1) puts these on the
+    text = 'name = "planar"\n[[limbs]]\nname = "base"\nshape = { length = 0.01, a0 = 0.01, b0 = 0.01, a1 = 0.01, b1 = 0.01 }\n'  # noqa: E501
+    # Hinges turn about the joint's x axis, limbs run along their z: a turn of -120 degrees about (1, 1, 1) puts these
+    # on the
     # base's z and y.
     first = "on_parent = { rotation = [-1.2091995761561452, -1.2091995761561452, -1.2091995761561452] }\n"
     for index in range(segments):

@@ -115,14 +115,14 @@ def test_jacobian_of_a_site(arm):
 def test_unreachable_target_gives_the_nearest_posture(arm):
     centre = shoulder(arm)
     straight = np.linalg.norm(arm.forward([0, 0, 0, 0])[1]["l_hand"] - centre)
-    found = ik.solve(arm, {"l_hand": centre + [2.0, 0.3, -0.2]}, steps=300)
+    found = ik.solve(arm, {"l_hand": centre + np.array([2.0, 0.3, -0.2])}, steps=300)
     assert found.residuals[0] == pytest.approx(np.linalg.norm([2.0, 0.3, -0.2]) - straight, abs=1e-4)
     assert found.converged and within(arm, found.angles)
 
 
 def test_stretched_arm_leaves_the_singular_pose(arm):
     centre = shoulder(arm)
-    found = ik.solve(arm, {"l_hand": centre - [0.0, 0.0, 0.35]}, start=np.zeros(4), steps=60)
+    found = ik.solve(arm, {"l_hand": centre - np.array([0.0, 0.0, 0.35])}, start=np.zeros(4), steps=60)
     assert found.residuals[0] < 1e-6
 
 
@@ -138,7 +138,7 @@ def test_contradictory_targets_meet_in_the_weighted_middle():
 
 def test_limits_hold_and_the_residual_is_told(arm):
     # Behind the back, through the body: no shoulder gets there.
-    found = ik.solve(arm, {"l_hand": shoulder(arm) + [-0.4, -0.3, 0.3]}, steps=100)
+    found = ik.solve(arm, {"l_hand": shoulder(arm) + np.array([-0.4, -0.3, 0.3])}, steps=100)
     assert within(arm, found.angles) and found.residuals[0] > 0.01
     assert ((found.angles == arm.limits[:, 0]) | (found.angles == arm.limits[:, 1])).any()
 
@@ -187,7 +187,7 @@ def test_rays_and_positions(arm):
 def test_silhouettes_that_say_nothing_change_nothing(arm, pixels):
     camera, pose = front_camera()
     image = ik.Silhouette(pixels, camera=camera, world_from_camera=pose)
-    goal = {"l_hand": shoulder(arm) + [0.3, 0.1, -0.2]}
+    goal = {"l_hand": shoulder(arm) + np.array([0.3, 0.1, -0.2])}
     plain, found = ik.solve(arm, goal), ik.solve(arm, goal, images=[image])
     assert np.allclose(plain.angles, found.angles, atol=1e-5) and found.h == 0.0
     assert found.images == (1 if pixels.any() else 0)
@@ -199,7 +199,7 @@ def test_bones_behind_the_camera_count_nothing(arm):
     mask = np.zeros((120, 160))
     mask[:5, :5] = 1
     image = ik.Silhouette(mask, camera=camera, world_from_camera=pose)
-    found = ik.solve(arm, {"l_hand": shoulder(arm) + [0.3, 0.1, -0.2]}, images=[image])
+    found = ik.solve(arm, {"l_hand": shoulder(arm) + np.array([0.3, 0.1, -0.2])}, images=[image])
     assert found.h == 0.0 and found.residuals[0] < 1e-6 and np.isfinite(found.angles).all()
 
 
@@ -229,7 +229,7 @@ def test_batch_equals_single(arm):
 
 def test_follower_starts_from_the_last_posture(arm):
     follower = ik.Follower(arm, steps=30)
-    goal = shoulder(arm) + [0.3, 0.1, -0.2]
+    goal = shoulder(arm) + np.array([0.3, 0.1, -0.2])
     first = follower.step({"l_hand": goal})
     second = follower.step({"l_hand": goal})
     assert np.array_equal(first.angles, second.angles) and second.steps == 0

@@ -165,6 +165,59 @@ def demo_command(
         typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")
 
 
+@app.command("ik")
+def ik_command(
+    recording: _RecordingArgument,
+    targets: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Known positions: a result of voodoo track. By default the reference's."),
+    ] = None,
+    sites: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,...", help="The sites that are known: by default head, trunk, hands, ankles."),
+    ] = None,
+    pictures: Annotated[
+        str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), or none (plain).")
+    ] = "depth",
+    init: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Result, .csv or .npz; by default NAME_ik.csv in this folder.")
+    ] = None,
+    frame: _FrameOption = None,
+    loader: _LoaderOption = None,
+) -> None:
+    """Find postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
+
+    The result has the columns of voodoo track and NAME_rad for every joint angle. Sites that are not among the known
+    ones are
+    compared with the reference, if it has them.
+
+    [bold]Examples[/bold]
+
+    voodoo ik walk_bag/ --pictures none
+
+    voodoo ik walk_bag/ --targets pose.npz --sites l_hand,r_hand,head_center --out angles.csv
+    """
+    from voodoo.ik_recording import KNOWN, Positions, follow
+
+    with _clear_errors():
+        source = _open(recording, loader, frame)
+        target = out if out is not None else Path(f"{source.name}_ik.csv")
+        check_suffix(target)
+        positions = Positions.of(source, None if targets is None else Track.load(targets))
+        tracker = start_tracker(source, init=None if init is None else Init.load(init))
+        known = KNOWN if sites is None else tuple(name.strip() for name in sites.split(","))
+        result, errors = follow(source, tracker, positions, sites=known, pictures=pictures)  # type: ignore[arg-type]
+        result.save(target)
+        for name, values in errors.items():
+            if np.isfinite(values).any():
+                typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
+        typer.echo(f"{len(result)} frames, {_states(result)}; wrote {target}")
+
+
 @app.command("eval")
 def eval_command(
     recordings: Annotated[

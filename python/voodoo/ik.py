@@ -151,7 +151,8 @@ class Silhouette:
 
 
 def signed_distance(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
-    """Distance (height, width) [px] to the border of a mask, negative inside; its zero is between two pixels."""
+    """Distance (height, width) [px] to the border of a mask, negative inside; its zero is half-way between two
+    pixels."""
     if mask.all():
         return np.full(mask.shape, -float(max(mask.shape)), dtype=np.float32)
     if not mask.any():
@@ -192,8 +193,8 @@ class Posture:
         """The numbers that say how it went."""
         worst = max(self.residuals, default=0.0)
         return (
-            f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px "
-            f"of {self.images} images, {self.steps} steps, {'converged' if self.converged else 'not converged'})"
+            f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px of {self.images} "  # noqa: E501
+            f"images, {self.steps} steps, {'converged' if self.converged else 'not converged'})"
         )
 
 
@@ -207,7 +208,8 @@ class Chain:
             body: any body.
             limbs: limb names; () for all of them. All but the first must hang on another one of them.
             root: "free": the first limb's pose are six unknowns; "fixed": it stands still (a whole body) or turns in
-                its joint to a base that does (chosen limbs). None: free for a whole body, fixed for chosen limbs.
+            its
+                joint to a base that does (chosen limbs). None: free for a whole body, fixed for chosen limbs.
 
         Raises:
             BodyError: an unknown limb, or limbs that do not hang together.
@@ -265,7 +267,8 @@ class Chain:
         Args:
             world_from_limb: rigid (4, 4) of every limb of the body.
             world_from_base: where the chain is rooted.
-            closest: of the closed chain nearest to the pose in the least-squares sense; else only each joint's turn.
+            closest: of the closed chain nearest to the pose in the least-squares sense; else only read each joint's
+            turn.
 
         Raises:
             MeasurementError: a limb is missing, or a matrix is not rigid.
@@ -303,7 +306,8 @@ class Options:
         tolerance: a residual below this is zero [m].
         still: a step that changes no angle by more ends the search [rad].
         gain: share of the step h / |P grad h|^2 of the image criterion, above 0 to 1: alpha of J10 eq. 4.
-        caution: damping of the image step where few samples lie outside, or the cameras look along the motion: the change
+        caution: damping of the image step where few samples lie outside, or the cameras look along the motion: the
+        change
             of h per radian, as a share of the bones' length in the images, that counts; 0 trusts every pixel.
         largest_turn: largest change of an angle in one step [rad].
         margin: how deep bones shall lie inside the silhouettes, in radii of their limbs; 0 is J10's criterion.
@@ -357,7 +361,8 @@ def solve(
     """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, limits throughout.
 
     Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing
-    here is ever NaN.
+    here is
+    ever NaN.
 
     Args:
         chain: what moves; a body stands for the chain of all its limbs with a free root.
@@ -365,7 +370,8 @@ def solve(
         images: silhouettes; empty ones take no part.
         start: angles (n,) or a posture to start from; None: at rest.
         world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
-            chosen limbs; None: identity.
+        chosen
+            limbs; None: identity.
         options: see Options.
         **changes: single fields of Options, e.g. `steps=30, margin=0.8`.
 
@@ -404,7 +410,8 @@ def solve(
 @dataclass(frozen=True, eq=False, repr=False)
 class Postures:
     """N postures of `solve_many`: angles (N, n), joints (N, S, 3) [m] in the order of Chain.site_names, h (N,) [px],
-    steps (N,), converged (N,)."""
+    steps
+    (N,), converged (N,)."""
 
     angles: FloatArray
     joints: FloatArray

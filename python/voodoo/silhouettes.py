@@ -1,8 +1,9 @@
-"""Masks of the person in depth and colour pictures, for voodoo.ik: by connected depth or still background."""
+"""Masks of the person in depth and colour pictures, for voodoo.ik: by connected depth, or against a still
+background."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import cv2
@@ -119,9 +120,3 @@ def largest(mask: Mask, *, close: int = 3) -> Mask:
     if count < 2:
         return np.zeros(mask.shape, dtype=bool)
     return np.asarray(labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])), dtype=bool)
-
-
-def spread(items: Iterable[npt.NDArray[np.uint8]], *, total: int, count: int) -> list[npt.NDArray[np.uint8]]:
-    """`count` of `total` items, evenly spread."""
-    chosen = set(np.linspace(0, total - 1, count).round().astype(int).tolist())
-    return [item for index, item in enumerate(items) if index in chosen]

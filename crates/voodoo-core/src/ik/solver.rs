@@ -407,14 +407,14 @@ impl Solver {
                 Some(best) if !slack => (best + 0.1 * SETTLED).max(self.before[level]),
                 _ => self.before[level] + rise + 1e-13,
             };
-            // Written so that a NaN fails.
-            if !(self.trial_cost[level].sqrt() <= limit) {
+            let residual = self.trial_cost[level].sqrt();
+            if residual.is_nan() || residual > limit {
                 return Some(level);
             }
         }
         if image && stage == self.levels.len() {
             let above = if stage == 0 { 0.0 } else { dot(&self.gradient, &self.stages[(stage - 1) * n..stage * n]) };
-            if !(self.trial_h <= self.h + above.max(0.0) + 1e-9) {
+            if self.trial_h.is_nan() || self.trial_h > self.h + above.max(0.0) + 1e-9 {
                 return Some(self.levels.len());
             }
         }

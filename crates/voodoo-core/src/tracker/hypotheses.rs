@@ -14,9 +14,9 @@ const SUSPICIOUS: f64 = 25.0;
 /// So large a share of its visible surface contradicted makes it suspect.
 const CONTRADICTED: f64 = 0.35;
 /// A limb of whose visible surface this share is seen where it is, is not suspect.
-const SUPPORTED: f64 = 0.4;
+const SUPPORTED: f64 = 0.25;
 /// A hypothesis must explain so many patches more than the current pose.
-const GAIN: f64 = 8.0;
+const GAIN: f64 = 25.0;
 /// ICP steps that refine the best hypothesis.
 const REFINE: usize = 4;
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians.

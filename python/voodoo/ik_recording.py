@@ -1,0 +1,171 @@
+"""Inverse kinematics through a recording: known sites from its reference or a result file, silhouettes from its
+pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+import voodoo
+from voodoo.errors import VoodooError
+from voodoo.ik import Chain, Follower, Options, Posture, Silhouette
+from voodoo.recordings import ColorImage, DepthImage, RecordedFrame, Recording
+from voodoo.results import Track
+from voodoo.running import LEVEL_FRAMES
+from voodoo.silhouettes import StillBackground, from_depth
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+Pictures: TypeAlias = Literal["depth", "color", "none"]
+
+KNOWN = ("head_center", "l_shoulder", "r_shoulder", "l_hand", "r_hand", "l_hip", "r_hip", "l_ankle", "r_ankle")
+"""What J10 takes for known, and the trunk that carries its chains."""
+_SAME_TIME_S = 0.02
+_LEARN = 41
+_REACHED_M = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Positions (F, J, 3) [m] of J sites at F stamps [s], in the recording's root frame; NaN = missing."""
+
+    stamps: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+
+    @classmethod
+    def of(cls, recording: Recording, result: Track | None = None) -> Positions:
+        """Those of a result, or of the recording's reference.
+
+        Raises:
+            VoodooError: the recording has no reference and no result was given.
+        """
+        if result is not None:
+            return cls(result.stamps, result.joint_names, result.joints)
+        if recording.reference is None:
+            raise VoodooError(
+                f"{recording.name}: expected positions of known sites, found no reference in the recording; "
+                "give a result of voodoo track"
+            )
+        return cls(recording.reference.stamps, recording.reference.names, recording.reference.positions)
+
+    def at(self, stamp: float, sites: Sequence[str]) -> dict[str, FloatArray]:
+        """The sites known within 20 ms of a time; empty when none is."""
+        index = int(np.argmin(np.abs(self.stamps - stamp)))
+        if abs(self.stamps[index] - stamp) > _SAME_TIME_S:
+            return {}
+        row = {name: self.values[index, self.names.index(name)] for name in sites if name in self.names}
+        return {name: position for name, position in row.items() if np.isfinite(position).all()}
+
+
+def follow(
+    recording: Recording,
+    tracker: voodoo.Tracker,
+    positions: Positions,
+    *,
+    sites: Sequence[str] = KNOWN,
+    pictures: Pictures = "depth",
+    options: Options | None = None,
+) -> tuple[Track, dict[str, FloatArray]]:
+    """Postures of all frames from the known sites and the silhouettes.
+
+    Args:
+        recording: read while solving.
+        tracker: at the first pose, see voodoo.running.start_tracker; gives body and start.
+        positions: of the known sites.
+        sites: which ones are taken for known; those that `positions` lack are left out.
+        pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known
+        sites; "color" by
+            the difference from the still background; "none": plain inverse kinematics.
+        options: see voodoo.ik.Options; None: margin 0.8.
+
+    Returns:
+        The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
+        else "tracking"; residual is the root mean square of the targets'. And the error (F,) [m] of every other site
+        of `positions`, NaN where unknown.
+
+    Raises:
+        VoodooError: no known site at all, unknown words, damage in the recording.
+    """
+    if pictures not in ("depth", "color", "none"):
+        raise VoodooError(f'pictures: expected "depth", "color" or "none", found {pictures!r}')
+    chain = Chain(tracker.body)
+    known = [name for name in sites if name in positions.names and name in chain.site_names]
+    if not known:
+        raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
+    options = Options(margin=0.8) if options is None else options
+    start = chain.project(tracker.estimate.world_from_limb)
+    follower = Follower(chain, start=start, **{name: getattr(options, name) for name in Options.__dataclass_fields__})
+    backgrounds = _backgrounds(recording) if pictures == "color" else {}
+    others = [name for name in positions.names if name in chain.site_names and name not in known]
+    postures: list[Posture] = []
+    stamps, rows = [], []
+    for recorded in recording:
+        targets = positions.at(recorded.stamp, known)
+        images = _silhouettes(recorded, targets, pictures, backgrounds, level=recording.root_frame in LEVEL_FRAMES)
+        posture = follower.step(targets, images=images if targets else [])
+        truth = positions.at(recorded.stamp, others)
+        rows.append(
+            [float(np.linalg.norm(posture.joints[n] - truth[n])) if n in truth else float("nan") for n in others]
+        )
+        postures.append(posture)
+        stamps.append(recorded.stamp)
+    if not postures:
+        raise VoodooError(f"{recording.name}: expected at least one frame, found none")
+    table = np.array(rows, dtype=np.float64).reshape(len(postures), len(others))
+    errors = {name: table[:, index] for index, name in enumerate(others)}
+    return _track(stamps, postures), errors
+
+
+def _track(stamps: Sequence[float], postures: Sequence[Posture]) -> Track:
+    def reached(posture: Posture) -> float:
+        return float(np.sqrt(np.mean(np.square(posture.residuals)))) if posture.residuals else float("inf")
+
+    first = postures[0]
+    return Track(
+        stamps=np.array(stamps, dtype=np.float64),
+        status=tuple("tracking" if reached(posture) < _REACHED_M else "degraded" for posture in postures),
+        residual=np.array([reached(posture) if posture.residuals else 0.0 for posture in postures]),
+        joint_names=tuple(first.joints),
+        joints=np.array([list(posture.joints.values()) for posture in postures]),
+        limb_names=tuple(first.world_from_limb),
+        world_from_limb=np.array([list(posture.world_from_limb.values()) for posture in postures]),
+        angle_names=first.angle_names,
+        angles=np.array([posture.angles for posture in postures]),
+    )
+
+
+def _silhouettes(
+    recorded: RecordedFrame,
+    known: Mapping[str, FloatArray],
+    pictures: Pictures,
+    backgrounds: Mapping[str, StillBackground],
+    *,
+    level: bool,
+) -> list[Silhouette]:
+    found = []
+    for item in recorded.measurements:
+        if pictures == "depth" and isinstance(item, DepthImage):
+            mask = from_depth(item, known, level=level)
+        elif pictures == "color" and isinstance(item, ColorImage):
+            mask = backgrounds[item.sensor].mask(item.image)
+        else:
+            continue
+        found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor))
+    return found
+
+
+def _backgrounds(recording: Recording) -> dict[str, StillBackground]:
+    chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
+    seen: dict[str, list[npt.NDArray[np.uint8]]] = {}
+    for index, recorded in enumerate(recording):
+        for item in recorded.measurements:
+            if index in chosen and isinstance(item, ColorImage):
+                seen.setdefault(item.sensor, []).append(item.image)
+    # A sensor that none of the chosen frames holds is not known to stand still.
+    if not seen:
+        raise VoodooError(f"{recording.name}: expected colour pictures, found none")
+    return {sensor: StillBackground(images) for sensor, images in seen.items()}
