@@ -50,7 +50,7 @@ def main() -> None:
     goals = np.array([chain.forward(row)[1]["wrist"] for row in rng.uniform(-0.8, 0.8, (count, 6))])[:, None]
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {count} postures, 15 steps a phase")
     print(
-        "| images | postures a second | us a posture | steps | us a step | reached within 0.1 mm |\n|---|---|---|---|---|---|"  # noqa: E501
+        "| images | postures a second | us a posture | steps | us a step | reached within 0.1 mm |\n|---|---|---|---|---|---|"
     )
     for views in (0, 1, 2):
         seconds = []
@@ -61,7 +61,7 @@ def main() -> None:
         best, steps = min(seconds), found.steps.sum()
         reached = np.linalg.norm(found.joints[:, 0] - goals[:, 0], axis=1) < 1e-4
         print(
-            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {1e6 * best / steps:.2f} | "  # noqa: E501
+            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {1e6 * best / steps:.2f} | "
             f"{100 * reached.mean():.1f} % |"
         )
 

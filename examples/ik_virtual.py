@@ -30,7 +30,7 @@ WORLD_FROM_CAMERA = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 0.35], [0, 0, -1.0, 3
 
 def planar_chain(segments: int = 4) -> ik.Chain:
     """Segments of 0.25 m in the x-y plane, hinged about z, the first at the origin; at rest all along y."""
-    text = 'name = "planar"\n[[limbs]]\nname = "base"\nshape = { length = 0.01, a0 = 0.01, b0 = 0.01, a1 = 0.01, b1 = 0.01 }\n'  # noqa: E501
+    text = 'name = "planar"\n[[limbs]]\nname = "base"\nshape = { length = 0.01, a0 = 0.01, b0 = 0.01, a1 = 0.01, b1 = 0.01 }\n'
     # Hinges turn about the joint's x axis, limbs run along their z: a turn of -120 degrees about (1, 1, 1) puts these
     # on the
     # base's z and y.

@@ -193,7 +193,7 @@ class Posture:
         """The numbers that say how it went."""
         worst = max(self.residuals, default=0.0)
         return (
-            f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px of {self.images} "  # noqa: E501
+            f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px of {self.images} "
             f"images, {self.steps} steps, {'converged' if self.converged else 'not converged'})"
         )
 
