@@ -1,4 +1,5 @@
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,3 +97,16 @@ def test_truncated_npz_and_short_csv_row(tmp_path):
 def test_other_suffixes_are_refused(tmp_path):
     with pytest.raises(VoodooError, match=r"\.csv or \.npz, found '\.txt'"):
         Track.of(list(estimates(1))).save(tmp_path / "pose.txt")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_a_lost_frame_without_measurements_has_no_residual(tmp_path, suffix):
+    result = Track.of(list(estimates(3)))
+    residual = result.residual.copy()
+    residual[1] = np.nan
+    with pytest.raises(VoodooError, match="residual"):
+        replace(result, residual=residual)
+    lost = replace(result, residual=residual, status=("tracking", "lost", "tracking"))
+    lost.save(tmp_path / f"result{suffix}")
+    again = Track.load(tmp_path / f"result{suffix}")
+    assert np.isnan(again.residual[1]) and np.isfinite(again.residual[[0, 2]]).all()

@@ -31,7 +31,8 @@ class Track:
     Args:
         stamps: (F,) [s].
         status: F of "tracking", "degraded" or "lost".
-        residual: (F,) root mean square distance of the measurements to the model [m].
+        residual: (F,) root mean square distance of the measurements to the model [m]; NaN in a lost frame without
+            measurements (an empty cell in .csv).
         joint_names: J names of joints and sites.
         joints: (F, J, 3) [m] in the recording's root frame.
         limb_names: L names; () when the track was read from a .csv, which has no limb poses.
@@ -51,10 +52,12 @@ class Track:
     angles: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     def __post_init__(self) -> None:
-        """Check that the arrays belong together and are finite: a result is never NaN."""
+        """Check that the arrays belong together and are finite: a pose is never NaN, only a lost frame's residual."""
         frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
         if not self.angle_names:
             object.__setattr__(self, "angles", np.empty((frames, 0)))
+        if len(self.status) != frames:
+            raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
         expected = {
             "angles": (frames, len(self.angle_names)),
             "stamps": (frames,),
@@ -66,11 +69,13 @@ class Track:
             array = getattr(self, name)
             if array.shape != shape:
                 raise VoodooError(f"{name}: expected shape {shape}, found {array.shape}")
-            if not np.isfinite(array).all():
-                where = tuple(int(index) for index in np.argwhere(~np.isfinite(array))[0])
+            finite = np.isfinite(array)
+            if name == "residual":
+                # A lost frame may have had nothing to measure a residual from.
+                finite |= np.array([status == "lost" for status in self.status], dtype=bool)[:frames]
+            if not finite.all():
+                where = tuple(int(index) for index in np.argwhere(~finite)[0])
                 raise VoodooError(f"{name}: expected finite numbers, found {array[where]} in frame {where[0]}")
-        if len(self.status) != frames:
-            raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -140,7 +145,7 @@ class Track:
                 self.stamps, self.status, self.residual, self.joints, self.angles, strict=True
             ):
                 # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
-                row = [repr(float(stamp)), status, f"{residual:.6f}"]
+                row = [repr(float(stamp)), status, "" if np.isnan(residual) else f"{residual:.6f}"]
                 writer.writerow(row + [f"{value:.6f}" for value in (*joints.ravel(), *angles)])
 
     def _write_npz(self, path: Path) -> None:
@@ -191,7 +196,7 @@ class Track:
             angles=angles.reshape(len(rows), len(angle_names)),
             stamps=np.array([float(row[0]) for row in rows], dtype=np.float64),
             status=tuple(row[1] for row in rows),
-            residual=np.array([float(row[2]) for row in rows], dtype=np.float64),
+            residual=np.array([float(row[2] or "nan") for row in rows], dtype=np.float64),
             joint_names=names,
             joints=joints.reshape(len(rows), len(names), 3),
             limb_names=(),
