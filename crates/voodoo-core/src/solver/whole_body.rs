@@ -12,6 +12,9 @@ const SLIDE: f64 = 0.07;
 const LIMIT_SIGMA: f64 = 0.05;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
+/// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
+const SHOWN: f64 = 20.0;
+const HIDDEN_MOTION: f64 = 0.1;
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
 
@@ -34,9 +37,12 @@ impl Solver for WholeBody {
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
         self.joint_sigmas.clear();
-        self.joint_sigmas.extend(body.limbs().iter().map(|limb| {
-            limb.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * problem.pace * config.motion_scale
-        }));
+        for (limb, part) in body.limbs().iter().enumerate() {
+            let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
+            // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
+            let shown = (correspondences.measured_weight(limb) / SHOWN).clamp(HIDDEN_MOTION, 1.0);
+            self.joint_sigmas.push(motion * shown * problem.pace * config.motion_scale);
+        }
         let root =
             [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
         self.normal.clear(poses.len());
