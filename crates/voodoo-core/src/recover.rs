@@ -74,7 +74,9 @@ impl TwoBone {
         let root = self.root(body, poses);
         let [first, second] = self.lengths;
         let line = target - root;
-        let distance = line.length().clamp((first - second).abs() + 1e-3, first + second - 1e-3);
+        // Neither stretched nor folded to the last millimetre; a toy body may be smaller than that.
+        let slack = 1e-3_f64.min(0.1 * first.min(second));
+        let distance = line.length().max((first - second).abs() + slack).min(first + second - slack);
         let direction = line.try_normalize().unwrap_or(-Vec3::Z);
         let along = (first * first - second * second + distance * distance) / (2.0 * distance);
         let off = (first * first - along * along).max(0.0).sqrt();
@@ -120,4 +122,32 @@ impl TwoBone {
 fn basis(main: Vec3, other: Vec3) -> Option<Mat3> {
     let second = (other - main * other.dot(main)).try_normalize()?;
     Some(Mat3::from_cols(main, second, main.cross(second)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+
+    #[test]
+    fn reaches_targets_on_bodies_of_any_size() {
+        for scale in [1.0, 1e-3] {
+            let body = Body::human(1.75, HumanModel::Full).unwrap().scaled(scale).unwrap();
+            let rest = body.rest_pose(Pose::identity());
+            for chain in TwoBone::of(&body) {
+                let target = chain.root(&body, &rest) + Vec3::new(0.6, 0.2, -0.3) * chain.reach();
+                for swivel in 0..TwoBone::swivels() {
+                    let mut poses = rest.clone();
+                    chain.point_at(&body, &mut poses, target, swivel);
+                    let end = poses[chain.lower] * (Vec3::Z * chain.lengths[1]);
+                    assert!(
+                        (end - target).length() < 0.02 * scale,
+                        "{:?} misses by {}",
+                        chain,
+                        (end - target).length()
+                    );
+                }
+            }
+        }
+    }
 }
