@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from voodoo import _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from voodoo.toml_text import parse_toml, read_text
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 _Vector = tuple[_Number, _Number, _Number]
@@ -146,10 +141,7 @@ class Body:
         Raises:
             BodyError: it names the key, what was expected and what was found.
         """
-        try:
-            values = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise BodyError(f"{source}: expected TOML, found a syntax error: {error}") from None
+        values = parse_toml(text, source=source, error=BodyError)
         try:
             spec = _BodySpec.model_validate(values)
         except ValidationError as error:
@@ -172,11 +164,7 @@ class Body:
     @classmethod
     def load(cls, path: str | Path) -> Body:
         """A body from a TOML file."""
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise BodyError(f"{path}: expected a readable TOML file, found: {error}") from None
-        return cls.from_toml(text, source=str(path))
+        return cls.from_toml(read_text(path, error=BodyError), source=str(path))
 
     def scaled(self, factor: float) -> Body:
         """The body with all lengths multiplied by a factor."""

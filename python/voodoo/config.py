@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,11 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from voodoo import _core
 from voodoo.errors import ConfigError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from voodoo.toml_text import parse_toml, read_text
 
 _FIELDS = {name: row for name, *row in _core.config_fields()}
 
@@ -62,10 +57,7 @@ class Config(_Model):  # type: ignore[misc] # made from the table of the core
     @classmethod
     def from_toml(cls, text: str, *, source: str = "configuration") -> Config:
         """A configuration from TOML text; keys that are not there keep their defaults."""
-        try:
-            values = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise ConfigError(f"{source}: expected TOML, found a syntax error: {error}") from None
+        values = parse_toml(text, source=source, error=ConfigError)
         try:
             return cls(**values)
         except ConfigError as error:
@@ -74,11 +66,7 @@ class Config(_Model):  # type: ignore[misc] # made from the table of the core
     @classmethod
     def load(cls, path: str | Path) -> Config:
         """A configuration from a TOML file."""
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(f"{path}: expected a readable TOML file, found: {error}") from None
-        return cls.from_toml(text, source=str(path))
+        return cls.from_toml(read_text(path, error=ConfigError), source=str(path))
 
     def to_toml(self) -> str:
         """The configuration as TOML, each entry with its meaning, unit and range."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +9,9 @@ from typing import Any
 import numpy as np
 
 from voodoo.camera import Camera
-from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.errors import CameraError, RecordingError
 from voodoo.recordings.measurements import FloatArray
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+from voodoo.toml_text import parse_toml, read_text
 
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
@@ -49,8 +44,7 @@ def read_calibration(path: Path) -> FolderCalibration:
     """
     if not path.is_file():
         raise RecordingError(f"{path}: expected a calibration file beside the images, found none")
-    with reading(path, "a TOML file"):
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
     tables = {"depth", "color"}
     _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))
     depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,9 @@ import cv2
 import numpy as np
 
 from voodoo.camera import Camera
-from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.errors import CameraError, RecordingError
 from voodoo.sensors.pixels import FloatArray
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+from voodoo.toml_text import parse_toml, read_text
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 
@@ -44,8 +39,7 @@ def read_camera_toml(path: str | Path) -> tuple[PlacedCamera, ...]:
     path = Path(path)
     if not path.is_file():
         raise RecordingError(f"{path}: expected a calibration file, found none")
-    with reading(path, "a TOML file"):
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
     tables = {key: value for key, value in content.items() if isinstance(value, dict) and "matrix" in value}
     if not tables:
         raise RecordingError(f"{path}: expected a table with a matrix for each camera, found {', '.join(content)}")
