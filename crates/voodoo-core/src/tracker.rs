@@ -17,7 +17,7 @@ use crate::outline::{edges, match_edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Gate, Problem, Solver, solver};
+use crate::solver::{Gate, Pair, Problem, Solver, pairs, solver};
 use crate::view::View;
 
 /// Gauss-Newton steps of the girth fit.
@@ -28,6 +28,8 @@ const BODY_REACH: f32 = 0.15;
 const GIRTH_GATE: f64 = 0.10;
 /// Step of a frame from which the outline speaks: earlier, it would push thin limbs off their points (method section 8).
 const OUTLINE_FROM: usize = 2;
+/// A limb becomes longer or shorter by at most this share in one frame.
+const LENGTH_STEP: f64 = 0.02;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
 
@@ -55,6 +57,10 @@ pub struct Tracker {
     correspondences: Correspondences,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
+    /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
+    pairs: Vec<Pair>,
+    stretched: Vec<f64>,
+    change: Vec<f64>,
     /// Arms and legs.
     chains: Vec<TwoBone>,
     estimate: Estimate,
@@ -88,6 +94,9 @@ impl Tracker {
             correspondences: Correspondences::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
+            pairs: Vec::new(),
+            stretched: Vec::new(),
+            change: Vec::new(),
             chains: Vec::new(),
             estimate: Estimate::default(),
         })
@@ -117,6 +126,10 @@ impl Tracker {
         let (body, poses) = self.body.fit(positions, fit_sizes)?;
         self.restart(body, poses);
         self.girths_open = fit_sizes && self.config.fit_girths;
+        if fit_sizes && self.config.fit_lengths {
+            self.pairs = pairs(&self.body);
+            self.stretched = vec![1.0; self.pairs.len()];
+        }
         Ok(&self.estimate)
     }
 
@@ -144,6 +157,7 @@ impl Tracker {
         self.previous.clear();
         self.started = true;
         self.girths_open = false;
+        self.pairs.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
         self.candidates = Candidates::default();
@@ -183,6 +197,9 @@ impl Tracker {
         self.match_all(frame, self.config.max_steps);
         if self.config.hypotheses && self.solver.starts_from_prediction() && self.stamp.is_some() {
             steps += self.try_hypotheses(frame, pace);
+        }
+        if !self.pairs.is_empty() {
+            self.refine_lengths(pace);
         }
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
@@ -293,6 +310,26 @@ impl Tracker {
                 }
             }
         }
+    }
+
+    /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
+    fn refine_lengths(&mut self, pace: f64) {
+        let Self { body, correspondences, predicted, config, solver, poses, pairs, stretched, change, .. } = self;
+        change.clear();
+        change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
+        let step = config.max_steps;
+        if !solver.lengths(&Problem { body, correspondences, predicted, step, pace, config }, poses, pairs, change) {
+            return;
+        }
+        for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
+            let factor =
+                ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total).clamp(0.5 / *total, 2.0 / *total);
+            *total *= factor;
+            pair.iter().for_each(|limb| {
+                body.change_length(*limb, factor);
+            });
+        }
+        body.close_joints(poses);
     }
 
     /// In the first frame after a reset the pose is known, and all that is not near the body is scene.

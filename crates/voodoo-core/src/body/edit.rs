@@ -57,6 +57,19 @@ impl Body {
         true
     }
 
+    /// Makes a limb longer by a factor, with all that is fixed to it. A change that makes no solid is not made.
+    pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
+        let shape = self.limbs[limb].shape;
+        let Ok(shape) =
+            TaperedEllipticCylinder::new(shape.length() * factor, shape.a0(), shape.b0(), shape.a1(), shape.b1())
+        else {
+            return false;
+        };
+        self.limbs[limb].shape = shape;
+        self.map_landmarks(limb, |_, position| position * Vec3::new(1.0, 1.0, factor));
+        true
+    }
+
     /// The body with a further limb joined to `parent`; its joint-facing proximal cap takes no matches.
     pub fn with_limb(
         &self,
