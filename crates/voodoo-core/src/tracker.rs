@@ -301,6 +301,9 @@ impl Tracker {
                     let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
                     edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
                 }
+                if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
+                    self.body.change_tip(limb, (tip.seen / tip.rim).clamp(0.8, 1.25));
+                }
                 let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
                 let (sum, step) = total.then(&step);
                 if self.body.change_girth(limb, step.shift, step.axes()) {

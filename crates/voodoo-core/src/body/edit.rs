@@ -57,6 +57,15 @@ impl Body {
         true
     }
 
+    /// Makes the surface of a limb longer by a factor; joints and sites stay. A change that makes no solid is not made.
+    pub(crate) fn change_tip(&mut self, limb: usize, factor: f64) {
+        let shape = self.limbs[limb].shape;
+        let (length, a1, b1) = (shape.length() * factor, shape.a1(), shape.b1());
+        if let Ok(shape) = TaperedEllipticCylinder::new(length, shape.a0(), shape.b0(), a1, b1) {
+            self.limbs[limb].shape = shape;
+        }
+    }
+
     /// Makes a limb longer by a factor, with all that is fixed to it. A change that makes no solid is not made.
     pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
         let shape = self.limbs[limb].shape;

@@ -114,7 +114,7 @@ impl Tracker {
         // A limb that is seen where it is needs no other place, whatever lies near it unexplained.
         let lost = now.seen < SUPPORTED * now.facing.max(1.0);
         let contradicted = now.contradicted > CONTRADICTED * now.facing.max(1.0);
-        if open < SUSPICIOUS || !(lost || contradicted) {
+        if open < SUSPICIOUS {
             return 0;
         }
         // The points the chain explains now must stay explained.
