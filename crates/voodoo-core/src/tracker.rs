@@ -63,6 +63,8 @@ pub struct Tracker {
     change: Vec<f64>,
     /// Arms and legs.
     chains: Vec<TwoBone>,
+    /// For how many frames each of them has explained little of its own.
+    idle: Vec<usize>,
     estimate: Estimate,
 }
 
@@ -98,6 +100,7 @@ impl Tracker {
             stretched: Vec::new(),
             change: Vec::new(),
             chains: Vec::new(),
+            idle: Vec::new(),
             estimate: Estimate::default(),
         })
     }
