@@ -25,6 +25,7 @@ pub mod normal;
 pub mod predict;
 pub mod recover;
 mod relate;
+pub mod render;
 pub mod rigid;
 pub mod shape;
 mod simd;
