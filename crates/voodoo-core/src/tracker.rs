@@ -13,10 +13,12 @@ use crate::error::{BodyError, TrackError};
 use crate::estimate::{Estimate, Status};
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
+use crate::outline::{edges, match_edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
 use crate::solver::{Gate, Problem, Solver, solver};
+use crate::view::View;
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
@@ -24,6 +26,8 @@ const GIRTH_STEPS: usize = 6;
 const BODY_REACH: f32 = 0.15;
 /// Points farther than this from the set pose say nothing about girths, metres.
 const GIRTH_GATE: f64 = 0.10;
+/// Step of a frame from which the outline speaks: earlier, it would push thin limbs off their points (method section 8).
+const OUTLINE_FROM: usize = 2;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
 
@@ -164,7 +168,7 @@ impl Tracker {
         }
         self.candidates.gather(frame, self.origin, &bounds, &self.backgrounds, &self.config);
         if std::mem::take(&mut self.girths_open) {
-            self.fit_girths();
+            self.fit_girths(frame);
         }
         let mut steps = 0;
         let mut previous = f64::INFINITY;
@@ -226,6 +230,12 @@ impl Tracker {
         self.match_points(&gate);
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+        if self.config.outline && step >= OUTLINE_FROM {
+            let views = View::all(frame, &self.backgrounds, self.origin);
+            match_edges(&self.body, &self.poses, views, &mut self.correspondences.edges);
+        } else {
+            self.correspondences.edges.clear();
+        }
     }
 
     /// One ICP step (2-7); returns the mean squared distance it started from.
@@ -260,15 +270,21 @@ impl Tracker {
     }
 
     /// Fits the girths to the first frame after a reset, whose pose is known.
-    fn fit_girths(&mut self) {
+    fn fit_girths(&mut self, frame: &Frame) {
         let mut totals = vec![GirthFit::default(); self.poses.len()];
         let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
+        let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
             self.match_points(&gate);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
                 let matches = &self.correspondences.limbs[limb];
-                let Some(step) = girth_step(&shape, matches, &self.poses[limb], total) else { continue };
+                seen.clear();
+                for view in View::all(frame, &self.backgrounds, self.origin) {
+                    let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
+                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
+                }
+                let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
                 let (sum, step) = total.then(&step);
                 if self.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut self.poses[limb];

@@ -4,7 +4,7 @@ use super::{ChainSolver, Gate, Problem, Solver};
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
-use crate::terms::{Limits, Prior, Sites, Surface, Term};
+use crate::terms::{Limits, Outline, Prior, Sites, Surface, Term};
 
 /// Share of a surface point's information across its normal (method section 1: 0.05 to 0.1 stops sliding).
 const SLIDE: f64 = 0.07;
@@ -46,9 +46,11 @@ impl Solver for WholeBody {
         let root =
             [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
         self.normal.clear(poses.len());
-        let terms: [&dyn Term; 4] = [
+        let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
+        let terms: [&dyn Term; 5] = [
             &Surface { correspondences, information, slide: SLIDE, scale },
             &Sites { correspondences, information, scale: 3.0 * scale },
+            &Outline { edges: &correspondences.edges, information: edge_information, scale },
             &Prior { predicted, root, joints: &self.joint_sigmas },
             &Limits { sigma: LIMIT_SIGMA },
         ];
