@@ -30,8 +30,12 @@ _WALL_M = 3.6
 _NOISE_AT_M = 2.4
 _RATE_HZ = 30.0
 # The camera stands 1 m above the floor and looks along the world's x axis at a person who looks back at it.
-_WORLD_FROM_SENSOR = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
-_WORLD_FROM_STANDING = np.array([[-1.0, 0.0, 0.0, 2.4], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.86], [0.0, 0.0, 0.0, 1.0]])
+_WORLD_FROM_SENSOR = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]]
+)
+_WORLD_FROM_STANDING = np.array(
+    [[-1.0, 0.0, 0.0, 2.4], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.86], [0.0, 0.0, 0.0, 1.0]]
+)
 
 # Angle (without side): centre and amplitude, radians or metres, of the left side; the shoulder's and hip's second and third
 # angles are mirrored on the right. Arms stay off the body, so that nothing but the noise is ambiguous.
@@ -206,3 +210,30 @@ def disturbed(frames: Iterable[VirtualFrame], how: Disturbance) -> Iterator[Virt
             image = rng.integers(500, 4500, image.shape).astype(np.uint16)
         last = replace(frame, image=image)
         yield last
+
+
+def grown(body: Body, *, thicker: float = 1.0, longer: float = 1.0, joints: bool = True) -> Body:
+    """The same body with thicker and longer limbs: what a tracker gets whose model is wrong.
+
+    Args:
+        body: the true one.
+        thicker: factor of all semi-axes.
+        longer: factor of all lengths.
+        joints: joints and sites move along with the limbs' ends; else only the surfaces grow.
+
+    Raises:
+        BodyError: the result is no body.
+    """
+    name, limbs, sites = body.core.parts()
+    reach = longer if joints else 1.0
+
+    def place(frame: tuple[FloatArray, FloatArray]) -> tuple[list[float], FloatArray]:
+        return [reach * float(value) for value in frame[0]], frame[1]
+
+    parts = []
+    for limb, parent, shape, joint, caps in limbs:
+        axes = (thicker * axis for axis in (shape.a0, shape.b0, shape.a1, shape.b1))
+        joint = None if joint is None else (joint[0], place(joint[1]), place(joint[2]), *joint[3:])
+        parts.append((limb, parent, _core.TaperedEllipticCylinder(longer * shape.length, *axes), joint, caps))
+    places = [(site, limb, [reach * float(value) for value in position]) for site, limb, position in sites]
+    return Body(_core.Body(name, parts, places))

@@ -18,6 +18,7 @@ pub mod correspondence;
 pub mod error;
 pub mod estimate;
 pub mod evidence;
+mod facing;
 pub mod frame;
 pub mod geometry;
 pub mod ik;
