@@ -261,6 +261,8 @@ config! {
     outline: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
+    /// After a reset that fits sizes, the frames that follow refine the limbs' lengths (whole-body solvers).
+    fit_lengths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.
     ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;
     /// Threads for one step. The result is the same, bit by bit, for any number.

@@ -12,7 +12,7 @@ use crate::geometry::{Pose, Vec3};
 use crate::view::{Pixel, View};
 
 /// A point this far from the model is not explained, metres.
-pub const EXPLAINED: f64 = 0.06;
+pub const EXPLAINED: f64 = 0.04;
 /// The camera sees past the model's surface when the return lies this much behind it, metres.
 const PAST: f64 = 0.08;
 /// Cost of a patch that hides behind what is seen.

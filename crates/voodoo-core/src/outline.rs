@@ -9,26 +9,27 @@ use crate::view::{Pixel, View};
 pub const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
 /// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
 const DEPTH_REACH: f64 = 0.12;
+/// A limb seen more nearly end on than this (sine) shows no outline.
+const ASLANT: f64 = 0.5;
 /// How far beyond the limb's rim its edge is looked for, metres.
 const EDGE_REACH: f64 = 0.08;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// Place along the axis, share of the length.
-    pub t: f64,
-    /// Direction across the limb, at right angles to its axis and to the line of sight; limb frame, length one.
+    /// Direction in which the edge was looked for, limb frame, length one: across the limb at right angles to the line of
+    /// sight, or along its axis.
     pub side: Vec3,
-    /// Distance of the model's rim from the axis, metres.
+    /// Distance of the model's rim in that direction from the axis, or from the proximal end, metres.
     pub rim: f64,
     /// The rim's point nearest to the edge, limb frame.
     pub foot: Vec3,
-    /// Distance of the seen edge from the axis, metres.
+    /// Distance of the seen edge, likewise, metres.
     pub seen: f64,
 }
 
-/// Looks for the edges on both sides of a limb. `owns` tells whether a point (working frame) is nearer to this limb than to
-/// all others: an edge of another limb is none of this one.
+/// Looks for the edges on both sides of a limb, and at its tip when it ends free. `owns` tells whether a point (working
+/// frame) is nearer to this limb than to all others: an edge of another limb is none of this one.
 pub fn edges(
     view: &View,
     limb: &Limb,
@@ -38,7 +39,14 @@ pub fn edges(
 ) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-    let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
+    let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3| {
+        let walk = Walk { start: camera_from_limb * start, along: camera_from_limb.rotation * side, rim, thickness };
+        if let Some((seen, place)) = walk.edge(view)
+            && (seen <= rim || owns(view.working_from_camera * place))
+        {
+            found(Edge { side, rim, foot, seen });
+        }
+    };
     for t in STATIONS {
         let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
         let axis = Vec3::new(0.0, 0.0, t * shape.length());
@@ -46,40 +54,54 @@ pub fn edges(
         let sight = camera_from_limb.inverse_transform_vector(-centre);
         let Some(ahead) = sight.with_z(0.0).try_normalize() else { continue };
         // Seen nearly end on, a limb has no sides.
-        if centre.z < 0.1 || sight.with_z(0.0).length() < 0.5 * sight.length() {
+        if sight.with_z(0.0).length() < ASLANT * sight.length() {
             continue;
         }
         let thickness = (a * ahead.x).hypot(b * ahead.y);
         for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
             let rim = (a * side.x).hypot(b * side.y);
-            let across = camera_from_limb.rotation * side;
-            let step = 0.5 * centre.z / focal;
-            let mut last = None;
-            let mut r = 0.0;
-            let seen = loop {
-                match view.at(centre + across * r) {
-                    Pixel::Something(z) if z < centre.z - thickness - DEPTH_REACH => break None,
-                    Pixel::Something(z) if z <= centre.z + thickness + DEPTH_REACH => last = Some(z),
-                    Pixel::Unknown => break None,
-                    Pixel::Something(_) | Pixel::Scene(_) => break last.map(|z| (r, z)),
-                }
-                // What lies well inside the limb is no edge: one look on the way out will do.
-                r = if r == 0.0 { (0.4 * rim).max(step) } else { r + step };
-                if r > rim + EDGE_REACH {
-                    break None;
-                }
-            };
-            let Some((seen, z)) = seen else { continue };
-            // The edge lies between the two last looks.
-            let seen = seen - 0.25 * step;
-            // The last pixel of the body before the edge.
-            let place = centre + across * (seen - step).max(0.0);
-            if seen > rim && !owns(view.working_from_camera * (place * (z / place.z))) {
-                continue;
-            }
             let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
-            found(Edge { t, side, rim, foot, seen });
+            look(axis, side, rim, thickness, foot);
         }
+    }
+    let tip = Vec3::new(0.0, 0.0, shape.length());
+    let sight = camera_from_limb.inverse_transform_vector(camera_from_limb * tip);
+    if limb.match_caps[1] && sight.with_z(0.0).length() > ASLANT * sight.length() {
+        let thickness = shape.a1().max(shape.b1());
+        look(Vec3::ZERO, Vec3::Z, shape.length(), thickness, tip);
+    }
+}
+
+/// A way across an image: from a point along a direction (camera frame), metres.
+struct Walk {
+    start: Vec3,
+    along: Vec3,
+    rim: f64,
+    thickness: f64,
+}
+
+impl Walk {
+    /// How far from the start the body ends, and the last place seen on it; `None` when another thing stands before it, when
+    /// the image does not tell, or when no edge comes within reach.
+    fn edge(&self, view: &View) -> Option<(f64, Vec3)> {
+        let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
+        let step = 0.5 * self.start.z.max(0.1) / focal;
+        let reach = self.thickness + DEPTH_REACH;
+        let mut last = None;
+        let mut r = 0.0;
+        while r <= self.rim + EDGE_REACH {
+            let place = self.start + self.along * r;
+            match view.at(place) {
+                Pixel::Unknown => return None,
+                Pixel::Something(z) if z < place.z - reach => return None,
+                Pixel::Something(z) if z <= place.z + reach => last = Some(place * (z / place.z)),
+                // The edge lies between the two last looks.
+                Pixel::Something(_) | Pixel::Scene(_) => return last.map(|last| (r - 0.25 * step, last)),
+            }
+            // What lies well inside the limb is no edge: one look on the way out will do.
+            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + step };
+        }
+        None
     }
 }
 

@@ -18,7 +18,7 @@ use crate::outline::{edges, match_edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Gate, Problem, Solver, solver};
+use crate::solver::{Gate, Pair, Problem, Solver, pairs, solver};
 use crate::view::View;
 
 /// Gauss-Newton steps of the girth fit.
@@ -29,6 +29,8 @@ const BODY_REACH: f32 = 0.15;
 const GIRTH_GATE: f64 = 0.10;
 /// Step of a frame from which the outline speaks: earlier, it would push thin limbs off their points (method section 8).
 const OUTLINE_FROM: usize = 2;
+/// A limb becomes longer or shorter by at most this share in one frame.
+const LENGTH_STEP: f64 = 0.02;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
 /// In the second frame after a reset the body's motion is not known yet: this much more of it is unexpected.
@@ -58,8 +60,14 @@ pub struct Tracker {
     correspondences: Correspondences,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
+    /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
+    pairs: Vec<Pair>,
+    stretched: Vec<f64>,
+    change: Vec<f64>,
     /// Arms and legs.
     chains: Vec<TwoBone>,
+    /// For how many frames each of them has explained little of its own.
+    idle: Vec<usize>,
     estimate: Estimate,
 }
 
@@ -91,7 +99,11 @@ impl Tracker {
             correspondences: Correspondences::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
+            pairs: Vec::new(),
+            stretched: Vec::new(),
+            change: Vec::new(),
             chains: Vec::new(),
+            idle: Vec::new(),
             estimate: Estimate::default(),
         })
     }
@@ -120,6 +132,10 @@ impl Tracker {
         let (body, poses) = self.body.fit(positions, fit_sizes)?;
         self.restart(body, poses);
         self.girths_open = fit_sizes && self.config.fit_girths;
+        if fit_sizes && self.config.fit_lengths {
+            self.pairs = pairs(&self.body);
+            self.stretched = vec![1.0; self.pairs.len()];
+        }
         Ok(&self.estimate)
     }
 
@@ -147,6 +163,7 @@ impl Tracker {
         self.previous.clear();
         self.started = true;
         self.girths_open = false;
+        self.pairs.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
         self.candidates = Candidates::default();
@@ -186,6 +203,9 @@ impl Tracker {
         self.match_all(frame, self.config.max_steps);
         if self.config.hypotheses && self.solver.starts_from_prediction() && self.stamp.is_some() {
             steps += self.try_hypotheses(frame, pace);
+        }
+        if !self.pairs.is_empty() {
+            self.refine_lengths(pace);
         }
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
@@ -292,6 +312,9 @@ impl Tracker {
                     let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
                     edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
                 }
+                if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
+                    self.body.change_tip(limb, (tip.seen / tip.rim).clamp(0.8, 1.25));
+                }
                 let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
                 let (sum, step) = total.then(&step);
                 if self.body.change_girth(limb, step.shift, step.axes()) {
@@ -301,6 +324,26 @@ impl Tracker {
                 }
             }
         }
+    }
+
+    /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
+    fn refine_lengths(&mut self, pace: f64) {
+        let Self { body, correspondences, predicted, config, solver, poses, pairs, stretched, change, .. } = self;
+        change.clear();
+        change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
+        let step = config.max_steps;
+        if !solver.lengths(&Problem { body, correspondences, predicted, step, pace, config }, poses, pairs, change) {
+            return;
+        }
+        for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
+            let factor =
+                ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total).clamp(0.5 / *total, 2.0 / *total);
+            *total *= factor;
+            pair.iter().for_each(|limb| {
+                body.change_length(*limb, factor);
+            });
+        }
+        body.close_joints(poses);
     }
 
     /// In the first frame after a reset the pose is known, and all that is not near the body is scene.

@@ -2,11 +2,13 @@
 
 mod chain;
 mod cholesky;
+mod lengths;
 mod limbwise;
 mod whole_body;
 
 pub use chain::ChainSolver;
 pub(crate) use cholesky::solve_in_place;
+pub use lengths::{Pair, pairs};
 pub use limbwise::Limbwise;
 pub use whole_body::WholeBody;
 
@@ -45,6 +47,12 @@ pub struct Gate {
 pub trait Solver: std::fmt::Debug + Send + Sync {
     /// One update of all poses (working frame).
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
+
+    /// Relative changes of the lengths of `pairs` that the correspondences ask for at `poses`, into `change`, which holds how
+    /// far the lengths are below the ones set. False when the solver knows none.
+    fn lengths(&mut self, _problem: &Problem, _poses: &[Pose], _pairs: &[Pair], _change: &mut [f64]) -> bool {
+        false
+    }
 
     /// Which points may be matched in a step of a frame.
     fn gate(&self, config: &Config, step: usize) -> Gate;
