@@ -55,6 +55,10 @@ impl Solver for WholeBody {
     fn starts_from_prediction(&self) -> bool {
         true
     }
+
+    fn faces_cameras(&self) -> bool {
+        true
+    }
 }
 
 impl WholeBody {
@@ -83,9 +87,5 @@ impl WholeBody {
         for term in terms {
             term.add(body, poses, &mut self.normal);
         }
-    }
-
-    fn faces_cameras(&self) -> bool {
-        true
     }
 }
