@@ -1,16 +1,16 @@
-//! A camera sees only what faces it: points that were matched to the far side of a limb belong to its near side.
+//! A camera sees only what faces it: points inside a limb that were matched to its far side belong to its near side.
 //!
-//! The closest point of the surface is on the far side as soon as a limb is wrong by its radius along the line of sight. Matched
-//! there, the points would hold the limb where it is, nearer to the camera than they are. They are matched to the point that the
-//! camera sees before it in the same slice instead, so that they draw the limb back to them, as far as the robust kernel lets
-//! them. At the outline the two coincide: nothing jumps.
+//! The closest point of the surface is on the far side as soon as a limb is its radius too near to the camera. Matched there, the
+//! points would hold the limb where it is. They are matched to the point that the camera sees before it in the same slice
+//! instead, and draw the limb back to them. At the outline the two coincide: nothing jumps. Points behind a limb keep their
+//! closest point: they may belong to what lies behind it.
 
 use crate::candidates::Candidates;
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Pose, Vec3};
 use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
 
-/// Turns the matches of depth pixels on the side of a limb that face away from their camera to the opposite side.
+/// Turns the matches of depth pixels inside a limb that face away from their camera to the near side.
 pub fn face_cameras(
     shape: &TaperedEllipticCylinder,
     pose: &Pose,
@@ -30,7 +30,8 @@ pub fn face_cameras(
             let facing_away = normals.x[index] * (measured.x[index] - x)
                 + normals.y[index] * (measured.y[index] - y)
                 + normals.z[index] * (measured.z[index] - z);
-            if facing_away <= 0.0 || weight[index] <= 0.0 || surface.region[index] != Region::Side as u8 {
+            let inside = surface.signed_distance[index] < 0.0 && surface.region[index] == Region::Side as u8;
+            if facing_away <= 0.0 || !inside || weight[index] <= 0.0 {
                 continue;
             }
             let view = pose.rotation.inverse() * (measured.get(index) - *camera);
