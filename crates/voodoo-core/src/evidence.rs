@@ -3,13 +3,11 @@
 //! Points that no limb explains cost, and so does visible surface of the model where the camera sees past it. Either alone
 //! would be fooled: a limb hidden inside the torso contradicts nothing, a limb in empty space leaves few points unexplained.
 
-use crate::background::Backgrounds;
 use crate::body::Limb;
 use crate::candidates::REFERENCE_PATCH;
 use crate::correspondence::Correspondences;
-use crate::frame::Frame;
 use crate::geometry::{Pose, Vec3};
-use crate::view::{Pixel, View};
+use crate::view::{Pixel, View, Views};
 
 /// A point this far from the model is not explained, metres.
 pub const EXPLAINED: f64 = 0.04;
@@ -30,14 +28,6 @@ enum Sight {
     Seen,
     /// The camera sees past it.
     Contradicted,
-}
-
-/// Depth images as witnesses against poses.
-#[derive(Debug)]
-pub struct Witness<'a> {
-    frame: &'a Frame<'a>,
-    backgrounds: &'a Backgrounds,
-    origin: Vec3,
 }
 
 /// Patches of a limb: seen, contradicted, and all that face a camera.
@@ -69,47 +59,40 @@ impl Visibility {
     }
 }
 
-impl<'a> Witness<'a> {
-    /// Looks at the images of a frame; `origin` is the working frame's.
-    pub fn new(frame: &'a Frame<'a>, backgrounds: &'a Backgrounds, origin: Vec3) -> Self {
-        Self { frame, backgrounds, origin }
-    }
-
-    /// How much of a limb's surface is seen and how much contradicted, in patches.
-    pub fn look(&self, limb: &Limb, working_from_limb: &Pose) -> Visibility {
-        let shape = &limb.shape;
-        let mut found = Visibility::default();
-        for view in View::all(self.frame, self.backgrounds, self.origin) {
-            let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-            for t in ALONG {
-                let z = t * shape.length();
-                let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
-                let centre = camera_from_limb * Vec3::new(0.0, 0.0, z);
-                // Direction to the camera, across the limb, in the limb frame.
-                let ahead = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0);
-                if ahead.length() < 1e-6 {
-                    continue;
+/// How much of a limb's surface is seen by the cameras and how much contradicted.
+pub fn look(views: Views, limb: &Limb, working_from_limb: &Pose) -> Visibility {
+    let shape = &limb.shape;
+    let mut found = Visibility::default();
+    for view in views.iter() {
+        let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
+        for t in ALONG {
+            let z = t * shape.length();
+            let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
+            let centre = camera_from_limb * Vec3::new(0.0, 0.0, z);
+            // Direction to the camera, across the limb, in the limb frame.
+            let ahead = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0);
+            if ahead.length() < 1e-6 {
+                continue;
+            }
+            let ahead = ahead.normalize();
+            let side = Vec3::new(-ahead.y, ahead.x, 0.0);
+            for s in ACROSS {
+                let forward = (1.0 - s * s).sqrt();
+                let place = ahead * forward + side * s;
+                let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
+                let patches = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
+                    / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
+                match sight(&view, point) {
+                    None => continue,
+                    Some(Sight::Contradicted) => found.contradicted += patches,
+                    Some(Sight::Seen) => found.seen += patches,
+                    Some(Sight::Hidden) => found.hidden += patches,
                 }
-                let ahead = ahead.normalize();
-                let side = Vec3::new(-ahead.y, ahead.x, 0.0);
-                for s in ACROSS {
-                    let forward = (1.0 - s * s).sqrt();
-                    let place = ahead * forward + side * s;
-                    let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
-                    let patches = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
-                        / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
-                    match sight(&view, point) {
-                        None => continue,
-                        Some(Sight::Contradicted) => found.contradicted += patches,
-                        Some(Sight::Seen) => found.seen += patches,
-                        Some(Sight::Hidden) => found.hidden += patches,
-                    }
-                    found.facing += patches;
-                }
+                found.facing += patches;
             }
         }
-        found
     }
+    found
 }
 
 fn sight(view: &View, point: Vec3) -> Option<Sight> {

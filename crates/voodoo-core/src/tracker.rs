@@ -10,7 +10,7 @@ use crate::candidates::{Candidates, body_box, image_window, shifted};
 use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
 use crate::error::{BodyError, TrackError};
-use crate::estimate::{Estimate, Status};
+use crate::estimate::{Estimate, LimbStatus, Status};
 use crate::facing::face_cameras;
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
@@ -19,7 +19,7 @@ use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
 use crate::solver::{Gate, Pair, Problem, Solver, pairs, solver};
-use crate::view::View;
+use crate::view::{Views, find_cut_out};
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
@@ -55,6 +55,8 @@ pub struct Tracker {
     predicted: Vec<Pose>,
     origin: Vec3,
     backgrounds: Backgrounds,
+    /// In which images of this frame the body was cut out.
+    cut_out: Vec<bool>,
     candidates: Candidates,
     assignment: Assignment,
     correspondences: Correspondences,
@@ -66,6 +68,7 @@ pub struct Tracker {
     change: Vec<f64>,
     /// Arms and legs.
     chains: Vec<TwoBone>,
+    judgement: Judgement,
     /// For how many frames each of them has explained little of its own.
     idle: Vec<usize>,
     estimate: Estimate,
@@ -94,6 +97,7 @@ impl Tracker {
             predicted: Vec::new(),
             origin: Vec3::ZERO,
             backgrounds: Backgrounds::default(),
+            cut_out: Vec::new(),
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
@@ -103,6 +107,7 @@ impl Tracker {
             stretched: Vec::new(),
             change: Vec::new(),
             chains: Vec::new(),
+            judgement: Judgement::default(),
             idle: Vec::new(),
             estimate: Estimate::default(),
         })
@@ -133,8 +138,7 @@ impl Tracker {
         self.restart(body, poses);
         self.girths_open = fit_sizes && self.config.fit_girths;
         if fit_sizes && self.config.fit_lengths {
-            self.pairs = pairs(&self.body);
-            self.stretched = vec![1.0; self.pairs.len()];
+            self.follow_lengths();
         }
         Ok(&self.estimate)
     }
@@ -166,11 +170,15 @@ impl Tracker {
         self.pairs.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
+        self.correspondences.edges.clear();
         self.candidates = Candidates::default();
         self.backgrounds.clear();
         self.report(f64::NAN, 0);
         // The caller vouches for a pose that was set.
         self.estimate.status = Status::Tracking;
+        self.judgement.clear();
+        self.estimate.limb_status.clear();
+        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
     }
 
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
@@ -181,6 +189,7 @@ impl Tracker {
         frame.check(&self.body, self.stamp)?;
         self.move_origin();
         let pace = self.predict(frame.stamp);
+        find_cut_out(frame, &mut self.cut_out);
         // 1 Prefilter the free points by the enlarged box of the whole body.
         let bounds = body_box(&self.body, &self.poses, self.config.body_box_margin);
         if self.config.background {
@@ -210,6 +219,7 @@ impl Tracker {
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);
+        self.judge(frame);
         Ok(&self.estimate)
     }
 
@@ -254,8 +264,8 @@ impl Tracker {
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
         if self.config.outline && step >= OUTLINE_FROM {
-            let views = View::all(frame, &self.backgrounds, self.origin);
-            match_edges(&self.body, &self.poses, views, &mut self.correspondences.edges);
+            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            match_edges(&self.body, &self.poses, views.iter(), &mut self.correspondences.edges);
         } else {
             self.correspondences.edges.clear();
         }
@@ -308,7 +318,9 @@ impl Tracker {
                 let shape = self.body.limbs()[limb].shape;
                 let matches = &self.correspondences.limbs[limb];
                 seen.clear();
-                for view in View::all(frame, &self.backgrounds, self.origin) {
+                let views =
+                    Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+                for view in views.iter() {
                     let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
                     edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
                 }
@@ -324,6 +336,12 @@ impl Tracker {
                 }
             }
         }
+    }
+
+    /// Starts to refine the limbs' lengths from those they have.
+    fn follow_lengths(&mut self) {
+        self.pairs = pairs(&self.body);
+        self.stretched = vec![1.0; self.pairs.len()];
     }
 
     /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
@@ -460,6 +478,13 @@ impl Tracker {
         }
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
+        self.correspondences.edges.clear();
+        if !self.pairs.is_empty() {
+            self.follow_lengths();
+        }
+        self.judgement.clear();
+        self.estimate.limb_status.clear();
+        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
         let status = self.estimate.status;
         self.report(self.stamp.unwrap_or(f64::NAN), 0);
         self.estimate.status = status;
@@ -468,5 +493,7 @@ impl Tracker {
 
 mod hypotheses;
 mod report;
+mod status;
 
 use hypotheses::Hypotheses;
+use status::Judgement;

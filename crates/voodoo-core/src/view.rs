@@ -32,28 +32,33 @@ pub enum Pixel {
 /// An image with more pixels without return than this share was cut out.
 const CUT_OUT: f64 = 0.5;
 
-impl<'a> View<'a> {
-    /// The image of a frame with this index; `origin` is the working frame's origin in the world.
-    pub fn new(image: &'a DepthImage<'a>, index: usize, backgrounds: &'a Backgrounds, origin: Vec3) -> Self {
-        let (mut none, mut all) = (0_u32, 0_u32);
-        for index in (0..image.pixels.len()).step_by(97) {
-            all += 1;
-            none += u32::from(image.pixels.get(index) <= 0.0);
-        }
-        Self {
+/// The depth images of a frame as witnesses.
+#[derive(Clone, Copy, Debug)]
+pub struct Views<'a> {
+    /// The frame.
+    pub frame: &'a Frame<'a>,
+    /// What is known of the scene behind the body.
+    pub backgrounds: &'a Backgrounds,
+    /// In which images the body was cut out, as [`find_cut_out`] found it.
+    pub cut_out: &'a [bool],
+    /// The working frame's origin in the world.
+    pub origin: Vec3,
+}
+
+impl<'a> Views<'a> {
+    /// One after the other.
+    pub fn iter(self) -> impl Iterator<Item = View<'a>> {
+        let images = self.frame.images.iter().enumerate().zip(self.cut_out);
+        images.map(move |((index, image), cut_out)| View {
             image,
-            background: backgrounds.of(index, image),
-            working_from_camera: shifted(&image.world_from_sensor, origin),
-            cut_out: f64::from(none) > CUT_OUT * f64::from(all),
-        }
+            background: self.backgrounds.of(index, image),
+            working_from_camera: shifted(&image.world_from_sensor, self.origin),
+            cut_out: *cut_out,
+        })
     }
+}
 
-    /// All depth images of a frame.
-    pub fn all(frame: &'a Frame<'a>, backgrounds: &'a Backgrounds, origin: Vec3) -> impl Iterator<Item = Self> {
-        let images = frame.images.iter().enumerate();
-        images.map(move |(index, image)| Self::new(image, index, backgrounds, origin))
-    }
-
+impl View<'_> {
     /// What the pixel that a point (camera frame) falls in shows. Images of distorting lenses say nothing: their rays are
     /// known by the pixel, not the pixel by the ray.
     pub fn at(&self, point: Vec3) -> Pixel {
@@ -79,4 +84,17 @@ impl<'a> View<'a> {
             Pixel::Something(z)
         }
     }
+}
+
+/// In which images of a frame the body was cut out, into `found`.
+pub fn find_cut_out(frame: &Frame, found: &mut Vec<bool>) {
+    found.clear();
+    found.extend(frame.images.iter().map(|image| {
+        let (mut none, mut all) = (0_u32, 0_u32);
+        for index in (0..image.pixels.len()).step_by(97) {
+            all += 1;
+            none += u32::from(image.pixels.get(index) <= 0.0);
+        }
+        f64::from(none) > CUT_OUT * f64::from(all)
+    }));
 }

@@ -3,12 +3,13 @@
 use super::Tracker;
 use crate::candidates::REFERENCE_PATCH;
 use crate::chain::joint_turn;
-use crate::evidence::{EXPLAINED, Visibility, Witness, unexplained};
+use crate::evidence::{EXPLAINED, Visibility, look, unexplained};
 use crate::frame::Frame;
 use crate::geometry::{Points, Pose, Vec3};
 use crate::recover::TwoBone;
 use crate::shape::SurfaceBatch;
 use crate::terms::ShortestAxis;
+use crate::view::Views;
 
 /// So many unexplained patches near a chain make it suspect.
 const SUSPICIOUS: f64 = 25.0;
@@ -110,10 +111,10 @@ impl Tracker {
         }
         let open_count = work.near.len();
         let open: f64 = work.near_weight.iter().sum();
-        let witness = Witness::new(frame, &self.backgrounds, self.origin);
+        let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let look = |poses: &[Pose]| {
             let mut sum = Visibility::default();
-            chain.limbs().for_each(|limb| sum += witness.look(&self.body.limbs()[limb], &poses[limb]));
+            chain.limbs().for_each(|limb| sum += look(views, &self.body.limbs()[limb], &poses[limb]));
             sum
         };
         if open < SUSPICIOUS {
@@ -224,9 +225,9 @@ impl Tracker {
 
     fn overall_score(&self, frame: &Frame) -> f64 {
         let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
-        let witness = Witness::new(frame, &self.backgrounds, self.origin);
+        let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let limbs = self.body.limbs().iter().zip(&self.poses);
-        let seen: f64 = limbs.map(|(limb, pose)| witness.look(limb, pose).cost()).sum();
+        let seen: f64 = limbs.map(|(limb, pose)| look(views, limb, pose).cost()).sum();
         let strain: f64 = self.chains.iter().map(|chain| self.strain(chain, &self.poses)).sum();
         unexplained(&self.correspondences, total) + seen + strain
     }
