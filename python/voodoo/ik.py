@@ -285,7 +285,7 @@ class Chain:
         images: Sequence[Silhouette],
         *,
         world_from_base: npt.ArrayLike | None = None,
-        margin: float = 0.0,
+        margin: float = 1.0,
         bones: Sequence[Bone] | None = None,
     ) -> tuple[float, FloatArray]:
         """The image criterion h [px] and its gradient (n,) (J10 eq. 5, 8); see `solve` for the arguments."""
@@ -320,7 +320,7 @@ class Options:
     gain: float = 1.0
     caution: float = 0.4
     largest_turn: float = 0.5
-    margin: float = 0.0
+    margin: float = 1.0
     bones: tuple[Bone, ...] | None = field(default=None)
 
     def __post_init__(self) -> None:
