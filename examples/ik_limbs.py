@@ -59,7 +59,9 @@ def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **optio
     for frame in range(len(truth["l_hip"])):
         images = [] if silhouettes is None else silhouettes(frame, last)
         base = np.eye(4)
-        base[:3, :3] = rotation(np.stack([local[name] for name in trunk]), np.stack([truth[name][frame] for name in trunk]))
+        base[:3, :3] = rotation(
+            np.stack([local[name] for name in trunk]), np.stack([truth[name][frame] for name in trunk])
+        )
         for joint, (_, first, end) in LIMBS.items():
             base[:3, 3] = truth[first][frame] - base[:3, :3] @ local[first]
             posture = followers[joint].step({end: truth[end][frame]}, images=images, world_from_base=base)

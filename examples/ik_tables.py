@@ -81,7 +81,9 @@ def rendered(path: Path) -> Rendered:
     return Rendered(recording.name, height, truth, depths, side)
 
 
-def picture(image: ik.Silhouette, pose: np.ndarray, known: Mapping[str, np.ndarray], joints: Sequence[Mapping]) -> np.ndarray:
+def picture(
+    image: ik.Silhouette, pose: np.ndarray, known: Mapping[str, np.ndarray], joints: Sequence[Mapping]
+) -> np.ndarray:
     """A silhouette with the limbs of the truth and of two solutions: joint -> (3,), at twice its size."""
     mask = np.where(image.distance[..., None] < 0.0, 255, 90).astype(np.uint8).repeat(3, axis=2)
     canvas = cv2.resize(mask, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)

@@ -100,7 +100,9 @@ def experiments(chain: ik.Chain) -> list[Experiment]:
 
 def run(chain: ik.Chain, experiment: Experiment, *, with_image: bool, steps: int) -> ik.Posture:
     images = [experiment.image] if with_image else []
-    return ik.solve(chain, {"tip": experiment.tip}, images=images, start=experiment.start, steps=steps, caution=0.02)
+    return ik.solve(
+        chain, {"tip": experiment.tip}, images=images, start=experiment.start, steps=steps, caution=0.02, margin=0.0
+    )
 
 
 def picture(chain: ik.Chain, experiment: Experiment, angles: np.ndarray, words: str) -> np.ndarray:

@@ -143,7 +143,11 @@ def _track(stamps: Sequence[float], postures: Sequence[Posture]) -> Track:
 
 
 def _silhouettes(
-    recorded: RecordedFrame, sites: Mapping[str, FloatArray], scenes: Mapping[str, StillScene | StillBackground], *, level: bool
+    recorded: RecordedFrame,
+    sites: Mapping[str, FloatArray],
+    scenes: Mapping[str, StillScene | StillBackground],
+    *,
+    level: bool,
 ) -> list[Silhouette]:
     """Silhouettes of all pictures whose scene is known; `sites`: where the person is and was (3,) [m]."""
     found = []
@@ -179,6 +183,5 @@ def _scenes(
         raise VoodooError(f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look")
     scenes: dict[str, StillScene | StillBackground] = {name: StillScene(images) for name, images in depths.items()}
     for name, pairs in colours.items():
-        images, there = zip(*pairs, strict=True)
-        scenes[name] = StillBackground(images, occupied=there)
+        scenes[name] = StillBackground([image for image, _ in pairs], occupied=[there for _, there in pairs])
     return scenes

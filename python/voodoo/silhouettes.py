@@ -113,8 +113,8 @@ def from_depth(
         for place in places.values():
             with np.errstate(invalid="ignore"):
                 near |= np.square(points - place).sum(axis=1) < _REACH_M**2
-        near = near.reshape(height, width)
-        mask = (mask & (before | near)) | (before & near)
+        close = near.reshape(height, width)
+        mask = (mask & (before | close)) | (before & close)
     return filled(without_specks(mask & np.isfinite(z), smallest=_SPECK_PX))
 
 
