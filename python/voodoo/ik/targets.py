@@ -12,7 +12,6 @@ import numpy as np
 from voodoo.errors import MeasurementError
 from voodoo.ik.values import Vector, three
 
-
 Parts: TypeAlias = tuple[str, str, tuple[float, float, float, float, float, float], float, int]
 """Site, kind, values, weight and priority of a target."""
 
