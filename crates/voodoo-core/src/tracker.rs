@@ -10,13 +10,16 @@ use crate::candidates::{Candidates, body_box, image_window, shifted};
 use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
 use crate::error::{BodyError, TrackError};
-use crate::estimate::{Estimate, Status};
+use crate::estimate::{Estimate, LimbStatus, Status};
+use crate::facing::face_cameras;
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
+use crate::outline::{edges, match_edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Gate, Problem, Solver, solver};
+use crate::solver::{Gate, Pair, Problem, Solver, pairs, solver};
+use crate::view::{Views, find_cut_out};
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
@@ -24,8 +27,14 @@ const GIRTH_STEPS: usize = 6;
 const BODY_REACH: f32 = 0.15;
 /// Points farther than this from the set pose say nothing about girths, metres.
 const GIRTH_GATE: f64 = 0.10;
+/// Step of a frame from which the outline speaks: earlier, it would push thin limbs off their points (method section 8).
+const OUTLINE_FROM: usize = 2;
+/// A limb becomes longer or shorter by at most this share in one frame.
+const LENGTH_STEP: f64 = 0.02;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
+/// In the second frame after a reset the body's motion is not known yet: this much more of it is unexpected.
+const UNKNOWN_MOTION: f64 = 4.0;
 
 /// Follows one body through frames.
 #[derive(Debug)]
@@ -46,13 +55,22 @@ pub struct Tracker {
     predicted: Vec<Pose>,
     origin: Vec3,
     backgrounds: Backgrounds,
+    /// In which images of this frame the body was cut out.
+    cut_out: Vec<bool>,
     candidates: Candidates,
     assignment: Assignment,
     correspondences: Correspondences,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
+    /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
+    pairs: Vec<Pair>,
+    stretched: Vec<f64>,
+    change: Vec<f64>,
     /// Arms and legs.
     chains: Vec<TwoBone>,
+    judgement: Judgement,
+    /// For how many frames each of them has explained little of its own.
+    idle: Vec<usize>,
     estimate: Estimate,
 }
 
@@ -79,12 +97,18 @@ impl Tracker {
             predicted: Vec::new(),
             origin: Vec3::ZERO,
             backgrounds: Backgrounds::default(),
+            cut_out: Vec::new(),
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
+            pairs: Vec::new(),
+            stretched: Vec::new(),
+            change: Vec::new(),
             chains: Vec::new(),
+            judgement: Judgement::default(),
+            idle: Vec::new(),
             estimate: Estimate::default(),
         })
     }
@@ -113,6 +137,9 @@ impl Tracker {
         let (body, poses) = self.body.fit(positions, fit_sizes)?;
         self.restart(body, poses);
         self.girths_open = fit_sizes && self.config.fit_girths;
+        if fit_sizes && self.config.fit_lengths {
+            self.follow_lengths();
+        }
         Ok(&self.estimate)
     }
 
@@ -140,13 +167,18 @@ impl Tracker {
         self.previous.clear();
         self.started = true;
         self.girths_open = false;
+        self.pairs.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
+        self.correspondences.edges.clear();
         self.candidates = Candidates::default();
         self.backgrounds.clear();
         self.report(f64::NAN, 0);
         // The caller vouches for a pose that was set.
         self.estimate.status = Status::Tracking;
+        self.judgement.clear();
+        self.estimate.limb_status.clear();
+        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
     }
 
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
@@ -157,6 +189,7 @@ impl Tracker {
         frame.check(&self.body, self.stamp)?;
         self.move_origin();
         let pace = self.predict(frame.stamp);
+        find_cut_out(frame, &mut self.cut_out);
         // 1 Prefilter the free points by the enlarged box of the whole body.
         let bounds = body_box(&self.body, &self.poses, self.config.body_box_margin);
         if self.config.background {
@@ -164,7 +197,7 @@ impl Tracker {
         }
         self.candidates.gather(frame, self.origin, &bounds, &self.backgrounds, &self.config);
         if std::mem::take(&mut self.girths_open) {
-            self.fit_girths();
+            self.fit_girths(frame);
         }
         let mut steps = 0;
         let mut previous = f64::INFINITY;
@@ -180,9 +213,13 @@ impl Tracker {
         if self.config.hypotheses && self.solver.starts_from_prediction() && self.stamp.is_some() {
             steps += self.try_hypotheses(frame, pace);
         }
+        if !self.pairs.is_empty() {
+            self.refine_lengths(pace);
+        }
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);
+        self.judge(frame);
         Ok(&self.estimate)
     }
 
@@ -223,9 +260,15 @@ impl Tracker {
     fn match_all(&mut self, frame: &Frame, step: usize) {
         // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
         let gate = self.solver.gate(&self.config, step);
-        self.match_points(&gate);
+        self.match_points(&gate, self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+        if self.config.outline && step >= OUTLINE_FROM {
+            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            match_edges(&self.body, &self.poses, views.iter(), &mut self.correspondences.edges);
+        } else {
+            self.correspondences.edges.clear();
+        }
     }
 
     /// One ICP step (2-7); returns the mean squared distance it started from.
@@ -256,19 +299,35 @@ impl Tracker {
         if self.solver.starts_from_prediction() {
             self.poses.clone_from(&self.predicted);
         }
-        step.map_or(1.0, |step| (step * 30.0).clamp(0.1, 10.0))
+        let pace = step.map_or(1.0, |step| (step * 30.0).clamp(0.1, 10.0));
+        match self.interval {
+            None if step.is_some() => pace * UNKNOWN_MOTION,
+            _ => pace,
+        }
     }
 
     /// Fits the girths to the first frame after a reset, whose pose is known.
-    fn fit_girths(&mut self) {
+    fn fit_girths(&mut self, frame: &Frame) {
         let mut totals = vec![GirthFit::default(); self.poses.len()];
         let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
+        let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
-            self.match_points(&gate);
+            // The pose is known: what is closest is what was seen.
+            self.match_points(&gate, false);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
                 let matches = &self.correspondences.limbs[limb];
-                let Some(step) = girth_step(&shape, matches, &self.poses[limb], total) else { continue };
+                seen.clear();
+                let views =
+                    Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+                for view in views.iter() {
+                    let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
+                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
+                }
+                if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
+                    self.body.change_tip(limb, (tip.seen / tip.rim).clamp(0.8, 1.25));
+                }
+                let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
                 let (sum, step) = total.then(&step);
                 if self.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut self.poses[limb];
@@ -277,6 +336,32 @@ impl Tracker {
                 }
             }
         }
+    }
+
+    /// Starts to refine the limbs' lengths from those they have.
+    fn follow_lengths(&mut self) {
+        self.pairs = pairs(&self.body);
+        self.stretched = vec![1.0; self.pairs.len()];
+    }
+
+    /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
+    fn refine_lengths(&mut self, pace: f64) {
+        let Self { body, correspondences, predicted, config, solver, poses, pairs, stretched, change, .. } = self;
+        change.clear();
+        change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
+        let step = config.max_steps;
+        if !solver.lengths(&Problem { body, correspondences, predicted, step, pace, config }, poses, pairs, change) {
+            return;
+        }
+        for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
+            let factor =
+                ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total).clamp(0.5 / *total, 2.0 / *total);
+            *total *= factor;
+            pair.iter().for_each(|limb| {
+                body.change_length(*limb, factor);
+            });
+        }
+        body.close_joints(poses);
     }
 
     /// In the first frame after a reset the pose is known, and all that is not near the body is scene.
@@ -303,7 +388,7 @@ impl Tracker {
         });
     }
 
-    fn match_points(&mut self, gate: &Gate) {
+    fn match_points(&mut self, gate: &Gate, facing: bool) {
         let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
         assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
@@ -318,6 +403,9 @@ impl Tracker {
                 gate.distance,
                 matches,
             );
+            if facing {
+                face_cameras(&body.limbs()[index].shape, &poses[index], candidates, gate.distance, matches);
+            }
         };
         match threads {
             // Every limb is worked on by one thread in a fixed order: the result does not depend on their number.
@@ -390,6 +478,13 @@ impl Tracker {
         }
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
+        self.correspondences.edges.clear();
+        if !self.pairs.is_empty() {
+            self.follow_lengths();
+        }
+        self.judgement.clear();
+        self.estimate.limb_status.clear();
+        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
         let status = self.estimate.status;
         self.report(self.stamp.unwrap_or(f64::NAN), 0);
         self.estimate.status = status;
@@ -398,5 +493,7 @@ impl Tracker {
 
 mod hypotheses;
 mod report;
+mod status;
 
 use hypotheses::Hypotheses;
+use status::Judgement;

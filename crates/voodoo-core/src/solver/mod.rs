@@ -2,11 +2,13 @@
 
 mod chain;
 mod cholesky;
+mod lengths;
 mod limbwise;
 mod whole_body;
 
 pub use chain::ChainSolver;
 pub(crate) use cholesky::solve_in_place;
+pub use lengths::{Pair, pairs};
 pub use limbwise::Limbwise;
 pub use whole_body::WholeBody;
 
@@ -46,11 +48,20 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
     /// One update of all poses (working frame).
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
 
+    /// Relative changes of the lengths of `pairs` that the correspondences ask for at `poses`, into `change`, which holds how
+    /// far the lengths are below the ones set. False when the solver knows none.
+    fn lengths(&mut self, _problem: &Problem, _poses: &[Pose], _pairs: &[Pair], _change: &mut [f64]) -> bool {
+        false
+    }
+
     /// Which points may be matched in a step of a frame.
     fn gate(&self, config: &Config, step: usize) -> Gate;
 
     /// Whether a frame starts from the predicted poses; the published method starts from the last ones.
     fn starts_from_prediction(&self) -> bool;
+
+    /// Whether depth pixels match only what faces their camera; the published method takes the closest point wherever it is.
+    fn faces_cameras(&self) -> bool;
 }
 
 /// The solver of a configuration.
