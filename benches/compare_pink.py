@@ -1,11 +1,10 @@
-"""voodoo.ik against pink (pin-pink on Pinocchio): a body of 26 freedoms, ten point targets, the same start and
-tolerance.
+"""voodoo.ik against pink (pin-pink on Pinocchio): a body of 26 freedoms, ten point targets, the same start
+and tolerance.
 
     pip install pin-pink quadprog && python benches/compare_pink.py
 
 Both solve the same reachable postures from the same starts on one thread, called from Python, until the worst target
-is nearer
-than the tolerance. pink steps by its own solve_ik and integrate, with its model built from the voodoo chain, joint by
+is nearer than the tolerance. pink steps by its own solve_ik and integrate, with its model built from the voodoo chain, joint by
 joint.
 """
 
@@ -41,8 +40,7 @@ SITES = (
 
 def body() -> voodoo.Body:
     """Papers' human with an elbow of three freedoms less: 6 root, 3 neck, 2 x (3 shoulder, 1 elbow, 3 hip, 1 knee) =
-    25, and a
-    hinge at the right wrist: 26."""
+    25, and a hinge at the right wrist: 26."""
     text = voodoo.Body.human(1.75, model="papers").to_toml()
     text += """
 [[limbs]]

@@ -1,7 +1,7 @@
 """Postures a second of J10's arm: two joints of three freedoms, 15 steps, with and without the image constraint, one
 core.
 
-python benches/ik_speed.py
+    python benches/ik_speed.py
 """
 
 from __future__ import annotations

@@ -90,6 +90,16 @@ def test_a_frame_without_known_sites_is_degraded_and_stays(some):
     assert np.isnan(errors["l_elbow"][5]) and np.isfinite(errors["l_elbow"][4])
 
 
+def test_every_frame_alone_forgets_the_one_before(some):
+    later = Some(some, 12)
+    later.frames = later.frames[6:]
+    alone, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none", warm=False)
+    only, _ = follow(later, start_tracker(some), Positions.of(some), pictures="none", warm=False)
+    warm, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none")
+    assert np.array_equal(alone.angles[6:], only.angles)
+    assert not np.allclose(alone.angles[6:], warm.angles[6:], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -126,7 +136,7 @@ def test_command_line(tmp_path, recording):
     assert len(track) == len(recording) and "l_elbow_flexion" in track.angle_names
     # Its own result can be the target of another run, with fewer sites.
     again = run(sample_path(), "--pictures", "none", "--targets", out, "--sites", "l_hand, r_hand,head_center",
-                "--out", tmp_path / "again.npz")  # fmt: skip
+                "--alone", "--out", tmp_path / "again.npz")  # fmt: skip
     assert again.exit_code == 0, again.output
     assert Track.load(tmp_path / "again.npz").residual.max() < 0.02
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 import voodoo
 from voodoo.errors import VoodooError
-from voodoo.ik import Chain, Follower, Options, Posture, Silhouette
+from voodoo.ik import Chain, Follower, Options, Posture, Silhouette, solve
 from voodoo.recordings import ColorImage, DepthImage, RecordedFrame, Recording
 from voodoo.results import Track
 from voodoo.running import LEVEL_FRAMES
@@ -70,6 +70,7 @@ def follow(
     sites: Sequence[str] = KNOWN,
     pictures: Pictures = "depth",
     options: Options | None = None,
+    warm: bool = True,
 ) -> tuple[Track, dict[str, FloatArray]]:
     """Postures of all frames from the known sites and the silhouettes.
 
@@ -82,6 +83,7 @@ def follow(
             last posture, or stands before the still scene; "color" by the difference from the still background; "none":
             plain inverse kinematics.
         options: see voodoo.ik.Options.
+        warm: start each frame from the posture before; else solve it by itself, from the first pose.
 
     Returns:
         The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
@@ -108,8 +110,14 @@ def follow(
     level = recording.root_frame in LEVEL_FRAMES
     for recorded in recording:
         targets = positions.at(recorded.stamp, known)
-        images = _silhouettes(recorded, {**last, **targets}, scenes, level=level) if targets else []
-        posture = follower.step(targets, images=images)
+        images = (
+            _silhouettes(recorded, {**last, **targets} if warm else targets, scenes, level=level) if targets else []
+        )
+        posture = (
+            follower.step(targets, images=images)
+            if warm
+            else solve(chain, targets, images=images, start=start, options=options)
+        )
         last = posture.joints
         truth = positions.at(recorded.stamp, others)
         rows.append(

@@ -24,8 +24,7 @@ class Chain:
         Args:
             body: any body.
             limbs: limb names; () for all of them. All but the first must hang on another one of them.
-            root: "free": the first limb's pose are six unknowns; "fixed": it stands still (a whole body) or turns in
-            its
+            root: "free": the first limb's pose are six unknowns; "fixed": it stands still (a whole body) or turns in its
                 joint to a base that does (chosen limbs). None: free for a whole body, fixed for chosen limbs.
 
         Raises:
@@ -84,8 +83,7 @@ class Chain:
         Args:
             world_from_limb: rigid (4, 4) of every limb of the body.
             world_from_base: where the chain is rooted.
-            closest: of the closed chain nearest to the pose in the least-squares sense; else only read each joint's
-            turn.
+            closest: of the closed chain nearest to the pose in the least-squares sense; else only read each joint's turn.
 
         Raises:
             MeasurementError: a limb is missing, or a matrix is not rigid.

@@ -21,10 +21,10 @@ class Options:
         still: a step that changes no angle by more ends the search [rad].
         gain: share of the step h / |P grad h|^2 of the image criterion, above 0 to 1: alpha of J10 eq. 4.
         caution: damping of the image step where few samples lie outside, or the cameras look along the motion: the
-        change
-            of h per radian, as a share of the bones' length in the images, that counts; 0 trusts every pixel.
+            change of h per radian, as a share of the bones' length in the images, that counts; 0 trusts every pixel.
         largest_turn: largest change of an angle in one step [rad].
-        margin: how deep bones shall lie inside the silhouettes, in radii of their limbs; 0 is J10's criterion.
+        margin: how deep bones shall lie inside the silhouettes, in radii of their limbs, less a pixel; 0 is J10's
+            criterion.
         bones: the segments that are projected; None: joint to joint.
     """
 

@@ -49,8 +49,7 @@ class Posture:
 @dataclass(frozen=True, eq=False, repr=False)
 class Postures:
     """N postures of `solve_many`: angles (N, n), joints (N, S, 3) [m] in the order of Chain.site_names, h (N,) [px],
-    steps
-    (N,), converged (N,)."""
+    steps (N,), converged (N,)."""
 
     angles: FloatArray
     joints: FloatArray

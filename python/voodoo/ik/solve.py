@@ -31,8 +31,7 @@ def solve(
     """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, limits throughout.
 
     Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing
-    here is
-    ever NaN.
+    here is ever NaN.
 
     Args:
         chain: what moves; a body stands for the chain of all its limbs with a free root.
@@ -40,8 +39,7 @@ def solve(
         images: silhouettes; empty ones take no part.
         start: angles (n,) or a posture to start from; None: at rest.
         world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
-        chosen
-            limbs; None: identity.
+            chosen limbs; None: identity.
         options: see Options.
         **changes: single fields of Options, e.g. `steps=30, margin=0.8`.
 
