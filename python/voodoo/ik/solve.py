@@ -41,7 +41,7 @@ def solve(
         world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
             chosen limbs; None: identity.
         options: see Options.
-        **changes: single fields of Options, e.g. `steps=30, margin=0.8`.
+        **changes: single fields of Options, e.g. `steps=30, margin=0.0`.
 
     Raises:
         BodyError: a site that is not on the chain.

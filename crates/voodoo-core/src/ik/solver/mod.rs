@@ -167,7 +167,8 @@ impl Solver {
         report.converged &= rest;
     }
 
-    /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they are as good as before the phase.
+    /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
+    /// are as good as before the phase.
     fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
