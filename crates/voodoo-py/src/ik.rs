@@ -12,6 +12,8 @@ use crate::body::PyBody;
 use crate::errors::{IntoPy, exception};
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+/// angles, poses, sites, residuals, steps, converged, h
+type Solved<'py> = (Array<'py>, Array<'py>, Array<'py>, Bound<'py, PyTuple>, usize, bool, f64);
 /// site, "position" or "line", position or (direction, moment), weight, level
 type GoalParts = (String, String, [f64; 6], f64, usize);
 /// site, site, radius
@@ -246,7 +248,7 @@ impl PyChain {
         margin: f64,
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
-    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Bound<'py, PyTuple>, usize, bool, f64)> {
+    ) -> PyResult<Solved<'py>> {
         let py = base.py();
         let mut angles = start.as_slice()?.to_vec();
         self.checked(py, &angles)?;
