@@ -179,6 +179,9 @@ def ik_command(
     pictures: Annotated[
         str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), or none (plain).")
     ] = "depth",
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Solve every frame by itself, from the first pose, not from the one before.")
+    ] = False,
     init: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
@@ -210,7 +213,8 @@ def ik_command(
         positions = Positions.of(source, None if targets is None else Track.load(targets))
         tracker = start_tracker(source, init=None if init is None else Init.load(init))
         known = KNOWN if sites is None else tuple(name.strip() for name in sites.split(","))
-        result, errors = follow(source, tracker, positions, sites=known, pictures=pictures)  # type: ignore[arg-type]
+        how: Any = {"sites": known, "pictures": pictures, "warm": not alone}
+        result, errors = follow(source, tracker, positions, **how)
         result.save(target)
         for name, values in errors.items():
             if np.isfinite(values).any():
