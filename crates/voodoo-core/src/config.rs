@@ -259,6 +259,8 @@ config! {
     hypotheses: bool = false, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
     outline: bool = true, "";
+    /// Limbs that are not joined push each other apart where they overlap (whole-body solvers).
+    penetration: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// After a reset that fits sizes, the frames that follow refine the limbs' lengths (whole-body solvers).

@@ -5,12 +5,15 @@ use super::{ChainSolver, Gate, Pair, Problem, Solver};
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
-use crate::terms::{Limits, Outline, Prior, Sites, Surface, Term};
+use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Share of a surface point's information across its normal (method section 1: 0.05 to 0.1 stops sliding).
 const SLIDE: f64 = 0.07;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
+/// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter.
+const OVERLAP_SIGMA: f64 = 0.01;
+const FREE_SHARE: f64 = 0.8;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
@@ -82,6 +85,9 @@ impl WholeBody {
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);
+        }
+        if config.penetration {
+            Penetration { sigma: OVERLAP_SIGMA, share: FREE_SHARE }.add(body, poses, &mut self.normal);
         }
     }
 }
