@@ -1,7 +1,7 @@
-//! All limbs at once: the terms are summed into one system, which the chain solves.
+//! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Pair, Problem, Solver};
+use super::{ChainSolver, Gate, Pair, Problem, Solver, TreeSolver};
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
@@ -34,6 +34,8 @@ fn narrowed(start: f64, end: f64, step: usize) -> f64 {
 pub struct WholeBody {
     normal: Normal,
     chain: ChainSolver,
+    /// Moves the limbs instead of the chain, if there.
+    tree: Option<TreeSolver>,
     lengths: Lengths,
     joint_sigmas: Vec<f64>,
 }
@@ -41,7 +43,10 @@ pub struct WholeBody {
 impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses);
-        self.chain.step(problem.body, &self.normal, DAMPING, poses);
+        match &mut self.tree {
+            Some(tree) => tree.step(problem.body, &self.normal, DAMPING, problem.config.band_sigma, poses),
+            None => self.chain.step(problem.body, &self.normal, DAMPING, poses),
+        }
     }
 
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
@@ -61,6 +66,11 @@ impl Solver for WholeBody {
 }
 
 impl WholeBody {
+    /// The same terms, solved with elastic bands.
+    pub fn tree() -> Self {
+        Self { tree: Some(TreeSolver::default()), ..Self::default() }
+    }
+
     fn sum_terms(&mut self, problem: &Problem, poses: &[Pose]) {
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
