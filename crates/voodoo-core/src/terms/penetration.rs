@@ -42,11 +42,12 @@ impl Penetration {
     fn add_points(&self, body: &Body, poses: &[Pose], [limb, other]: [usize; 2], normal: &mut Normal) {
         let (shape, surface) = (&body.limbs()[limb].shape, &body.limbs()[other].shape);
         let weight = 1.0 / (self.sigma * self.sigma);
+        let start = poses[other].inverse_transform_point(poses[limb].translation);
+        let along = poses[other].rotation.inverse() * (poses[limb].rotation * Vec3::Z);
         for share in FELT {
             let z = share * shape.length();
             let free = self.share * shape.least_radius(z);
-            let x = poses[limb] * (Vec3::Z * z);
-            let local = poses[other].inverse_transform_point(x);
+            let local = start + along * z;
             if far(surface, local, free) || surface.approximate_distance(local) > free + APPROXIMATE {
                 continue;
             }
@@ -56,7 +57,7 @@ impl Penetration {
                 continue;
             }
             // The distance grows as the point moves along the normal, and as the surface moves against it.
-            let row = crate::normal::line(x, poses[other].rotation * found.normal);
+            let row = crate::normal::line(poses[other] * local, poses[other].rotation * found.normal);
             normal.cost += weight * overlap * overlap;
             // The mixed block of the two twists is left out: the system is one of single limbs and joints.
             normal.limbs[limb].add_row(weight, &-row, overlap);
