@@ -12,7 +12,7 @@ const SLIDE: f64 = 0.07;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
 /// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter.
-const OVERLAP_SIGMA: f64 = 0.01;
+const OVERLAP_SIGMA: f64 = 0.03;
 const FREE_SHARE: f64 = 0.8;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
