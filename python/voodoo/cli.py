@@ -239,6 +239,9 @@ def eval_command(
     depth_only: Annotated[
         bool, typer.Option("--depth-only", help="Leave out everything but depth images (no laser, no clouds).")
     ] = False,
+    ablation: Annotated[
+        bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
+    ] = False,
     loader: _LoaderOption = None,
 ) -> None:
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
@@ -246,12 +249,18 @@ def eval_command(
     Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
     summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end.
 
+    With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
+    switch turned over, the other solvers, no prediction) and prints a row each; --out gets ablation.md and ablation.csv.
+
     [bold]Examples[/bold]
 
     voodoo eval rendered/ --only '*_cmu' --out report
 
     voodoo eval utd-mhad/ --jobs 4 --out report
+
+    voodoo eval rendered/ --ablate --out report
     """
+    from voodoo.ablate import ablate, table, variants, write_tables
     from voodoo.evaluate import evaluate_all, find_recordings
     from voodoo.report import markdown, write_reports
 
@@ -259,6 +268,17 @@ def eval_command(
         _config(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        if ablation:
+            chosen = _config(config)
+            runs = ablate(paths, config=chosen, loader=loader, model=model, depth_only=depth_only, jobs=jobs)
+            ablations = list(_progress(runs, "ablating", len(variants(chosen))))
+            typer.echo(table(ablations))
+            if out is not None:
+                typer.echo("wrote " + ", ".join(str(file) for file in write_tables(out, ablations)))
+            failed = [score for item in ablations for score in item.failures]
+            if failed:
+                raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
+            return
         done = evaluate_all(paths, config_file=config, loader=loader, model=model, depth_only=depth_only, jobs=jobs)
         ordered = sorted(_progress(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]

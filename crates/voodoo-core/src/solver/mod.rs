@@ -4,12 +4,14 @@ mod chain;
 mod cholesky;
 mod lengths;
 mod limbwise;
+mod tree;
 mod whole_body;
 
 pub use chain::ChainSolver;
 pub(crate) use cholesky::solve_in_place;
 pub use lengths::{Pair, pairs};
 pub use limbwise::Limbwise;
+pub use tree::TreeSolver;
 pub use whole_body::WholeBody;
 
 use crate::body::Body;
@@ -69,5 +71,6 @@ pub fn solver(kind: SolverKind) -> Box<dyn Solver> {
     match kind {
         SolverKind::Limbwise => Box::new(Limbwise),
         SolverKind::Chain => Box::new(WholeBody::default()),
+        SolverKind::Tree => Box::new(WholeBody::tree()),
     }
 }

@@ -1,16 +1,19 @@
-//! All limbs at once: the terms are summed into one system, which the chain solves.
+//! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Pair, Problem, Solver};
+use super::{ChainSolver, Gate, Pair, Problem, Solver, TreeSolver};
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
-use crate::terms::{Limits, Outline, Prior, Sites, Surface, Term};
+use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Share of a surface point's information across its normal (method section 1: 0.05 to 0.1 stops sliding).
 const SLIDE: f64 = 0.07;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
+/// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter.
+const OVERLAP_SIGMA: f64 = 0.03;
+const FREE_SHARE: f64 = 0.8;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
@@ -31,6 +34,8 @@ fn narrowed(start: f64, end: f64, step: usize) -> f64 {
 pub struct WholeBody {
     normal: Normal,
     chain: ChainSolver,
+    /// Moves the limbs instead of the chain, if there.
+    tree: Option<TreeSolver>,
     lengths: Lengths,
     joint_sigmas: Vec<f64>,
 }
@@ -38,7 +43,10 @@ pub struct WholeBody {
 impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses);
-        self.chain.step(problem.body, &self.normal, DAMPING, poses);
+        match &mut self.tree {
+            Some(tree) => tree.step(problem.body, &self.normal, DAMPING, problem.config.band_sigma, poses),
+            None => self.chain.step(problem.body, &self.normal, DAMPING, poses),
+        }
     }
 
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
@@ -62,6 +70,11 @@ impl Solver for WholeBody {
 }
 
 impl WholeBody {
+    /// The same terms, solved with elastic bands.
+    pub fn tree() -> Self {
+        Self { tree: Some(TreeSolver::default()), ..Self::default() }
+    }
+
     fn sum_terms(&mut self, problem: &Problem, poses: &[Pose]) {
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
@@ -86,6 +99,9 @@ impl WholeBody {
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);
+        }
+        if config.penetration {
+            Penetration { sigma: OVERLAP_SIGMA, share: FREE_SHARE }.add(body, poses, &mut self.normal);
         }
     }
 }
