@@ -184,11 +184,16 @@ class FrontEnd:
                 step=max(depth.camera.width // 200, 1),
             )
         rays = skin.observe(
-            item.image, item.camera, item.root_from_sensor, then, body=body, lost=self._lost(), source=item.sensor
+            item.image,
+            item.camera,
+            item.root_from_sensor,
+            then,
+            stamp=item.stamp,
+            body=body,
+            surface=self.tracker.distance,
+            source=item.sensor,
         )
-        for ray in rays:
-            moved = ray.origin + (predicted[ray.site] - then[ray.site])
-            self.rays.append(SiteRay(ray.site, moved, ray.direction, ray.sigma, ray.source, ray.trust))
+        self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
 
     def _lost(self) -> list[str]:
         """Hands whose forearm had too few points in the last step to say where it is."""

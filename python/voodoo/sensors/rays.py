@@ -27,6 +27,8 @@ class SiteRay:
         sigma: standard deviation across the ray at the site [m].
         source: name for `Estimate.sources`.
         trust: factor of its weight, in [0, 1].
+        place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
+        place_sigma: standard deviation of `place` along the ray [m].
     """
 
     site: str
@@ -35,6 +37,13 @@ class SiteRay:
     sigma: float
     source: str
     trust: float = 1.0
+    place: FloatArray | None = None
+    place_sigma: float = 0.04
+
+    def moved(self, shift: FloatArray) -> SiteRay:
+        """The ray of a site that has gone on by (3,) [m] since it was seen."""
+        place = None if self.place is None else self.place + shift
+        return replace(self, origin=self.origin + shift, place=place)
 
 
 def agreed(
@@ -96,5 +105,8 @@ def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_t
         if ray.trust >= min_trust:
             weight = model.weight(ray.sigma) * ray.trust
             frame.add_ray(ray.site, origin=ray.origin, direction=ray.direction, weight=weight, source=ray.source)
+            if ray.place is not None:
+                along = model.weight(ray.place_sigma) * ray.trust
+                frame.add_position(ray.site, ray.place, weight=along, source=ray.source)
             count += 1
     return count

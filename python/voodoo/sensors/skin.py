@@ -16,7 +16,7 @@ is what
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import cv2
@@ -27,7 +27,7 @@ from scipy.ndimage import maximum_filter1d
 from voodoo._core import Estimate
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
-from voodoo.sensors.assignment import assign
+from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
@@ -39,6 +39,8 @@ ByteImage = npt.NDArray[np.uint8]
 
 PALM_M, FACE_M = 0.045, 0.085
 """Radii of a palm and of a face."""
+FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
+"""The middle of a head lies this far behind its face, that of a hand behind its skin."""
 LONGEST_HAND = 6.0
 """A hand with stretched fingers in radii of its palm, measured across the box around it."""
 
@@ -68,7 +70,10 @@ class SkinSettings:
     )
     gate: float = 0.12
     lost_gate: float = 0.35
-    depth_gate: float = 0.10
+    gate_growth: float = 1.0
+    widest_gate: float = 0.80
+    unexplained: float = 0.06
+    dead_zone: bool = True
     ambiguity: float = 1.5
     noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.0))
     static_seconds: float = 1.0
@@ -108,6 +113,8 @@ class SkinTracker:
         """Start with the colours of all skins; `learn` makes them one person's."""
         self.settings = settings or SkinSettings()
         self.colour = SkinColour()
+        self.blobs = Blobs()
+        self._stamp = 0.0
         self.candidates: list[Candidate] = []
         self.assigned: dict[str, Candidate] = {}
         self._skin: Mask | None = None
@@ -130,8 +137,9 @@ class SkinTracker:
         world_from_sensor: npt.ArrayLike,
         predicted: Mapping[str, FloatArray],
         *,
+        stamp: float | None = None,
         body: BodyView | None = None,
-        lost: Collection[str] = (),
+        surface: Callable[[FloatArray], FloatArray] | None = None,
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -141,9 +149,10 @@ class SkinTracker:
             camera: calibration.
             world_from_sensor: (4, 4).
             predicted: site name -> (3,) in the world at the time of the picture.
+            stamp: of the picture [s]; None: 1/30 s after the last.
             body: what a depth camera saw near the body; None: not known. A candidate must then lie at about the depth
                 of its site, so that a hand hidden behind the body does not jump to what is in front.
-            lost: sites whose limb nothing else measures.
+            surface: distances of places (N, 3) from the body's surface (N,) [m], as `Tracker.distance` gives them.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -161,43 +170,106 @@ class SkinTracker:
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
         self._skin = skin
-        focal = math.sqrt(camera.fx * camera.fy)
         self.candidates, self.assigned = [], {}
+        stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
+        self._stamp = stamp
         if not places or not self.settled:
             return []
+        focal = math.sqrt(camera.fx * camera.fy)
         nearest = min(z for _, z in places.values())
         self.candidates = candidates(skin, palm_px=PALM_M * focal / nearest)
         if not self.candidates:
             return []
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
+        axis = pose[:3, 2]
+        sights = []
+        for item, direction in zip(self.candidates, directions, strict=True):
+            along = None if body is None else body.depth_at(item.pixel, 1.5 * PALM_M * focal / nearest)
+            z = nearest if along is None else along
+            place = origin + direction * (z / float(direction @ axis))
+            sights.append(Sight(direction, place, along is not None, item.hand, item.region))
+        seen = self.blobs.follow(sights, stamp)
         sites = list(places)
-        cost = np.array([ray_distance(origin, directions, predicted[site]) for site in sites])
-        cost[:, ~np.isfinite(directions).all(axis=1)] = np.inf
-        no_hand = np.flatnonzero([not item.hand for item in self.candidates])
-        hands = np.flatnonzero([not site.startswith("head") for site in sites])
-        cost[np.ix_(hands, no_hand)] = np.inf
-        if body is not None:
-            reach = 1.5 * PALM_M * focal / nearest
-            depths = [body.depth_at(item.pixel, reach) for item in self.candidates]
-            for row, site in enumerate(sites):
-                limit = self.settings.depth_gate + (self.settings.lost_gate if site in lost else self.settings.gate)
-                for column, depth in enumerate(depths):
-                    if depth is None or abs(depth - places[site][1]) > limit:
-                        cost[row, column] = np.inf
-        gates = np.array([self.settings.lost_gate if site in lost else self.settings.gate for site in sites])
-        pixels = np.array([item.pixel for item in self.candidates])
+        distance = np.array(
+            [
+                [
+                    float(np.linalg.norm(self._inside(site, sight) - predicted[site]))
+                    if sight.deep
+                    else float(ray_distance(origin, sight.direction, predicted[site]))
+                    for sight in sights
+                ]
+                for site in sites
+            ]
+        )
+        found = self.blobs.name(
+            seen,
+            distance,
+            self._allowed(sites, sights, seen, predicted, surface),
+            sites=sites,
+            gates=dict.fromkeys(sites, self.settings.gate),
+            growth=self.settings.gate_growth,
+            widest={
+                site: self.settings.widest_gate
+                if body is not None and not site.startswith("head")
+                else self.settings.lost_gate
+                for site in sites
+            },
+            ambiguity=self.settings.ambiguity,
+            stamp=stamp,
+        )
         rays = []
-        # Distances in units of each site's own gate.
-        for row, column in assign(cost / gates[:, None], gate=1.0):
-            site = sites[row]
-            z = places[site][1]
-            apart = np.linalg.norm(pixels - pixels[column], axis=1) > 2.0 * PALM_M * focal / z
-            if (cost[row][apart] < max(self.settings.ambiguity * cost[row, column], 0.5 * gates[row])).any():
-                continue
+        for site, column in found.items():
             self.assigned[site] = self.candidates[column]
-            across = self.settings.noise.sigma(z, focal, spread=self.settings.sites[site])
-            rays.append(SiteRay(site, origin, directions[column], across, source))
+            across = self.settings.noise.sigma(places[site][1], focal, spread=self.settings.sites[site])
+            sight = sights[column]
+            place = self._inside(site, sight) if sight.deep else None
+            bias, off = self.settings.sites[site], float(distance[sites.index(site), column])
+            trust = max(1.0 - bias / max(off, 1e-6), 0.0) if self.settings.dead_zone else 1.0
+            rays.append(SiteRay(site, origin, sight.direction, across, source, trust, place))
         return rays
+
+    def _inside(self, site: str, sight: Sight) -> FloatArray:
+        """Where the site is when a sight is its surface."""
+        return sight.place + sight.direction * (FACE_BEHIND_M if site.startswith("head") else HAND_BEHIND_M)
+
+    def _allowed(
+        self,
+        sites: list[str],
+        sights: list[Sight],
+        seen: list[Blob],
+        predicted: Mapping[str, FloatArray],
+        surface: Callable[[FloatArray], FloatArray] | None,
+    ) -> FloatArray:
+        """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
+
+        A site that was lost is taken up far from where it is expected only in a region that no other site has, and which
+        the body does not explain where it is thought to be.
+        """
+        owned = {blob.sight.region for blob in seen if blob.label is not None}
+        away = np.zeros(len(sights))
+        if surface is not None:
+            away = surface(np.array([sight.place for sight in sights]))
+        far = np.array(
+            [
+                sight.deep and sight.region not in owned and outside > self.settings.unexplained
+                for sight, outside in zip(sights, away, strict=True)
+            ]
+        )
+        allowed = np.tile(1.0 + far, (len(sites), 1))
+        for row, site in enumerate(sites):
+            side = site[0]
+            shoulder = predicted.get(f"{side}_shoulder")
+            if site.startswith("head"):
+                continue
+            allowed[row] *= [sight.hand for sight in sights]
+            if shoulder is not None:
+                reach = _reach(side, predicted)
+                distance = [float(np.linalg.norm(sight.place - shoulder)) for sight in sights]
+                allowed[row] *= [not sight.deep or d < reach for sight, d in zip(sights, distance, strict=True)]
+            elbow = predicted.get(f"{side}_elbow")
+            if elbow is not None:
+                allowed[row] *= _hand_ends(sights, predicted[site], elbow)
+        return allowed
 
     def learn(
         self,
@@ -222,7 +294,7 @@ class SkinTracker:
         _check_image(image, camera)
         places = self._places(camera, pose, estimate.joints)
         focal = math.sqrt(camera.fx * camera.fy)
-        inside = np.zeros(image.shape[:2], dtype=np.uint8)
+        inside = []
         near = np.zeros(image.shape[:2], dtype=np.uint8)
         for site, (pixel, z) in places.items():
             radius = (FACE_M if site.startswith("head") else PALM_M) * focal / z
@@ -231,7 +303,9 @@ class SkinTracker:
                 continue
             cv2.circle(near, centre, max(round(2.5 * radius), 2), 1, -1)
             if site in self.assigned or not self.settled:
-                cv2.circle(inside, centre, max(round(0.8 * radius), 1), 1, -1)
+                place = np.zeros(image.shape[:2], dtype=np.uint8)
+                cv2.circle(place, centre, max(round(0.8 * radius), 1), 1, -1)
+                inside.append(place.astype(bool))
         self._pictures += 1
         if self._seen is not None:
             self._learn_static(self._seen, ~near.astype(bool), rate_hz)
@@ -240,7 +314,7 @@ class SkinTracker:
             return
         known = self._colours
         colours = known[1] if known is not None and known[0] is image else Colours.of(image)
-        if self.colour.learn(colours, inside.astype(bool), outside=~near.astype(bool), body=self._body):
+        if self.colour.learn(colours, inside, outside=~near.astype(bool), body=self._body):
             self._learnt += 1
 
     def _learn_static(self, seen: Mask, away: Mask, rate_hz: float) -> None:
@@ -264,6 +338,25 @@ class SkinTracker:
             for site, pixel, point in zip(sites, pixels, points, strict=True)
             if np.isfinite(pixel).all() and point[2] > 0.1
         }
+
+
+def _reach(side: str, predicted: Mapping[str, FloatArray]) -> float:
+    """How far a hand can be from its shoulder [m], with room for a model that is not where the person is."""
+    joints = [predicted.get(f"{side}_{name}") for name in ("shoulder", "elbow", "hand")]
+    if any(joint is None for joint in joints):
+        return math.inf
+    shoulder, elbow, hand = (np.asarray(joint) for joint in joints)
+    return 1.2 * float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(hand - elbow)) + 0.15
+
+
+def _hand_ends(sights: list[Sight], hand: FloatArray, elbow: FloatArray) -> list[bool]:
+    """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region."""
+    towards = [float(np.linalg.norm(item.place - hand) - np.linalg.norm(item.place - elbow)) for item in sights]
+    least: dict[int, float] = {}
+    for item, value in zip(sights, towards, strict=True):
+        if item.hand:
+            least[item.region] = min(value, least.get(item.region, math.inf))
+    return [value <= least.get(item.region, math.inf) for item, value in zip(sights, towards, strict=True)]
 
 
 def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
