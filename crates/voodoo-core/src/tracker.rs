@@ -166,6 +166,7 @@ impl Tracker {
         if std::mem::take(&mut self.girths_open) {
             self.fit_girths();
         }
+        self.lead(frame, pace);
         let mut steps = 0;
         let mut previous = f64::INFINITY;
         while steps < self.config.max_steps {
@@ -226,6 +227,19 @@ impl Tracker {
         self.match_points(&gate);
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+    }
+
+    /// Lets the solver follow the named sites before the points are assigned.
+    fn lead(&mut self, frame: &Frame, pace: f64) {
+        let mut step = 0;
+        loop {
+            self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+            let Self { body, correspondences, previous, config, solver, poses, .. } = self;
+            if !solver.lead(&Problem { body, correspondences, predicted: previous, step, pace, config }, poses) {
+                break;
+            }
+            step += 1;
+        }
     }
 
     /// One ICP step (2-7); returns the mean squared distance it started from.

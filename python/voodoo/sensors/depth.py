@@ -94,7 +94,7 @@ class BodyView:
     """What a depth camera saw of the body, in the picture of a colour camera beside it.
 
     Args:
-        mask: (H, W) of the picture: True where something near the body was seen.
+        mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
         pixels: (N, 2) of the points in the picture.
         depths: (N,) of the points along the colour camera's optical axis [m].
     """
@@ -159,4 +159,23 @@ def body_view(
     # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
     grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
-    return BodyView(grown, pixels, in_color[:, 2])
+    return BodyView(grown | _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places), pixels, in_color[:, 2])
+
+
+def _beyond(
+    depth_camera: Camera,
+    world_from_depth: FloatArray,
+    color_camera: Camera,
+    world_from_color: FloatArray,
+    places: FloatArray,
+) -> npt.NDArray[np.bool_]:
+    """(H, W) of the colour image: True where the depth camera does not look, at the distance of the body."""
+    z = max(float(np.median(in_sensor(world_from_depth, places)[:, 2])), 0.1)
+    right, bottom = depth_camera.width - 1, depth_camera.height - 1
+    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]].astype(np.float64)
+    corners = np.column_stack([rays * z, np.full(4, z)]) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
+    outline = color_camera.project(in_sensor(world_from_color, corners))
+    seen = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
+    if np.isfinite(outline).all():
+        cv2.fillConvexPoly(seen, np.clip(np.round(outline), -9999, 9999).astype(np.int32), 1)
+    return np.asarray(seen == 0)

@@ -169,6 +169,8 @@ class SkinTracker:
             skin &= body.mask
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
+        # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
+        skin = np.asarray(cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
         self._skin = skin
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp

@@ -2,11 +2,13 @@
 
 mod chain;
 mod cholesky;
+mod guide;
 mod limbwise;
 mod whole_body;
 
 pub use chain::ChainSolver;
 pub(crate) use cholesky::solve_in_place;
+pub use guide::Guide;
 pub use limbwise::Limbwise;
 pub use whole_body::WholeBody;
 
@@ -46,6 +48,12 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
     /// One update of all poses (working frame).
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
 
+    /// Follows the named sites before the first step of a frame; true asks for another round. Solvers that move all limbs
+    /// at once need no such lead. `problem.predicted` are the poses before the frame.
+    fn lead(&mut self, _problem: &Problem, _poses: &mut [Pose]) -> bool {
+        false
+    }
+
     /// Which points may be matched in a step of a frame.
     fn gate(&self, config: &Config, step: usize) -> Gate;
 
@@ -56,7 +64,7 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
 /// The solver of a configuration.
 pub fn solver(kind: SolverKind) -> Box<dyn Solver> {
     match kind {
-        SolverKind::Limbwise => Box::new(Limbwise),
+        SolverKind::Limbwise => Box::new(Limbwise::default()),
         SolverKind::Chain => Box::new(WholeBody::default()),
     }
 }
