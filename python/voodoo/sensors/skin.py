@@ -66,7 +66,7 @@ class SkinSettings:
     """
 
     sites: Mapping[str, float] = field(
-        default_factory=lambda: {"head_center": 0.05, "l_hand": 0.04, "r_hand": 0.04},
+        default_factory=lambda: {"head_center": 0.06, "l_hand": 0.05, "r_hand": 0.05},
     )
     gate: float = 0.12
     lost_gate: float = 0.35
