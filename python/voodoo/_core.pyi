@@ -181,7 +181,7 @@ class Estimate:
         """Time of the frame [s]; NaN after a reset."""
     @property
     def status(self) -> str:
-        """tracking, degraded (half of the limbs or more carried by their joints only) or lost (nothing measured)."""
+        """tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured)."""
     @property
     def steps(self) -> int:
         """ICP steps used."""
@@ -209,6 +209,10 @@ class Estimate:
     @property
     def world_from_limb(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Pose (4, 4) of every limb."""
+    @property
+    def limb_status(self) -> Mapping[str, str]:
+        """What the frame says about every limb: "measured", "inferred" (hidden or out of view: carried by joints and
+        prediction) or "lost" (it should show where it is, and does not)."""
     @property
     def limb_points(self) -> Mapping[str, int]:
         """Matched points of every limb."""

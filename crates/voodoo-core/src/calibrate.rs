@@ -5,15 +5,18 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Pose, Vec3};
+use crate::outline::Edge;
 use crate::shape::TaperedEllipticCylinder;
 
 /// Standard deviation of the shift of a limb's surface against its joints (metres) and of its relative girth: what
 /// anthropometry leaves open between persons, clothes and definitions of joint centres.
 const SHIFT_SIGMA: f64 = 0.03;
-const GIRTH_SIGMA: f64 = 0.10;
+const GIRTH_SIGMA: f64 = 0.15;
 /// Scatter of a surface point about the model, and how many independent ones a limb shows at most: neighbours err alike.
 const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
+/// Scatter of an edge of the outline: about a pixel.
+const EDGE_SIGMA: f64 = 0.01;
 /// Fewer matched points than this tell nothing.
 const ENOUGH: usize = 15;
 
@@ -41,6 +44,7 @@ pub fn girth_step(
     shape: &TaperedEllipticCylinder,
     matches: &LimbMatches,
     working_from_limb: &Pose,
+    edges: &[Edge],
     total: &GirthFit,
 ) -> Option<GirthFit> {
     let (points, _) = matches.accepted();
@@ -49,6 +53,14 @@ pub fn girth_step(
     }
     let mut h = SMatrix::<f64, 5, 5>::zeros();
     let mut g = SVector::<f64, 5>::zeros();
+    let row = |foot: Vec3, n: Vec3| {
+        let t = (foot.z / shape.length()).clamp(0.0, 1.0);
+        let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
+        let (a, b) = (n.x * foot.x, n.y * foot.y);
+        let taper = a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1());
+        SVector::from([n.x, n.y, a, b, taper])
+    };
+    let kernel = |distance: f64| 1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2));
     for index in 0..matches.weight.len() {
         if matches.weight[index] <= 0.0 {
             continue;
@@ -56,13 +68,8 @@ pub fn girth_step(
         let distance = f64::from(matches.surface.signed_distance[index]);
         let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
         let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
-        let t = (foot.z / shape.length()).clamp(0.0, 1.0);
-        let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
-        let (a, b) = (n.x * foot.x, n.y * foot.y);
-        let taper = a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1());
-        let row = SVector::from([n.x, n.y, a, b, taper]);
-        let scale = distance / (2.0 * POINT_SIGMA);
-        let weight = 1.0 / (1.0 + scale * scale);
+        let row = row(foot, n);
+        let weight = kernel(distance);
         h += weight * row * row.transpose();
         g += weight * distance * row;
     }
@@ -71,8 +78,15 @@ pub fn girth_step(
     let so_far = SVector::from([total.shift.x, total.shift.y, e0, e1, e2]);
     let prior = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA])
         .map(|sigma| 1.0 / (sigma * sigma));
-    let h = h * information + SMatrix::from_diagonal(&prior);
-    let g = g * information - prior.component_mul(&so_far);
+    let mut h = h * information + SMatrix::from_diagonal(&prior);
+    let mut g = g * information - prior.component_mul(&so_far);
+    for edge in edges {
+        let distance = edge.seen - edge.rim;
+        let row = row(edge.foot, edge.side);
+        let weight = kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA);
+        h += weight * row * row.transpose();
+        g += weight * distance * row;
+    }
     let step = h.cholesky()?.solve(&g);
     let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
     step.iter().all(|value| value.is_finite()).then(|| GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors })

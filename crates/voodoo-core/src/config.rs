@@ -245,6 +245,8 @@ config! {
     kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
     /// Scale at which the robust kernel stops narrowing.
     kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
+    /// Standard deviation of an edge of the outline, for the whole-body solvers.
+    outline_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
     /// Share of the last motion that is expected to go on (0: the body is expected to stand still).
     prediction: f64 = 0.6, "", 0.0 ..= 1.0;
     /// Standard deviation of the root's unexpected turn in 1/30 s.
@@ -255,8 +257,12 @@ config! {
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones.
     hypotheses: bool = false, "";
+    /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
+    outline: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
+    /// After a reset that fits sizes, the frames that follow refine the limbs' lengths (whole-body solvers).
+    fit_lengths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.
     ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;
     /// Threads for one step. The result is the same, bit by bit, for any number.

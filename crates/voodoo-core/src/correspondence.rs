@@ -35,6 +35,19 @@ pub struct SitePair {
     pub source: u16,
 }
 
+/// A point of a limb's rim and the edge that an image shows there: a distance along one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgePair {
+    /// The limb.
+    pub limb: usize,
+    /// The rim's point.
+    pub x: Vec3,
+    /// Direction across the limb and the line of sight.
+    pub normal: Vec3,
+    /// The edge lies so far out along it, metres; negative when the image shows less than the model.
+    pub distance: f64,
+}
+
 /// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
@@ -59,6 +72,8 @@ pub struct Correspondences {
     pub limbs: Vec<LimbMatches>,
     /// Sites with positions and rays.
     pub sites: Vec<SitePair>,
+    /// Rims of limbs and the outline of the body in depth images.
+    pub edges: Vec<EdgePair>,
     /// Elastic bands.
     pub bands: Vec<Band>,
 }

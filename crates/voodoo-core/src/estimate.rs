@@ -7,9 +7,21 @@ use crate::geometry::{Pose, Vec3};
 pub enum Status {
     /// Measurements support the pose.
     Tracking,
-    /// Some of the body is carried by its joints only.
+    /// More than a quarter of the limbs are not measured.
     Degraded,
-    /// Nothing measured supports the pose.
+    /// Hardly anything measured supports the pose.
+    #[default]
+    Lost,
+}
+
+/// How much the pose of one limb can be relied on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LimbStatus {
+    /// Measurements support it.
+    Measured,
+    /// Hidden, or out of view: carried by its joints and the prediction.
+    Inferred,
+    /// It should show where it is, and does not.
     #[default]
     Lost,
 }
@@ -34,6 +46,8 @@ pub struct Estimate {
     pub stamp: f64,
     /// How much it can be relied on.
     pub status: Status,
+    /// How much every limb can be relied on.
+    pub limb_status: Vec<LimbStatus>,
     /// Pose of every limb.
     pub world_from_limb: Vec<Pose>,
     /// Position of every site.

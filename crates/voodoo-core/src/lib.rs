@@ -22,6 +22,7 @@ pub mod frame;
 pub mod geometry;
 pub mod ik;
 pub mod normal;
+pub mod outline;
 pub mod predict;
 pub mod recover;
 mod relate;
@@ -31,6 +32,7 @@ mod simd;
 pub mod solver;
 pub mod terms;
 pub mod tracker;
+pub mod view;
 
 pub use body::Body;
 pub use config::Config;

@@ -10,13 +10,15 @@ use crate::candidates::{Candidates, body_box, image_window, shifted};
 use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
 use crate::error::{BodyError, TrackError};
-use crate::estimate::{Estimate, Status};
+use crate::estimate::{Estimate, LimbStatus, Status};
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
+use crate::outline::{edges, match_edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Gate, Problem, Solver, solver};
+use crate::solver::{Gate, Pair, Problem, Solver, pairs, solver};
+use crate::view::{Views, find_cut_out};
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
@@ -24,6 +26,10 @@ const GIRTH_STEPS: usize = 6;
 const BODY_REACH: f32 = 0.15;
 /// Points farther than this from the set pose say nothing about girths, metres.
 const GIRTH_GATE: f64 = 0.10;
+/// Step of a frame from which the outline speaks: earlier, it would push thin limbs off their points (method section 8).
+const OUTLINE_FROM: usize = 2;
+/// A limb becomes longer or shorter by at most this share in one frame.
+const LENGTH_STEP: f64 = 0.02;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
 
@@ -46,13 +52,22 @@ pub struct Tracker {
     predicted: Vec<Pose>,
     origin: Vec3,
     backgrounds: Backgrounds,
+    /// In which images of this frame the body was cut out.
+    cut_out: Vec<bool>,
     candidates: Candidates,
     assignment: Assignment,
     correspondences: Correspondences,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
+    /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
+    pairs: Vec<Pair>,
+    stretched: Vec<f64>,
+    change: Vec<f64>,
     /// Arms and legs.
     chains: Vec<TwoBone>,
+    judgement: Judgement,
+    /// For how many frames each of them has explained little of its own.
+    idle: Vec<usize>,
     estimate: Estimate,
 }
 
@@ -79,12 +94,18 @@ impl Tracker {
             predicted: Vec::new(),
             origin: Vec3::ZERO,
             backgrounds: Backgrounds::default(),
+            cut_out: Vec::new(),
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
+            pairs: Vec::new(),
+            stretched: Vec::new(),
+            change: Vec::new(),
             chains: Vec::new(),
+            judgement: Judgement::default(),
+            idle: Vec::new(),
             estimate: Estimate::default(),
         })
     }
@@ -113,6 +134,9 @@ impl Tracker {
         let (body, poses) = self.body.fit(positions, fit_sizes)?;
         self.restart(body, poses);
         self.girths_open = fit_sizes && self.config.fit_girths;
+        if fit_sizes && self.config.fit_lengths {
+            self.follow_lengths();
+        }
         Ok(&self.estimate)
     }
 
@@ -140,13 +164,18 @@ impl Tracker {
         self.previous.clear();
         self.started = true;
         self.girths_open = false;
+        self.pairs.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
+        self.correspondences.edges.clear();
         self.candidates = Candidates::default();
         self.backgrounds.clear();
         self.report(f64::NAN, 0);
         // The caller vouches for a pose that was set.
         self.estimate.status = Status::Tracking;
+        self.judgement.clear();
+        self.estimate.limb_status.clear();
+        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
     }
 
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
@@ -157,6 +186,7 @@ impl Tracker {
         frame.check(&self.body, self.stamp)?;
         self.move_origin();
         let pace = self.predict(frame.stamp);
+        find_cut_out(frame, &mut self.cut_out);
         // 1 Prefilter the free points by the enlarged box of the whole body.
         let bounds = body_box(&self.body, &self.poses, self.config.body_box_margin);
         if self.config.background {
@@ -164,7 +194,7 @@ impl Tracker {
         }
         self.candidates.gather(frame, self.origin, &bounds, &self.backgrounds, &self.config);
         if std::mem::take(&mut self.girths_open) {
-            self.fit_girths();
+            self.fit_girths(frame);
         }
         self.lead(frame, pace);
         let mut steps = 0;
@@ -181,9 +211,13 @@ impl Tracker {
         if self.config.hypotheses && self.solver.starts_from_prediction() && self.stamp.is_some() {
             steps += self.try_hypotheses(frame, pace);
         }
+        if !self.pairs.is_empty() {
+            self.refine_lengths(pace);
+        }
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);
+        self.judge(frame);
         Ok(&self.estimate)
     }
 
@@ -227,6 +261,12 @@ impl Tracker {
         self.match_points(&gate);
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+        if self.config.outline && step >= OUTLINE_FROM {
+            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            match_edges(&self.body, &self.poses, views.iter(), &mut self.correspondences.edges);
+        } else {
+            self.correspondences.edges.clear();
+        }
     }
 
     /// Lets the solver follow the named sites before the points are assigned.
@@ -274,15 +314,26 @@ impl Tracker {
     }
 
     /// Fits the girths to the first frame after a reset, whose pose is known.
-    fn fit_girths(&mut self) {
+    fn fit_girths(&mut self, frame: &Frame) {
         let mut totals = vec![GirthFit::default(); self.poses.len()];
         let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
+        let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
             self.match_points(&gate);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
                 let matches = &self.correspondences.limbs[limb];
-                let Some(step) = girth_step(&shape, matches, &self.poses[limb], total) else { continue };
+                seen.clear();
+                let views =
+                    Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+                for view in views.iter() {
+                    let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
+                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
+                }
+                if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
+                    self.body.change_tip(limb, (tip.seen / tip.rim).clamp(0.8, 1.25));
+                }
+                let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
                 let (sum, step) = total.then(&step);
                 if self.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut self.poses[limb];
@@ -291,6 +342,32 @@ impl Tracker {
                 }
             }
         }
+    }
+
+    /// Starts to refine the limbs' lengths from those they have.
+    fn follow_lengths(&mut self) {
+        self.pairs = pairs(&self.body);
+        self.stretched = vec![1.0; self.pairs.len()];
+    }
+
+    /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
+    fn refine_lengths(&mut self, pace: f64) {
+        let Self { body, correspondences, predicted, config, solver, poses, pairs, stretched, change, .. } = self;
+        change.clear();
+        change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
+        let step = config.max_steps;
+        if !solver.lengths(&Problem { body, correspondences, predicted, step, pace, config }, poses, pairs, change) {
+            return;
+        }
+        for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
+            let factor =
+                ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total).clamp(0.5 / *total, 2.0 / *total);
+            *total *= factor;
+            pair.iter().for_each(|limb| {
+                body.change_length(*limb, factor);
+            });
+        }
+        body.close_joints(poses);
     }
 
     /// In the first frame after a reset the pose is known, and all that is not near the body is scene.
@@ -404,6 +481,13 @@ impl Tracker {
         }
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
+        self.correspondences.edges.clear();
+        if !self.pairs.is_empty() {
+            self.follow_lengths();
+        }
+        self.judgement.clear();
+        self.estimate.limb_status.clear();
+        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
         let status = self.estimate.status;
         self.report(self.stamp.unwrap_or(f64::NAN), 0);
         self.estimate.status = status;
@@ -412,5 +496,7 @@ impl Tracker {
 
 mod hypotheses;
 mod report;
+mod status;
 
 use hypotheses::Hypotheses;
+use status::Judgement;

@@ -6,10 +6,10 @@ use proptest::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
 use voodoo_core::chain::exp;
-use voodoo_core::correspondence::{Correspondences, LimbMatches, SitePair};
+use voodoo_core::correspondence::{Correspondences, EdgePair, LimbMatches, SitePair};
 use voodoo_core::geometry::{Mat3, Pose, Vec3};
 use voodoo_core::normal::Normal;
-use voodoo_core::terms::{Limits, Prior, Sites, Surface, Term};
+use voodoo_core::terms::{Limits, Outline, Prior, Sites, Surface, Term};
 
 /// Compares the analytic gradient with central differences of the cost; `evaluate` fills the system at given poses.
 fn check(body: &Body, poses: &[Pose], evaluate: &dyn Fn(&[Pose], &mut Normal)) -> Result<(), TestCaseError> {
@@ -101,6 +101,23 @@ proptest! {
             }).collect();
             let correspondences = Correspondences { sites: pairs, ..Default::default() };
             Sites { correspondences: &correspondences, information: 1.0, scale: 0.5 }.add(&body, poses, normal);
+        })?;
+    }
+
+    #[test]
+    fn outline(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 16)) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = random_pose(&body, &angles);
+        // A point of each limb and the edge it is drawn to, fixed in the world.
+        let feet: Vec<Vec3> = offsets.iter().map(|offset| Vec3::new(*offset, 0.05, 0.1)).collect();
+        let normal = Vec3::new(0.6, 0.0, 0.8);
+        let targets: Vec<Vec3> = poses.iter().zip(&feet).zip(&offsets).map(|((pose, foot), offset)| *pose * *foot + normal * *offset).collect();
+        check(&body, &poses, &|poses, system| {
+            let edges: Vec<EdgePair> = (0..poses.len()).map(|limb| {
+                let x = poses[limb] * feet[limb];
+                EdgePair { limb, x, normal, distance: normal.dot(targets[limb] - x) }
+            }).collect();
+            Outline { edges: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
         })?;
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
-use voodoo_core::estimate::{Estimate, Status};
+use voodoo_core::estimate::{Estimate, LimbStatus, Status};
 use voodoo_core::{Body, geometry::Vec3};
 
 use crate::arrays::{frozen, matrix};
@@ -56,6 +56,14 @@ pub fn status_word(status: Status) -> &'static str {
     }
 }
 
+fn limb_status_word(status: LimbStatus) -> &'static str {
+    match status {
+        LimbStatus::Measured => "measured",
+        LimbStatus::Inferred => "inferred",
+        LimbStatus::Lost => "lost",
+    }
+}
+
 #[pymethods]
 impl PyEstimate {
     #[getter]
@@ -66,6 +74,11 @@ impl PyEstimate {
     #[getter]
     fn status(&self) -> &'static str {
         status_word(self.estimate.status)
+    }
+
+    #[getter]
+    fn limb_status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_status.iter().copied().map(limb_status_word)))
     }
 
     #[getter]

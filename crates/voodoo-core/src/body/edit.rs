@@ -57,6 +57,28 @@ impl Body {
         true
     }
 
+    /// Makes the surface of a limb longer by a factor; joints and sites stay. A change that makes no solid is not made.
+    pub(crate) fn change_tip(&mut self, limb: usize, factor: f64) {
+        let shape = self.limbs[limb].shape;
+        let (length, a1, b1) = (shape.length() * factor, shape.a1(), shape.b1());
+        if let Ok(shape) = TaperedEllipticCylinder::new(length, shape.a0(), shape.b0(), a1, b1) {
+            self.limbs[limb].shape = shape;
+        }
+    }
+
+    /// Makes a limb longer by a factor, with all that is fixed to it. A change that makes no solid is not made.
+    pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
+        let shape = self.limbs[limb].shape;
+        let Ok(shape) =
+            TaperedEllipticCylinder::new(shape.length() * factor, shape.a0(), shape.b0(), shape.a1(), shape.b1())
+        else {
+            return false;
+        };
+        self.limbs[limb].shape = shape;
+        self.map_landmarks(limb, |_, position| position * Vec3::new(1.0, 1.0, factor));
+        true
+    }
+
     /// The body with a further limb joined to `parent`; its joint-facing proximal cap takes no matches.
     pub fn with_limb(
         &self,

@@ -239,7 +239,7 @@ impl Body {
     }
 
     /// Moves every limb so that the centres of its joint coincide.
-    fn close_joints(&self, poses: &mut [Pose]) {
+    pub(crate) fn close_joints(&self, poses: &mut [Pose]) {
         for (index, limb) in self.limbs().iter().enumerate() {
             if let Some((parent, joint)) = &limb.parent {
                 let centre = poses[*parent] * joint.parent_from_joint.translation;

@@ -22,6 +22,8 @@ const KNEE: f64 = 0.285;
 const ANKLE: f64 = 0.039;
 const SHOULDER: [f64; 2] = [0.112, 0.818];
 const UPPER_ARM: f64 = 0.186;
+/// The shoulder's muscle rises above the joint's centre.
+const DELTOID: f64 = 0.022;
 const FOREARM: f64 = 0.146;
 const HAND: f64 = 0.095;
 const HAND_CENTRE: f64 = 0.045;
@@ -164,9 +166,9 @@ impl Builder {
         let shoulder_limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
         let upper = self.limb(
             named("upperarm"),
-            shoulder,
+            shoulder + Vec3::Z * DELTOID,
             down,
-            UPPER_ARM,
+            UPPER_ARM + DELTOID,
             UPPER_ARM_AXES,
             Some((thorax, link("shoulder", shoulder, [0.0; 2], shoulder_limits, 0.35))),
             [false; 2],

@@ -110,6 +110,19 @@ impl Body {
         }
     }
 
+    /// The limb whose surface lies nearest to a point (about, see
+    /// [`TaperedEllipticCylinder::approximate_distance`]); the first of equals.
+    pub fn closest_limb(&self, world_from_limb: &[Pose], point: Vec3) -> usize {
+        let (mut closest, mut least) = (0, f64::INFINITY);
+        for (index, (limb, pose)) in self.limbs.iter().zip(world_from_limb).enumerate() {
+            let distance = limb.shape.approximate_distance(pose.inverse_transform_point(point));
+            if distance < least {
+                (closest, least) = (index, distance);
+            }
+        }
+        closest
+    }
+
     fn check(&self) -> Result<(), BodyError> {
         if self.limbs.is_empty() {
             return Err(BodyError::Empty);

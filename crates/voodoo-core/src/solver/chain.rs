@@ -14,11 +14,11 @@ const LARGEST_TURN: f64 = 0.5;
 /// Working memory of the chain solver.
 #[derive(Debug, Default)]
 pub struct ChainSolver {
-    chain: Chain,
-    screws: Vec<Vector6<f64>>,
-    composite: Vec<(Matrix6<f64>, Vector6<f64>)>,
-    h: Vec<f64>,
-    step: Vec<f64>,
+    pub(super) chain: Chain,
+    pub(super) screws: Vec<Vector6<f64>>,
+    pub(super) composite: Vec<(Matrix6<f64>, Vector6<f64>)>,
+    pub(super) h: Vec<f64>,
+    pub(super) step: Vec<f64>,
 }
 
 impl ChainSolver {
@@ -31,7 +31,7 @@ impl ChainSolver {
         }
     }
 
-    fn assemble(&mut self, body: &Body, normal: &Normal, poses: &[Pose], damping: f64) {
+    pub(super) fn assemble(&mut self, body: &Body, normal: &Normal, poses: &[Pose], damping: f64) {
         let Self { chain, screws, composite, h, step } = self;
         let n = chain.freedoms;
         screws.clear();

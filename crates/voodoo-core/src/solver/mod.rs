@@ -3,12 +3,14 @@
 mod chain;
 mod cholesky;
 mod guide;
+mod lengths;
 mod limbwise;
 mod whole_body;
 
 pub use chain::ChainSolver;
 pub(crate) use cholesky::solve_in_place;
 pub use guide::Guide;
+pub use lengths::{Pair, pairs};
 pub use limbwise::Limbwise;
 pub use whole_body::WholeBody;
 
@@ -51,6 +53,12 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
     /// Follows the named sites before the first step of a frame; true asks for another round. Solvers that move all limbs
     /// at once need no such lead. `problem.predicted` are the poses before the frame.
     fn lead(&mut self, _problem: &Problem, _poses: &mut [Pose]) -> bool {
+        false
+    }
+
+    /// Relative changes of the lengths of `pairs` that the correspondences ask for at `poses`, into `change`, which holds how
+    /// far the lengths are below the ones set. False when the solver knows none.
+    fn lengths(&mut self, _problem: &Problem, _poses: &[Pose], _pairs: &[Pair], _change: &mut [f64]) -> bool {
         false
     }
 

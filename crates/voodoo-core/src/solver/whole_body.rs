@@ -1,10 +1,11 @@
 //! All limbs at once: the terms are summed into one system, which the chain solves.
 
-use super::{ChainSolver, Gate, Problem, Solver};
+use super::lengths::Lengths;
+use super::{ChainSolver, Gate, Pair, Problem, Solver};
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
-use crate::terms::{Limits, Prior, Sites, Surface, Term};
+use crate::terms::{Limits, Outline, Prior, Sites, Surface, Term};
 
 /// Share of a surface point's information across its normal (method section 1: 0.05 to 0.1 stops sliding).
 const SLIDE: f64 = 0.07;
@@ -15,6 +16,8 @@ const NARROWING: f64 = 0.7;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const SHOWN: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
+/// Information that holds a length's relative change back in one frame, and that draws it to the length set.
+const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
 
@@ -28,11 +31,34 @@ fn narrowed(start: f64, end: f64, step: usize) -> f64 {
 pub struct WholeBody {
     normal: Normal,
     chain: ChainSolver,
+    lengths: Lengths,
     joint_sigmas: Vec<f64>,
 }
 
 impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
+        self.sum_terms(problem, poses);
+        self.chain.step(problem.body, &self.normal, DAMPING, poses);
+    }
+
+    fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
+        self.sum_terms(problem, poses);
+        let Self { normal, chain, lengths, .. } = self;
+        chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
+    }
+
+    fn gate(&self, config: &Config, step: usize) -> Gate {
+        let distance = narrowed(config.gate_start, config.gate_end, step);
+        Gate { box_margin: distance, distance }
+    }
+
+    fn starts_from_prediction(&self) -> bool {
+        true
+    }
+}
+
+impl WholeBody {
+    fn sum_terms(&mut self, problem: &Problem, poses: &[Pose]) {
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
@@ -46,24 +72,16 @@ impl Solver for WholeBody {
         let root =
             [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
         self.normal.clear(poses.len());
-        let terms: [&dyn Term; 4] = [
+        let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
+        let terms: [&dyn Term; 5] = [
             &Surface { correspondences, information, slide: SLIDE, scale },
             &Sites { correspondences, information, scale: 3.0 * scale },
+            &Outline { edges: &correspondences.edges, information: edge_information, scale },
             &Prior { predicted, root, joints: &self.joint_sigmas },
             &Limits { sigma: LIMIT_SIGMA },
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);
         }
-        self.chain.step(body, &self.normal, DAMPING, poses);
-    }
-
-    fn gate(&self, config: &Config, step: usize) -> Gate {
-        let distance = narrowed(config.gate_start, config.gate_end, step);
-        Gate { box_margin: distance, distance }
-    }
-
-    fn starts_from_prediction(&self) -> bool {
-        true
     }
 }

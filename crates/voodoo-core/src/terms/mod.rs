@@ -1,11 +1,13 @@
 //! The energy: each term adds to the same normal equations. The list of files is the objective.
 
 mod limits;
+mod outline;
 mod prior;
 mod sites;
 mod surface;
 
 pub use limits::Limits;
+pub use outline::Outline;
 pub use prior::Prior;
 pub(crate) use prior::ShortestAxis;
 pub use sites::Sites;

@@ -1,20 +1,23 @@
 //! Trying other configurations of arms and legs, and keeping the best by one score.
 
 use super::Tracker;
+use crate::candidates::REFERENCE_PATCH;
 use crate::chain::joint_turn;
-use crate::evidence::{EXPLAINED, Visibility, Witness, unexplained};
+use crate::evidence::{EXPLAINED, Visibility, look, unexplained};
 use crate::frame::Frame;
 use crate::geometry::{Points, Pose, Vec3};
 use crate::recover::TwoBone;
 use crate::shape::SurfaceBatch;
 use crate::terms::ShortestAxis;
+use crate::view::Views;
 
 /// So many unexplained patches near a chain make it suspect.
 const SUSPICIOUS: f64 = 25.0;
-/// So large a share of its visible surface contradicted makes it suspect.
-const CONTRADICTED: f64 = 0.35;
-/// A limb of whose visible surface this share is seen where it is, is not suspect.
-const SUPPORTED: f64 = 0.25;
+/// A chain is idle when the patches that it alone explains are a smaller share of those it shows, counted as this many at
+/// least, for so many frames.
+const IDLE: f64 = 0.3;
+const LEAST: f64 = 20.0;
+const PATIENCE: usize = 3;
 /// A hypothesis must explain so many patches more than the current pose.
 const GAIN: f64 = 25.0;
 /// ICP steps that refine the best hypothesis.
@@ -22,6 +25,9 @@ const REFINE: usize = 4;
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
+/// Places along a limb that are looked at, and how deep (metres) one lies in another limb when it is inside.
+const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const INSIDE: f64 = 0.01;
 /// Points looked at when hypotheses are compared, at most.
 const SAMPLE: usize = 400;
 
@@ -45,6 +51,7 @@ pub(super) struct Hypotheses {
 impl Tracker {
     pub(super) fn prepare_hypotheses(&mut self) {
         self.chains = TwoBone::of(&self.body);
+        self.idle = vec![0; self.chains.len()];
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others.
@@ -104,17 +111,14 @@ impl Tracker {
         }
         let open_count = work.near.len();
         let open: f64 = work.near_weight.iter().sum();
-        let witness = Witness::new(frame, &self.backgrounds, self.origin);
+        let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let look = |poses: &[Pose]| {
             let mut sum = Visibility::default();
-            chain.limbs().for_each(|limb| sum += witness.look(&self.body.limbs()[limb], &poses[limb]));
+            chain.limbs().for_each(|limb| sum += look(views, &self.body.limbs()[limb], &poses[limb]));
             sum
         };
-        let now = look(&self.poses);
-        // A limb that is seen where it is needs no other place, whatever lies near it unexplained.
-        let lost = now.seen < SUPPORTED * now.facing.max(1.0);
-        let contradicted = now.contradicted > CONTRADICTED * now.facing.max(1.0);
-        if open < SUSPICIOUS || !(lost || contradicted) {
+        if open < SUSPICIOUS {
+            self.idle[index] = 0;
             return 0;
         }
         // The points the chain explains now must stay explained.
@@ -129,7 +133,6 @@ impl Tracker {
             }
         }
         let targets = targets(&work.near, open_count, root);
-        thin(&mut work.near, &mut work.near_weight, SAMPLE);
         // What the other limbs explain anyway is no merit of this one.
         work.others.clear();
         work.others.resize(work.near.len(), f32::INFINITY);
@@ -139,6 +142,19 @@ impl Tracker {
                 *least = least.min(distance.abs());
             }
         }
+        // An arm that explains little beside what the other limbs explain may be anywhere; one that does stays.
+        let own = work.others[open_count..].iter().zip(&work.near_weight[open_count..]);
+        let alone: f64 = own.filter(|(other, _)| f64::from(**other) > EXPLAINED).map(|(_, weight)| weight).sum();
+        let now = look(&self.poses);
+        if alone > IDLE * (now.facing - now.hidden).max(LEAST) {
+            self.idle[index] = 0;
+            return 0;
+        }
+        self.idle[index] += 1;
+        if self.idle[index] < PATIENCE {
+            return 0;
+        }
+        thin(&mut work.near, &mut work.near_weight, &mut work.others, SAMPLE);
         let others = std::mem::take(&mut work.others);
         let score =
             |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, surface: &mut SurfaceBatch| {
@@ -209,11 +225,31 @@ impl Tracker {
 
     fn overall_score(&self, frame: &Frame) -> f64 {
         let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
-        let witness = Witness::new(frame, &self.backgrounds, self.origin);
+        let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let limbs = self.body.limbs().iter().zip(&self.poses);
-        let seen: f64 = limbs.map(|(limb, pose)| witness.look(limb, pose).cost()).sum();
+        let seen: f64 = limbs.map(|(limb, pose)| look(views, limb, pose).cost()).sum();
         let strain: f64 = self.chains.iter().map(|chain| self.strain(chain, &self.poses)).sum();
         unexplained(&self.correspondences, total) + seen + strain
+    }
+
+    /// Patches of a chain whose axis lies inside another limb: there is no room for it.
+    fn inside(&self, chain: &TwoBone, poses: &[Pose]) -> f64 {
+        let mut cost = 0.0;
+        for limb in chain.limbs() {
+            let shape = &self.body.limbs()[limb].shape;
+            let patches = 2.0 * shape.length() * shape.b0().max(shape.b1()) / REFERENCE_PATCH;
+            // The joint of the upper limb lies inside its parent.
+            let first = if limb == chain.upper { 2 } else { 0 };
+            for place in &PLACES[first..] {
+                let point = poses[limb] * Vec3::new(0.0, 0.0, place * shape.length());
+                let within = (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
+                    let local = poses[other].inverse_transform_point(point);
+                    self.body.limbs()[other].shape.approximate_distance(local) < -INSIDE
+                });
+                cost += if within { patches / PLACES.len() as f64 } else { 0.0 };
+            }
+        }
+        cost
     }
 
     /// Cost of broken joint limits and of motion since the last frame, in unexplained patches.
@@ -235,7 +271,7 @@ impl Tracker {
                 cost += moved * moved;
             }
         }
-        cost
+        cost + self.inside(chain, poses)
     }
 }
 
@@ -265,7 +301,7 @@ fn targets(points: &Points, count: usize, root: Vec3) -> [Option<Vec3>; 3] {
 }
 
 /// Keeps about `most` of the points, evenly, and their total weight.
-fn thin(points: &mut Points, weights: &mut Vec<f64>, most: usize) {
+fn thin(points: &mut Points, weights: &mut Vec<f64>, others: &mut Vec<f32>, most: usize) {
     let count = points.len();
     if count <= most {
         return;
@@ -276,9 +312,11 @@ fn thin(points: &mut Points, weights: &mut Vec<f64>, most: usize) {
         let point = points.get(from).to_array().map(|value| value as f32);
         points.set(kept, point);
         weights[kept] = weights[from] * scale;
+        others[kept] = others[from];
     }
     points.x.truncate(most);
     points.y.truncate(most);
     points.z.truncate(most);
     weights.truncate(most);
+    others.truncate(most);
 }

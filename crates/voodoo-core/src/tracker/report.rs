@@ -2,10 +2,7 @@
 
 use super::Tracker;
 use crate::candidates::shifted;
-use crate::estimate::{SourceReport, Status};
-
-/// Share of the limbs that may be without points before the pose counts as degraded.
-const SUPPORTED: f64 = 0.5;
+use crate::estimate::SourceReport;
 
 impl Tracker {
     pub(super) fn report(&mut self, stamp: f64, steps: usize) {
@@ -31,14 +28,6 @@ impl Tracker {
                 (on_parent - poses[index] * joint.limb_from_joint.translation).length()
             }));
         }
-        let measured =
-            |limb: &usize| *limb < correspondences.limbs.len() && correspondences.measured_weight(*limb) > 0.0;
-        let supported = (0..poses.len()).filter(measured).count();
-        estimate.status = match supported as f64 / poses.len() as f64 {
-            0.0 => Status::Lost,
-            share if share < SUPPORTED => Status::Degraded,
-            _ => Status::Tracking,
-        };
         let sources = &mut estimate.sources;
         sources.clear();
         for source in &candidates.source {

@@ -1,0 +1,120 @@
+//! The outline of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
+
+use crate::body::{Body, Limb};
+use crate::correspondence::EdgePair;
+use crate::geometry::{Pose, Vec3};
+use crate::view::{Pixel, View};
+
+/// Places along a limb that are looked at; the ends belong to the neighbours as well.
+pub const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+/// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
+const DEPTH_REACH: f64 = 0.12;
+/// A limb seen more nearly end on than this (sine) shows no outline.
+const ASLANT: f64 = 0.5;
+/// How far beyond the limb's rim its edge is looked for, metres.
+const EDGE_REACH: f64 = 0.08;
+
+/// One place on the rim of a limb and the edge seen there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Direction in which the edge was looked for, limb frame, length one: across the limb at right angles to the line of
+    /// sight, or along its axis.
+    pub side: Vec3,
+    /// Distance of the model's rim in that direction from the axis, or from the proximal end, metres.
+    pub rim: f64,
+    /// The rim's point nearest to the edge, limb frame.
+    pub foot: Vec3,
+    /// Distance of the seen edge, likewise, metres.
+    pub seen: f64,
+}
+
+/// Looks for the edges on both sides of a limb, and at its tip when it ends free. `owns` tells whether a point (working
+/// frame) is nearer to this limb than to all others: an edge of another limb is none of this one.
+pub fn edges(
+    view: &View,
+    limb: &Limb,
+    working_from_limb: &Pose,
+    mut owns: impl FnMut(Vec3) -> bool,
+    mut found: impl FnMut(Edge),
+) {
+    let shape = &limb.shape;
+    let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
+    let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3| {
+        let walk = Walk { start: camera_from_limb * start, along: camera_from_limb.rotation * side, rim, thickness };
+        if let Some((seen, place)) = walk.edge(view)
+            && (seen <= rim || owns(view.working_from_camera * place))
+        {
+            found(Edge { side, rim, foot, seen });
+        }
+    };
+    for t in STATIONS {
+        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
+        let axis = Vec3::new(0.0, 0.0, t * shape.length());
+        let centre = camera_from_limb * axis;
+        let sight = camera_from_limb.inverse_transform_vector(-centre);
+        let Some(ahead) = sight.with_z(0.0).try_normalize() else { continue };
+        // Seen nearly end on, a limb has no sides.
+        if sight.with_z(0.0).length() < ASLANT * sight.length() {
+            continue;
+        }
+        let thickness = (a * ahead.x).hypot(b * ahead.y);
+        for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
+            let rim = (a * side.x).hypot(b * side.y);
+            let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
+            look(axis, side, rim, thickness, foot);
+        }
+    }
+    let tip = Vec3::new(0.0, 0.0, shape.length());
+    let sight = camera_from_limb.inverse_transform_vector(camera_from_limb * tip);
+    if limb.match_caps[1] && sight.with_z(0.0).length() > ASLANT * sight.length() {
+        let thickness = shape.a1().max(shape.b1());
+        look(Vec3::ZERO, Vec3::Z, shape.length(), thickness, tip);
+    }
+}
+
+/// A way across an image: from a point along a direction (camera frame), metres.
+struct Walk {
+    start: Vec3,
+    along: Vec3,
+    rim: f64,
+    thickness: f64,
+}
+
+impl Walk {
+    /// How far from the start the body ends, and the last place seen on it; `None` when another thing stands before it, when
+    /// the image does not tell, or when no edge comes within reach.
+    fn edge(&self, view: &View) -> Option<(f64, Vec3)> {
+        let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
+        let step = 0.5 * self.start.z.max(0.1) / focal;
+        let reach = self.thickness + DEPTH_REACH;
+        let mut last = None;
+        let mut r = 0.0;
+        while r <= self.rim + EDGE_REACH {
+            let place = self.start + self.along * r;
+            match view.at(place) {
+                Pixel::Unknown => return None,
+                Pixel::Something(z) if z < place.z - reach => return None,
+                Pixel::Something(z) if z <= place.z + reach => last = Some(place * (z / place.z)),
+                // The edge lies between the two last looks.
+                Pixel::Something(_) | Pixel::Scene(_) => return last.map(|last| (r - 0.25 * step, last)),
+            }
+            // What lies well inside the limb is no edge: one look on the way out will do.
+            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + step };
+        }
+        None
+    }
+}
+
+/// Edges of all limbs in all depth images as pairs, into `pairs`.
+pub fn match_edges<'a>(body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>, pairs: &mut Vec<EdgePair>) {
+    pairs.clear();
+    for view in views {
+        for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
+            let owns = |point| body.closest_limb(poses, point) == index;
+            edges(&view, limb, pose, owns, |edge| {
+                let (x, normal) = (*pose * edge.foot, pose.rotation * edge.side);
+                pairs.push(EdgePair { limb: index, x, normal, distance: edge.seen - edge.rim });
+            });
+        }
+    }
+}

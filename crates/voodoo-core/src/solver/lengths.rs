@@ -1,0 +1,130 @@
+//! How much longer the limbs should be: the chain's normal equations with one more unknown for every pair of limbs.
+
+use nalgebra::Vector6;
+
+use super::ChainSolver;
+use super::cholesky::solve_in_place;
+use crate::body::Body;
+use crate::geometry::{Pose, Vec3};
+use crate::normal::Normal;
+
+/// Limbs that are of one length: the two of a pair, or one of the trunk.
+pub type Pair = Vec<usize>;
+
+/// Working memory.
+#[derive(Debug, Default)]
+pub struct Lengths {
+    /// Mixed second derivatives, one row of all pose unknowns a pair.
+    mixed: Vec<f64>,
+    h: Vec<f64>,
+    column: Vec<f64>,
+    reduced: Vec<f64>,
+    gradient: Vec<f64>,
+}
+
+/// Limbs that carry others, left and right together.
+pub fn pairs(body: &Body) -> Vec<Pair> {
+    let limbs = body.limbs();
+    let carries =
+        |index: usize| limbs.iter().any(|limb| limb.parent.as_ref().is_some_and(|(parent, _)| *parent == index));
+    let stem = |index: usize| limbs[index].name.trim_start_matches("l_").trim_start_matches("r_");
+    let mut pairs: Vec<Pair> = Vec::new();
+    for index in (0..limbs.len()).filter(|index| carries(*index)) {
+        match pairs.iter_mut().find(|pair| stem(pair[0]) == stem(index)) {
+            Some(pair) => pair.push(index),
+            None => pairs.push(vec![index]),
+        }
+    }
+    pairs
+}
+
+impl ChainSolver {
+    /// Relative changes of length, one a pair, into `change`: the Gauss-Newton step of the lengths after the pose's unknowns
+    /// have been eliminated (Schur complement), held back by `inertia` and drawn to `change`'s value at entry by `pull`.
+    pub fn lengths(
+        &mut self,
+        body: &Body,
+        normal: &Normal,
+        poses: &[Pose],
+        pairs: &[Pair],
+        [inertia, pull]: [f64; 2],
+        change: &mut [f64],
+        work: &mut Lengths,
+    ) -> bool {
+        self.chain.layout(body);
+        self.assemble(body, normal, poses, 0.0);
+        let Self { chain, screws, composite, h, step } = self;
+        let (n, count) = (chain.freedoms, pairs.len());
+        let Lengths { mixed, h: copy, column, reduced, gradient } = work;
+        mixed.clear();
+        mixed.resize(count * n, 0.0);
+        reduced.clear();
+        reduced.resize(count * count, 0.0);
+        gradient.clear();
+        gradient.resize(count, 0.0);
+        let group = |limb: usize| pairs.iter().position(|pair| pair.contains(&limb));
+        // Lengthening its parent carries a limb along the parent's axis: a sliding joint below the turning one.
+        let slide = |limb: usize| -> Vector6<f64> {
+            let Some((parent, joint)) = &body.limbs()[limb].parent else { return Vector6::zeros() };
+            let own =
+                body.limbs()[*parent].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
+            let v = poses[*parent].rotation * Vec3::Z * (joint.parent_from_joint.translation.z - own);
+            Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
+        };
+        for limb in 1..composite.len() {
+            let parent = chain.parent[limb];
+            let Some(row) = group(parent) else { continue };
+            let slider = slide(limb);
+            let force = composite[limb].0 * slider;
+            gradient[row] += slider.dot(&composite[limb].1);
+            let mut ancestor = limb;
+            loop {
+                for unknown in chain.start[ancestor]..chain.start[ancestor] + chain.count[ancestor] {
+                    mixed[row * n + unknown] += force.dot(&screws[unknown]);
+                }
+                if ancestor == 0 {
+                    break;
+                }
+                if let Some(column) = group(chain.parent[ancestor]) {
+                    let value = force.dot(&slide(ancestor));
+                    reduced[row * count + column] += value;
+                    if ancestor != limb {
+                        reduced[column * count + row] += value;
+                    }
+                }
+                ancestor = chain.parent[ancestor];
+            }
+            for below in limb + 1..composite.len() {
+                let mut ancestor = below;
+                while ancestor > limb {
+                    ancestor = chain.parent[ancestor];
+                }
+                if ancestor == limb {
+                    let force = composite[below].0 * slider;
+                    for unknown in chain.start[below]..chain.start[below] + chain.count[below] {
+                        mixed[row * n + unknown] += force.dot(&screws[unknown]);
+                    }
+                }
+            }
+        }
+        // `step` holds the negative gradient of the pose's unknowns.
+        for row in 0..count {
+            copy.clone_from(h);
+            column.clear();
+            column.extend_from_slice(&mixed[row * n..(row + 1) * n]);
+            if !solve_in_place(copy, column, n) {
+                return false;
+            }
+            for other in 0..count {
+                let dot: f64 = mixed[other * n..(other + 1) * n].iter().zip(column.iter()).map(|(a, b)| a * b).sum();
+                reduced[row * count + other] -= dot;
+            }
+            gradient[row] += column.iter().zip(step.iter()).map(|(a, b)| a * b).sum::<f64>();
+        }
+        for row in 0..count {
+            reduced[row * count + row] += inertia + pull;
+            change[row] = pull * change[row] - gradient[row];
+        }
+        solve_in_place(reduced, change, count)
+    }
+}

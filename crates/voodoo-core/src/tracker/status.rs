@@ -1,0 +1,159 @@
+//! What the frame says about every limb, and so about the body: measured, inferred or lost.
+//!
+//! A limb that lies on another explains points that the other explains as well, and the cameras see it where it is: neither
+//! proves it right. What only this limb explains, against what of it should show, does; and a camera that sees past it proves
+//! it wrong. A whole arm or leg is as good as what it hangs on.
+
+use super::Tracker;
+use crate::estimate::{LimbStatus, Status};
+use crate::evidence::{EXPLAINED, look};
+use crate::frame::Frame;
+use crate::view::Views;
+
+/// Candidates that are looked at, about.
+const SAMPLE: usize = 250;
+/// Share of the visible patches that a measured limb alone explains at least, of so many patches at least.
+const SUPPORT: f64 = 0.15;
+const LEAST: f64 = 8.0;
+/// Share of the patches facing a camera that it may see past.
+const CONTRADICTED: f64 = 0.3;
+/// A limb of which a smaller share shows is hidden.
+const SHOWN: f64 = 0.35;
+/// Without a depth image, points on a limb that make it measured.
+const FEW: f64 = 5.0;
+/// Share of the past frames in what is said about a limb: evidence flickers.
+const MEMORY: f64 = 0.6;
+/// A site this far from its measurement does not support its limb, metres.
+const SITE_REACH: f64 = 0.10;
+
+/// What is known about one limb, over a few frames.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Support {
+    /// Share of the visible patches explained by this limb alone.
+    alone: f64,
+    /// Share of the facing patches that cameras see past.
+    contradicted: f64,
+    /// Share of the facing patches not hidden.
+    shown: f64,
+    frames: usize,
+}
+
+/// Working memory.
+#[derive(Debug, Default)]
+pub(super) struct Judgement {
+    limbs: Vec<Support>,
+    alone: Vec<f64>,
+    distances: Vec<f64>,
+}
+
+impl Judgement {
+    pub(super) fn clear(&mut self) {
+        self.limbs.clear();
+    }
+}
+
+impl Support {
+    fn update(&mut self, now: [f64; 3]) {
+        let keep = if self.frames == 0 { 0.0 } else { MEMORY };
+        for (value, now) in [&mut self.alone, &mut self.contradicted, &mut self.shown].into_iter().zip(now) {
+            *value = keep * *value + (1.0 - keep) * now;
+        }
+        self.frames += 1;
+    }
+
+    fn status(&self) -> LimbStatus {
+        if self.alone >= SUPPORT && self.contradicted <= CONTRADICTED {
+            LimbStatus::Measured
+        } else if self.shown < SHOWN && self.contradicted <= CONTRADICTED {
+            LimbStatus::Inferred
+        } else {
+            LimbStatus::Lost
+        }
+    }
+}
+
+impl Tracker {
+    /// Fills the status of the limbs and of the body.
+    pub(super) fn judge(&mut self, frame: &Frame) {
+        let mut work = std::mem::take(&mut self.judgement);
+        let count = self.poses.len();
+        if self.candidates.is_empty() && self.correspondences.sites.is_empty() {
+            // Nothing was measured: what was known before does not speak for this frame.
+            work.limbs.clear();
+        }
+        work.limbs.resize(count, Support::default());
+        self.count_alone(&mut work);
+        let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+        for limb in 0..count {
+            let seen = look(views, &self.body.limbs()[limb], &self.poses[limb]);
+            let visible = seen.facing - seen.hidden;
+            let alone = work.alone[limb];
+            let mut now = if seen.facing > 0.0 {
+                [alone / visible.max(LEAST), seen.contradicted / seen.facing, visible / seen.facing]
+            } else {
+                [SUPPORT * alone / FEW, 0.0, 0.0]
+            };
+            let site = |pair: &&crate::correspondence::SitePair| {
+                pair.limb == limb && pair.weight > 0.0 && (pair.x - pair.p).length() < SITE_REACH
+            };
+            if self.correspondences.sites.iter().find(site).is_some() {
+                now = [1.0, 0.0, 1.0];
+            }
+            work.limbs[limb].update(now.map(|value| value.min(1.0)));
+        }
+        let statuses = &mut self.estimate.limb_status;
+        statuses.clear();
+        statuses.extend(work.limbs.iter().map(Support::status));
+        for chain in &self.chains {
+            if statuses[chain.lower] == LimbStatus::Measured {
+                statuses[chain.lower] = statuses[chain.upper];
+            }
+            // Hands and feet show too few patches to tell on their own.
+            for end in &chain.ends {
+                statuses[*end] = statuses[chain.lower];
+            }
+        }
+        self.judgement = work;
+        self.estimate.status = overall(&self.estimate.limb_status);
+    }
+
+    /// Weight of the candidates that each limb explains and no other but its neighbours.
+    fn count_alone(&self, work: &mut Judgement) {
+        let Judgement { alone, distances, .. } = work;
+        let count = self.poses.len();
+        alone.clear();
+        alone.resize(count, 0.0);
+        let step = (self.candidates.len() / SAMPLE).max(1);
+        for index in (0..self.candidates.len()).step_by(step) {
+            let point = self.candidates.points.get(index);
+            distances.clear();
+            distances.extend(
+                self.body
+                    .limbs()
+                    .iter()
+                    .zip(&self.poses)
+                    .map(|(limb, pose)| limb.shape.approximate_distance(pose.inverse_transform_point(point)).abs()),
+            );
+            let closest = (1..count).fold(0, |best, limb| if distances[limb] < distances[best] { limb } else { best });
+            let rival = |other: &usize| {
+                *other != closest && distances[*other] <= EXPLAINED && !self.body.adjacent(*other, closest)
+            };
+            if distances[closest] < EXPLAINED && (0..count).find(rival).is_none() {
+                alone[closest] += f64::from(self.candidates.weight[index]) * step as f64;
+            }
+        }
+    }
+}
+
+/// Lost without a measured root and half of the limbs; degraded when more than a quarter of the limbs are not measured.
+fn overall(limbs: &[LimbStatus]) -> Status {
+    let share = |status| limbs.iter().filter(|limb| **limb == status).count() as f64 / limbs.len() as f64;
+    let measured = share(LimbStatus::Measured);
+    if measured < 0.25 || (limbs[0] != LimbStatus::Measured && measured < 0.5) {
+        Status::Lost
+    } else if measured < 0.75 {
+        Status::Degraded
+    } else {
+        Status::Tracking
+    }
+}

@@ -1,0 +1,100 @@
+//! What the pixels of a depth image say about a place in space.
+
+use crate::background::{Background, Backgrounds};
+use crate::candidates::shifted;
+use crate::frame::{DepthImage, Frame};
+use crate::geometry::{Pose, Vec3};
+
+/// A depth image as a witness: what lies in a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The image.
+    pub image: &'a DepthImage<'a>,
+    /// What is known of the scene behind the body.
+    pub background: Option<&'a Background>,
+    /// Pose of the camera in the working frame.
+    pub working_from_camera: Pose,
+    /// The body was cut out: a pixel without return shows that nothing is there.
+    pub cut_out: bool,
+}
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pixel {
+    /// Outside the image, or no return where that means nothing.
+    Unknown,
+    /// The scene behind the body, or nothing where the body was cut out; with its depth, infinite when nothing returned.
+    Scene(f64),
+    /// Something that may be the body, at this depth.
+    Something(f64),
+}
+
+/// An image with more pixels without return than this share was cut out.
+const CUT_OUT: f64 = 0.5;
+
+/// The depth images of a frame as witnesses.
+#[derive(Clone, Copy, Debug)]
+pub struct Views<'a> {
+    /// The frame.
+    pub frame: &'a Frame<'a>,
+    /// What is known of the scene behind the body.
+    pub backgrounds: &'a Backgrounds,
+    /// In which images the body was cut out, as [`find_cut_out`] found it.
+    pub cut_out: &'a [bool],
+    /// The working frame's origin in the world.
+    pub origin: Vec3,
+}
+
+impl<'a> Views<'a> {
+    /// One after the other.
+    pub fn iter(self) -> impl Iterator<Item = View<'a>> {
+        let images = self.frame.images.iter().enumerate().zip(self.cut_out);
+        images.map(move |((index, image), cut_out)| View {
+            image,
+            background: self.backgrounds.of(index, image),
+            working_from_camera: shifted(&image.world_from_sensor, self.origin),
+            cut_out: *cut_out,
+        })
+    }
+}
+
+impl View<'_> {
+    /// What the pixel that a point (camera frame) falls in shows. Images of distorting lenses say nothing: their rays are
+    /// known by the pixel, not the pixel by the ray.
+    pub fn at(&self, point: Vec3) -> Pixel {
+        let image = self.image;
+        let [fx, fy, cx, cy] = image.intrinsics;
+        if point.z < 0.05 || image.rays.is_some() {
+            return Pixel::Unknown;
+        }
+        let column = (fx * point.x / point.z + cx).round();
+        let row = (fy * point.y / point.z + cy).round();
+        if !(column >= 0.0 && row >= 0.0 && column < image.width as f64 && row < image.height as f64) {
+            return Pixel::Unknown;
+        }
+        let index = row as usize * image.width + column as usize;
+        let z = f64::from(image.pixels.get(index)) * image.metres_per_unit;
+        if z.is_nan() || z <= 0.0 {
+            return if self.cut_out { Pixel::Scene(f64::INFINITY) } else { Pixel::Unknown };
+        }
+        let scene = self.background.and_then(|background| background.depth().get(index));
+        if scene.is_some_and(|depth| Background::holds(*depth, z as f32)) {
+            Pixel::Scene(z)
+        } else {
+            Pixel::Something(z)
+        }
+    }
+}
+
+/// In which images of a frame the body was cut out, into `found`.
+pub fn find_cut_out(frame: &Frame, found: &mut Vec<bool>) {
+    found.clear();
+    found.extend(frame.images.iter().map(|image| {
+        let (mut none, mut all) = (0_u32, 0_u32);
+        for index in (0..image.pixels.len()).step_by(97) {
+            all += 1;
+            none += u32::from(image.pixels.get(index) <= 0.0);
+        }
+        f64::from(none) > CUT_OUT * f64::from(all)
+    }));
+}
