@@ -310,7 +310,11 @@ impl Tracker {
         if self.solver.starts_from_prediction() {
             self.poses.clone_from(&self.predicted);
         }
-        step.map_or(1.0, |step| (step * 30.0).clamp(0.1, 10.0))
+        // Unexpected motion of short intervals adds up like noise; over long ones nothing is known of the speed.
+        step.map_or(1.0, |step| {
+            let pace = (step * 30.0).clamp(0.1, 10.0);
+            pace.max(pace.sqrt())
+        })
     }
 
     /// Fits the girths to the first frame after a reset, whose pose is known.

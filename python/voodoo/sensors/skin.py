@@ -75,7 +75,7 @@ class SkinSettings:
     unexplained: float = 0.06
     dead_zone: bool = True
     ambiguity: float = 1.5
-    noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.0))
+    noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.04))
     static_seconds: float = 1.0
     settled_frames: int = 1
     learn_every: int = 3
@@ -222,7 +222,7 @@ class SkinTracker:
         rays = []
         for site, column in found.items():
             self.assigned[site] = self.candidates[column]
-            across = self.settings.noise.sigma(places[site][1], focal, spread=self.settings.sites[site])
+            across = self.settings.noise.sigma(places[site][1], focal)
             sight = sights[column]
             place = self._inside(site, sight) if sight.deep else None
             bias, off = self.settings.sites[site], float(distance[sites.index(site), column])
