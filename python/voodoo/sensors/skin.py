@@ -66,7 +66,7 @@ class SkinSettings:
     """
 
     sites: Mapping[str, float] = field(
-        default_factory=lambda: {"head_center": 0.06, "l_hand": 0.05, "r_hand": 0.05},
+        default_factory=lambda: {"head_center": 0.06, "l_hand": 0.06, "r_hand": 0.06},
     )
     gate: float = 0.12
     lost_gate: float = 0.35
@@ -75,7 +75,7 @@ class SkinSettings:
     unexplained: float = 0.06
     dead_zone: bool = True
     ambiguity: float = 1.5
-    noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.04))
+    noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.03))
     static_seconds: float = 1.0
     settled_frames: int = 1
     learn_every: int = 3
