@@ -43,9 +43,8 @@ impl Guide {
         }
         let pace = problem.pace * config.motion_scale;
         self.joint_sigmas.clear();
-        self.joint_sigmas.extend(
-            body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * pace),
-        );
+        self.joint_sigmas
+            .extend(body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * pace));
         let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * pace);
         self.normal.clear(poses.len());
         let information = LED / (config.point_sigma * config.point_sigma);

@@ -57,6 +57,10 @@ impl Solver for WholeBody {
     fn starts_from_prediction(&self) -> bool {
         true
     }
+
+    fn faces_cameras(&self) -> bool {
+        true
+    }
 }
 
 impl WholeBody {
