@@ -81,7 +81,6 @@ class Blob:
         self.sight, self.stamp = sight, stamp
         self.count += 1
 
-
     def merge(self, seen: Blob, stamp: float) -> bool:
         """Whether it is the same as a blob that was seen just now, which then takes over its name and history."""
         if _apart(self, seen.sight, stamp) * _limit(self, stamp) > SAME_M:
@@ -144,7 +143,9 @@ class Blobs:
             Site -> number of its blob.
         """
         owner = {
-            site for row, site in enumerate(sites) for column, blob in enumerate(seen)
+            site
+            for row, site in enumerate(sites)
+            for column, blob in enumerate(seen)
             if blob.label == site and allowed[row, column]
         }
         cost = np.full((len(sites), len(seen)), np.inf)

@@ -60,7 +60,6 @@ class FrontEndSettings:
         depth_filter: what is dropped from depth images; None takes them as they are.
         skin: settings of the skin-colour cue.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
-        lost_points: a forearm with fewer matched points has lost its hand.
 
     Raises:
         MeasurementError: an unknown kind.
@@ -81,7 +80,6 @@ class FrontEndSettings:
     depth_filter: DepthFilter | None = field(default_factory=DepthFilter)
     skin: SkinSettings = field(default_factory=SkinSettings)
     ground_z: float | None = None
-    lost_points: int = 10
 
     def __post_init__(self) -> None:
         """Check the kinds."""
@@ -194,11 +192,6 @@ class FrontEnd:
             source=item.sensor,
         )
         self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
-
-    def _lost(self) -> list[str]:
-        """Hands whose forearm had too few points in the last step to say where it is."""
-        points = self.tracker.estimate.limb_points
-        return [f"{side}_hand" for side in "lr" if points.get(f"{side}_forearm", 0) < self.settings.lost_points]
 
     def _add_keypoints(self, item: KeypointImage, predicted: Mapping[str, FloatArray], stamp: float) -> None:
         place: dict[str, Any] = {

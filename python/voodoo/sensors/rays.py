@@ -46,6 +46,16 @@ class SiteRay:
         return replace(self, origin=self.origin + shift, place=place)
 
 
+def beyond_bias(bias: float, distance: float) -> float:
+    """Trust, in [0, 1), of a cue that is `distance` [m] from where its site is expected and may always be `bias` [m] off.
+
+    What a detector calls a hand is not where the body model has its hand, in frame after frame the same: no number of
+    frames averages that out. Within the bias the cue says nothing; beyond it, it pulls as `1 - bias / distance`, so that
+    the force on the site is that of the part of the distance that is not bias.
+    """
+    return max(1.0 - bias / distance, 0.0) if distance > 0.0 else 0.0
+
+
 def agreed(
     rays: Sequence[SiteRay], *, predicted: Mapping[str, npt.NDArray[np.float64]], scale: float = 0.08
 ) -> list[SiteRay]:

@@ -1,16 +1,18 @@
 """Skin colour as a cue for head and hands (K06 III-A): segmentation that adapts, regions, and their assignment.
 
-All regions become candidates without a label; candidates and sites are matched one to one within a gate around the
-predicted
-sites, what is left over is ignored. Three things keep a hand with its owner:
+All regions become candidates without a label. They are followed in space (see `blobs`), so that a hand keeps its name
+while the body model falls behind. What keeps a hand with its owner:
 
-* A region that is larger than a hand (a bare forearm, a door) offers its tips, not its middle.
-* What has had skin's colour for long where no head or hand was is background (a wooden door); with a depth image, so
-is what
-  lies nowhere near the body.
-* A site that other sensors measure well has a narrow gate, and where two candidates could both be it, neither is taken.
-* The colours are learnt at the projected head and hands while they are matched, with a forgetting factor, so that they
-  follow the light and the person.
+* A region that is larger than a hand (a bare forearm, a door) offers its tips, not its middle, and of the tips of a
+  forearm the one that is not the elbow's.
+* What has had skin's colour for long where no head or hand was is background (a wooden door); with a depth image, so is
+  what lies nowhere near the body.
+* Where two new candidates could both be a site, neither is taken. A site that was lost is taken up far from where it is
+  expected only in a region that belongs to no other site and that the body does not explain where it is thought to be.
+* The colours are learnt where two of head and hands show them, with a forgetting factor, so that they follow the light and
+  the person.
+
+With a depth image a region is a place in space, not only a ray.
 """
 
 from __future__ import annotations
@@ -18,11 +20,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d
 
 from voodoo._core import Estimate
 from voodoo.camera import Camera
@@ -31,18 +33,17 @@ from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
-from voodoo.sensors.rays import SiteRay
+from voodoo.sensors.rays import SiteRay, beyond_bias
 from voodoo.sensors.skin_colour import Colours, SkinColour
+from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
 
-PALM_M, FACE_M = 0.045, 0.085
-"""Radii of a palm and of a face."""
+Surface: TypeAlias = Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
+"""Distances of places (N, 3) from the surface of the body (N,) [m]."""
 FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
 """The middle of a head lies this far behind its face, that of a hand behind its skin."""
-LONGEST_HAND = 6.0
-"""A hand with stretched fingers in radii of its palm, measured across the box around it."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,16 @@ class SkinSettings:
     """How skin regions become rays.
 
     Args:
-        sites: site -> standard deviation [m] of a region's centre from it. A face is the front of the head.
-        gate: a candidate farther than this from the predicted site is not it [m].
-        lost_gate: the same for a site whose limb nothing else measures.
-        depth_gate: with a depth image, a candidate must be as deep as its site up to its gate and this [m]: the
-            surface is not the site.
+        sites: site -> how far [m] a region's middle may always be from it, see `beyond_bias`. A face is the front of the
+            head.
+        gate: a new region farther than this from the predicted site is not it [m]; one that has its name keeps it.
+        lost_gate: see gate_growth [m].
+        gate_growth: a gate grows by this while its site is not seen [m/s], up to `lost_gate`, or to `widest_gate` for a
+            hand that a depth camera sees.
+        widest_gate: see above [m].
+        unexplained: a region is taken far from where its site is expected only if it is this far outside the body [m].
         ambiguity: a second candidate that is not this many times as far as the first makes both useless.
-        noise: of a region's centre in the image; its spread is that of the site.
+        noise: of a region's centre in the image; and how much it changes from picture to picture.
         static_seconds: what has skin's colour for so long away from head and hands is background [s].
         settled_frames: pictures to learn from before the cue is used.
         learn_every: of the pictures after those, every n-th is learnt from.
@@ -73,7 +77,6 @@ class SkinSettings:
     gate_growth: float = 1.0
     widest_gate: float = 0.80
     unexplained: float = 0.06
-    dead_zone: bool = True
     ambiguity: float = 1.5
     noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.03))
     static_seconds: float = 1.0
@@ -83,27 +86,11 @@ class SkinSettings:
     def __post_init__(self) -> None:
         """Check the numbers."""
         numbers = {"gate": self.gate, "lost_gate": self.lost_gate, "static_seconds": self.static_seconds, **self.sites}
+        numbers |= {"gate_growth": self.gate_growth, "widest_gate": self.widest_gate, "unexplained": self.unexplained}
         numbers["learn_every"] = float(self.learn_every)
         for name, value in numbers.items():
             if not (math.isfinite(value) and value > 0.0):
                 raise MeasurementError(f"skin {name}: expected a number > 0, found {value!r}")
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A place in the image where a head or hand may be.
-
-    Args:
-        pixel: (u, v).
-        region: number of the region it is of.
-        area: of that region [px].
-        hand: False for the middle of a region that is longer than a hand: it may be a face, but not a hand.
-    """
-
-    pixel: tuple[float, float]
-    region: int
-    area: int
-    hand: bool = True
 
 
 class SkinTracker:
@@ -139,7 +126,7 @@ class SkinTracker:
         *,
         stamp: float | None = None,
         body: BodyView | None = None,
-        surface: Callable[[FloatArray], FloatArray] | None = None,
+        surface: Surface | None = None,
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -170,7 +157,9 @@ class SkinTracker:
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
         # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
-        skin = np.asarray(cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
+        skin = np.asarray(
+            cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool
+        )
         self._skin = skin
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
@@ -225,8 +214,7 @@ class SkinTracker:
             across = self.settings.noise.sigma(places[site][1], focal)
             sight = sights[column]
             place = self._inside(site, sight) if sight.deep else None
-            bias, off = self.settings.sites[site], float(distance[sites.index(site), column])
-            trust = max(1.0 - bias / max(off, 1e-6), 0.0) if self.settings.dead_zone else 1.0
+            trust = beyond_bias(self.settings.sites[site], float(distance[sites.index(site), column]))
             rays.append(SiteRay(site, origin, sight.direction, across, source, trust, place))
         return rays
 
@@ -240,7 +228,7 @@ class SkinTracker:
         sights: list[Sight],
         seen: list[Blob],
         predicted: Mapping[str, FloatArray],
-        surface: Callable[[FloatArray], FloatArray] | None,
+        surface: Surface | None,
     ) -> FloatArray:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
@@ -248,7 +236,7 @@ class SkinTracker:
         the body does not explain where it is thought to be.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
-        away = np.zeros(len(sights))
+        away: npt.NDArray[np.floating[Any]] = np.zeros(len(sights))
         if surface is not None:
             away = surface(np.array([sight.place for sight in sights]))
         far = np.array(
@@ -359,59 +347,6 @@ def _hand_ends(sights: list[Sight], hand: FloatArray, elbow: FloatArray) -> list
         if item.hand:
             least[item.region] = min(value, least.get(item.region, math.inf))
     return [value <= least.get(item.region, math.inf) for item, value in zip(sights, towards, strict=True)]
-
-
-def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
-    """Where in a skin mask (H, W) a head or a hand may be.
-
-    Regions with less than a fifth of a palm's area are noise. Each other one offers its middle, unless it is larger
-    than four faces (a door); one that is longer than a hand also offers its tips: the middles of what lies within a
-    palm's reach of the contour's farthest points.
-
-    Args:
-        skin: True where the colour is skin's.
-        palm_px: radius of a palm in the image [px].
-    """
-    smallest = max(0.2 * math.pi * palm_px**2, 6.0)
-    largest = 4.0 * math.pi * (FACE_M / PALM_M * palm_px) ** 2
-    count, labels, stats, centres = cv2.connectedComponentsWithStats(skin.astype(np.uint8), connectivity=8)
-    found = []
-    for region in range(1, count):
-        left, top, width, height, area = (int(value) for value in stats[region])
-        if not smallest <= area <= largest:
-            continue
-        extent = math.hypot(width, height)
-        middle = (float(centres[region][0]), float(centres[region][1]))
-        found.append(Candidate(middle, region, area, hand=extent <= LONGEST_HAND * palm_px))
-        if extent > LONGEST_HAND * palm_px:
-            mask = labels[top : top + height, left : left + width] == region
-            for u, v in _tips(mask, palm_px):
-                found.append(Candidate((u + left, v + top), region, area))
-    return found
-
-
-def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
-    """Middles of the parts of a region around its tips, farthest first, at most four."""
-    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    outline = max(contours, key=len).reshape(-1, 2).astype(np.float64)
-    rows, columns = np.nonzero(mask)
-    pixels = np.column_stack([columns, rows]).astype(np.float64)
-    distance = np.linalg.norm(outline - pixels.mean(axis=0), axis=1)
-    # A tip is farther out than all of the contour around it.
-    peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
-    tips: list[tuple[float, float]] = []
-    taken: list[FloatArray] = []
-    for index in np.argsort(-distance, kind="stable"):
-        if len(tips) == 4 or distance[index] < 1.5 * palm_px:
-            break
-        tip = outline[index]
-        if not peak[index] or any(float(np.linalg.norm(tip - other)) < 3.0 * palm_px for other in taken):
-            continue
-        taken.append(tip)
-        near = pixels[np.linalg.norm(pixels - tip, axis=1) < 3.2 * palm_px]
-        u, v = near.mean(axis=0)
-        tips.append((float(u), float(v)))
-    return tips
 
 
 def _check_image(image: ByteImage, camera: Camera) -> None:
