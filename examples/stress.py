@@ -163,8 +163,8 @@ def main() -> None:
     body = voodoo.Body.human(height=1.78)
     how = Disturbance()
     lines = [
-        "| `motion_scale` | lost joints | mean / max error, mm | angle error, variance, deg² | second difference, variance, deg² | "
-        "lag, frames |",
+        "| `motion_scale` | lost joints | mean / max error, mm | angle error, variance, deg² | "
+        "second difference, variance, deg² | lag, frames |",
         "|---|---|---|---|---|---|",
     ]
     drawn: dict[float, Followed] = {}
