@@ -38,6 +38,8 @@ pub struct WholeBody {
     tree: Option<TreeSolver>,
     lengths: Lengths,
     joint_sigmas: Vec<f64>,
+    /// Weight of the sites on each limb and beyond it.
+    sites: Vec<f64>,
 }
 
 impl Solver for WholeBody {
@@ -79,11 +81,23 @@ impl WholeBody {
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
+        // A site speaks for every joint between it and the root: what a hand is seen to do, its arm does.
+        self.sites.clear();
+        self.sites.resize(poses.len(), 0.0);
+        for pair in &correspondences.sites {
+            self.sites[pair.limb] += pair.weight;
+        }
+        for (limb, part) in body.limbs().iter().enumerate().rev() {
+            if let Some((parent, _)) = &part.parent {
+                self.sites[*parent] += self.sites[limb];
+            }
+        }
         self.joint_sigmas.clear();
         for (limb, part) in body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
-            let shown = (correspondences.measured_weight(limb) / SHOWN).clamp(HIDDEN_MOTION, 1.0);
+            let measured = correspondences.limbs[limb].total_weight() + self.sites[limb];
+            let shown = (measured / SHOWN).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.pace * config.motion_scale);
         }
         let root =
