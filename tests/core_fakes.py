@@ -1,6 +1,6 @@
 """Stand-ins for the compiled core, so that the code around it is tested on known poses."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +59,7 @@ class Estimate:
     world_from_limb: dict
     status: str = "tracking"
     residual: float = 0.012
+    limb_status: dict = field(default_factory=dict)
 
 
 class Body:

@@ -261,7 +261,7 @@ config! {
     /// Smaller is smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones.
-    hypotheses: bool = false, "";
+    hypotheses: bool = true, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
     outline: bool = true, "";
     /// Limbs that are not joined push each other apart where they overlap (whole-body solvers).
