@@ -22,6 +22,7 @@ from voodoo.picture_writer import PictureWriter, save_picture
 from voodoo.recordings import LOADERS, Recording, open_recording, sample_path
 from voodoo.results import Track, check_suffix
 from voodoo.running import HumanModel, Init, start_tracker, track
+from voodoo.sensors.front_end import INPUTS, FrontEndSettings
 
 T = TypeVar("T")
 
@@ -56,6 +57,10 @@ _ModelOption = Annotated[
 _FrameOption = Annotated[
     str | None,
     typer.Option("--frame", metavar="NAME", help="Root frame of the result, instead of the recording's own."),
+]
+_UseOption = Annotated[
+    str | None,
+    typer.Option("--use", metavar="KIND,...", help=f"Inputs to use, by default all there are: {', '.join(INPUTS)}."),
 ]
 
 
@@ -232,9 +237,8 @@ def eval_command(
         list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
     ] = None,
     model: _ModelOption = "full",
-    depth_only: Annotated[
-        bool, typer.Option("--depth-only", help="Leave out everything but depth images (no laser, no clouds).")
-    ] = False,
+    use: _UseOption = None,
+    depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
     loader: _LoaderOption = None,
 ) -> None:
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
@@ -255,7 +259,8 @@ def eval_command(
         _config(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-        done = evaluate_all(paths, config_file=config, loader=loader, model=model, depth_only=depth_only, jobs=jobs)
+        kinds = ("depth",) if depth_only else _kinds(use)
+        done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, jobs=jobs)
         ordered = sorted(_progress(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
         typer.echo(markdown(scores))
@@ -305,6 +310,15 @@ def body_command(
 def _open(path: Path, loader: str | None, frame: str | None) -> Recording:
     options: dict[str, Any] = {} if frame is None else {"root_frame": frame}
     return open_recording(path, loader=loader, **options)
+
+
+def _kinds(words: str | None) -> tuple[str, ...]:
+    """The kinds of inputs in "depth,scan"; all of them for None.
+
+    Raises:
+        VoodooError: an unknown kind.
+    """
+    return INPUTS if words is None else FrontEndSettings(use=tuple(word.strip() for word in words.split(","))).use
 
 
 def _config(path: Path | None) -> voodoo.Config:

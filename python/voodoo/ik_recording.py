@@ -15,7 +15,7 @@ from voodoo.errors import VoodooError
 from voodoo.ik import Chain, Follower, Options, Posture, Silhouette
 from voodoo.recordings import ColorImage, DepthImage, RecordedFrame, Recording
 from voodoo.results import Track
-from voodoo.running import LEVEL_FRAMES
+from voodoo.sensors.front_end import LEVEL_FRAMES
 from voodoo.silhouettes import StillBackground, from_depth
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
