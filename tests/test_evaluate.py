@@ -42,6 +42,7 @@ def test_perfect_tracker(opened):
     assert score.silhouette_iou > 0.9
     assert score.depth_within_5cm > 0.5
     assert score.jitter_m == pytest.approx(0.0, abs=1e-9)
+    assert score.standing_jitter_m == pytest.approx(0.0, abs=1e-9) or np.isnan(score.standing_jitter_m)
     assert frames.errors.shape == (40, 12)
 
 

@@ -120,6 +120,31 @@ def test_jitter_of_uniform_motion_is_zero_and_of_a_known_zigzag_is_known():
     assert np.isnan(metrics.jitter(line[:2]))
 
 
+def test_standing_jitter_counts_only_what_stands_still():
+    stamps = np.arange(90) / 30.0
+    reference = np.zeros((90, 2, 3))
+    # The first joint stands, then walks at 0.6 m/s; the second stands, but is not known for a while.
+    reference[45:, 0, 0] = 0.02 * np.arange(45)
+    reference[30:33, 1] = np.nan
+    still = metrics.standing_still(reference, stamps)
+    assert not still[:6].any()
+    assert not still[-6:].any()
+    assert still[6:40, 0].all()
+    assert not still[42:, 0].any()
+    assert still[[20, 60], 1].all()
+    assert not still[24:39, 1].any()
+    zigzag = np.zeros((90, 2, 3))
+    zigzag[:, 0, 1] = 0.001 * (-1.0) ** np.arange(90)
+    zigzag[45:, 0, 1] *= 10.0
+    zigzag[:, 1, 1] = 0.003 * (-1.0) ** np.arange(90)
+    assert metrics.standing_jitter(zigzag[:, :1], still[:, :1]) == pytest.approx(0.004)
+    assert metrics.standing_jitter(zigzag[:, 1:], still[:, 1:]) == pytest.approx(0.012)
+    # A late estimate stands still later.
+    assert metrics.standing_jitter(zigzag[:, :1], still[:, :1], lag=5) > 0.004
+    assert np.isnan(metrics.standing_jitter(zigzag, np.zeros_like(still)))
+    assert not metrics.standing_still(reference[:5], stamps[:5]).any()
+
+
 def test_share_within_includes_the_limit_and_skips_the_unknown():
     assert metrics.share_within(np.array([0.05, 0.051, np.nan, 0.01, 0.2]), 0.05) == 0.5
     assert np.isnan(metrics.share_within(np.array([np.nan]), 0.05))

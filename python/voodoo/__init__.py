@@ -6,6 +6,7 @@ from voodoo.camera import Camera
 from voodoo.config import Config
 from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
 from voodoo.recordings import open_recording
+from voodoo.rendering import RenderedDepth, render_depth
 from voodoo.tracker import Tracker
 
 __all__ = [
@@ -22,9 +23,11 @@ __all__ = [
     "Limb",
     "MeasurementError",
     "RecordingError",
+    "RenderedDepth",
     "TaperedEllipticCylinder",
     "Tracker",
     "VoodooError",
     "__version__",
     "open_recording",
+    "render_depth",
 ]

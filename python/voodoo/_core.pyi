@@ -17,6 +17,7 @@ __all__ = [
     "View",
     "__version__",
     "config_fields",
+    "render_depth",
 ]
 
 __version__: str
@@ -35,6 +36,18 @@ class _Camera(Protocol):
     @property
     def distorted(self) -> bool: ...
     def rays(self) -> npt.NDArray[np.float32]: ...
+
+def render_depth(
+    body: Body,
+    world_from_limb: Sequence[npt.NDArray[np.float64]],
+    *,
+    width: int,
+    height: int,
+    intrinsics: tuple[float, float, float, float],
+    rays: npt.NDArray[np.float32] | None = None,
+    world_from_sensor: npt.NDArray[np.float64] | None = None,
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int16]]:
+    """Depth (height, width) [m], 0 where nothing is seen, and index of the limb, -1 for none; see voodoo.render_depth."""
 
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""

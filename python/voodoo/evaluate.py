@@ -56,7 +56,9 @@ class Score:
         selection: how the person's depth points were found, see witness.
         depth_within_5cm, depth_median_m, depth_p95_m: of their distances to the model.
         silhouette_iou: mean over the frames.
-        jitter_m, reference_jitter_m: mean norm of the second difference of the twelve joints.
+        jitter_m, reference_jitter_m: mean norm of the second difference of the twelve joints, over all frames.
+        standing_jitter_m, reference_standing_jitter_m: the same over the joints and frames in which the reference stands
+            still, see metrics.standing_still.
         degraded_share, lost_share: frames in which the tracker itself said so.
         step_s: mean time of a frame from measurements to estimate.
     """
@@ -82,6 +84,8 @@ class Score:
     silhouette_iou: float = np.nan
     jitter_m: float = np.nan
     reference_jitter_m: float = np.nan
+    standing_jitter_m: float = np.nan
+    reference_standing_jitter_m: float = np.nan
     degraded_share: float = np.nan
     lost_share: float = np.nan
     step_s: float = np.nan
@@ -283,6 +287,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     errors = errors_best if exact is False else errors0
     limit = LIMIT_EXACT_M if exact else LIMIT_REFERENCE_M
     class_, lost = metrics.tracking_class(errors, stamps, limit=limit)
+    still = metrics.standing_still(reference, stamps)
     distances = np.concatenate([step.witness.distances for step in steps])
     score = Score(
         name=recording.name,
@@ -305,6 +310,8 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         silhouette_iou=metrics.mean_or_nan(overlaps),
         jitter_m=metrics.jitter(positions),
         reference_jitter_m=metrics.jitter(reference),
+        standing_jitter_m=metrics.standing_jitter(positions, still, lag=lag if exact is False else 0),
+        reference_standing_jitter_m=metrics.standing_jitter(reference, still),
         degraded_share=float(np.mean([word == "degraded" for word in status])),
         lost_share=float(np.mean([word == "lost" for word in status])),
         step_s=float(seconds.mean()),

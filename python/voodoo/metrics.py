@@ -24,6 +24,9 @@ LOST_AFTER_S = 0.3
 MAX_LAG = 5
 """Lags from -MAX_LAG to MAX_LAG frames are tried."""
 
+STILL_M, STILL_S = 0.02, 0.2
+"""A joint of the reference stands still in a frame when it stays this near [m] for so long [s] before and after."""
+
 _STAMP_TOLERANCE_S = 1e-6
 
 
@@ -136,6 +139,52 @@ def jitter(positions: FloatArray) -> float:
     if len(positions) < 3:
         return float("nan")
     return mean_or_nan(np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2))
+
+
+def standing_still(
+    reference: FloatArray, stamps: FloatArray, *, within: float = STILL_M, around: float = STILL_S
+) -> BoolArray:
+    """Where each joint of the reference (F, J, 3) stands still, (F, J).
+
+    It does in a frame when it is known and within `within` [m] of its place there in all frames from `around` [s] before to
+    `around` after. A reference's own noise is less than that; a motion slower than 0.1 m/s is not told from standing. The
+    first and last frames, which lack neighbours, do not count.
+    """
+    frames = len(reference)
+    still = np.zeros(reference.shape[:2], dtype=bool)
+    period = float(np.median(np.diff(stamps))) if frames > 1 else 0.0
+    reach = max(round(around / period), 1) if period > 0.0 else frames
+    if frames <= 2 * reach:
+        return still
+    middle = reference[reach : frames - reach]
+    quiet = np.isfinite(middle).all(axis=2)
+    for shift in range(-reach, reach + 1):
+        away = np.linalg.norm(reference[reach + shift : frames - reach + shift] - middle, axis=2)
+        quiet &= away <= within
+    still[reach : frames - reach] = quiet
+    return still
+
+
+def standing_jitter(positions: FloatArray, still: BoolArray, *, lag: int = 0) -> float:
+    """Mean norm [m] of the second difference of joints (F, J, 3) over the frames in which they should stand still.
+
+    Args:
+        positions: of the estimate, or of the reference itself.
+        still: (F, J), see standing_still.
+        lag: frame i is judged by frame i - lag of `still`: positive when the estimate is late.
+
+    Returns:
+        NaN when no joint ever stands still.
+    """
+    if len(positions) < 3:
+        return float("nan")
+    second = np.full(positions.shape[:2], np.nan)
+    second[1:-1] = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2)
+    source = np.arange(len(positions)) - lag
+    inside = (source >= 0) & (source < len(positions))
+    counted = np.zeros(still.shape, dtype=bool)
+    counted[inside] = still[source[inside]]
+    return mean_or_nan(second[counted])
 
 
 def share_within(distances: FloatArray, limit: float) -> float:

@@ -50,7 +50,8 @@ class Summary:
 
 _MEANS = (
     "error_m", "error_lag0_m", "error_best_lag_m", "within_5cm", "within_10cm", "depth_within_5cm", "depth_median_m",
-    "depth_p95_m", "silhouette_iou", "jitter_m", "reference_jitter_m", "degraded_share", "lost_share", "step_s",
+    "depth_p95_m", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
+    "reference_standing_jitter_m", "degraded_share", "lost_share", "step_s",
 )  # fmt: skip
 
 _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
@@ -65,6 +66,8 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("silhouette_iou", "silhouette IoU", lambda value: f"{value:.3f}"),
     ("jitter_m", "second difference of the joints", lambda value: f"{1000 * value:.1f} mm"),
     ("reference_jitter_m", "... of the reference", lambda value: f"{1000 * value:.1f} mm"),
+    ("standing_jitter_m", "second difference where the reference stands still", lambda value: f"{1000 * value:.1f} mm"),
+    ("reference_standing_jitter_m", "... of the reference itself there", lambda value: f"{1000 * value:.1f} mm"),
     ("degraded_share", "frames called degraded", lambda value: f"{100 * value:.1f} %"),
     ("lost_share", "frames called lost", lambda value: f"{100 * value:.1f} %"),
     ("step_s", "time of a frame", lambda value: f"{1000 * value:.2f} ms"),

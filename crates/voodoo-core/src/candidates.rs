@@ -21,6 +21,9 @@ pub struct Candidates {
     pub limb: Vec<u16>,
     /// Which source they come from.
     pub source: Vec<u16>,
+    /// The pixels of depth images come first, image after image: the number of points up to the end of each, and where its
+    /// camera stands.
+    pub cameras: Vec<(u32, Vec3)>,
 }
 
 /// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
@@ -69,6 +72,7 @@ impl Candidates {
         self.weight.clear();
         self.limb.clear();
         self.source.clear();
+        self.cameras.clear();
         let (up, floor) = match frame.ground {
             Some(ground) => (ground.normal, ground.offset + config.ground_clearance - ground.normal.dot(origin)),
             None => (Vec3::ZERO, -1.0),
@@ -78,6 +82,7 @@ impl Candidates {
         for (index, image) in frame.images.iter().enumerate() {
             let background = backgrounds.of(index, image).map_or(&[][..], Background::depth);
             self.gather_image(image, background, origin, bounds, &gate, config.max_points);
+            self.cameras.push((self.points.len() as u32, image.world_from_sensor.translation - origin));
         }
         for cloud in frame.clouds {
             self.gather_cloud(cloud, origin, &gate);

@@ -13,6 +13,8 @@ const DEPTH_REACH: f64 = 0.12;
 const ASLANT: f64 = 0.5;
 /// How far beyond the limb's rim its edge is looked for, metres.
 const EDGE_REACH: f64 = 0.08;
+/// The same beyond a free limb's tip.
+const TIP_REACH: f64 = 0.20;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,8 +41,9 @@ pub fn edges(
 ) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-    let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3| {
-        let walk = Walk { start: camera_from_limb * start, along: camera_from_limb.rotation * side, rim, thickness };
+    let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
+        let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
+        let walk = Walk { start, along, rim, thickness, reach };
         if let Some((seen, place)) = walk.edge(view)
             && (seen <= rim || owns(view.working_from_camera * place))
         {
@@ -61,14 +64,14 @@ pub fn edges(
         for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
             let rim = (a * side.x).hypot(b * side.y);
             let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
-            look(axis, side, rim, thickness, foot);
+            look(axis, side, rim, thickness, foot, EDGE_REACH);
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
     let sight = camera_from_limb.inverse_transform_vector(camera_from_limb * tip);
     if limb.match_caps[1] && sight.with_z(0.0).length() > ASLANT * sight.length() {
         let thickness = shape.a1().max(shape.b1());
-        look(Vec3::ZERO, Vec3::Z, shape.length(), thickness, tip);
+        look(Vec3::ZERO, Vec3::Z, shape.length(), thickness, tip, TIP_REACH);
     }
 }
 
@@ -78,6 +81,7 @@ struct Walk {
     along: Vec3,
     rim: f64,
     thickness: f64,
+    reach: f64,
 }
 
 impl Walk {
@@ -86,15 +90,15 @@ impl Walk {
     fn edge(&self, view: &View) -> Option<(f64, Vec3)> {
         let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
         let step = 0.5 * self.start.z.max(0.1) / focal;
-        let reach = self.thickness + DEPTH_REACH;
+        let deep = self.thickness + DEPTH_REACH;
         let mut last = None;
         let mut r = 0.0;
-        while r <= self.rim + EDGE_REACH {
+        while r <= self.rim + self.reach {
             let place = self.start + self.along * r;
             match view.at(place) {
                 Pixel::Unknown => return None,
-                Pixel::Something(z) if z < place.z - reach => return None,
-                Pixel::Something(z) if z <= place.z + reach => last = Some(place * (z / place.z)),
+                Pixel::Something(z) if z < place.z - deep => return None,
+                Pixel::Something(z) if z <= place.z + deep => last = Some(place * (z / place.z)),
                 // The edge lies between the two last looks.
                 Pixel::Something(_) | Pixel::Scene(_) => return last.map(|last| (r - 0.25 * step, last)),
             }

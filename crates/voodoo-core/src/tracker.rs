@@ -11,6 +11,7 @@ use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
 use crate::error::{BodyError, TrackError};
 use crate::estimate::{Estimate, LimbStatus, Status};
+use crate::facing::face_cameras;
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
 use crate::outline::{edges, match_edges};
@@ -32,6 +33,8 @@ const OUTLINE_FROM: usize = 2;
 const LENGTH_STEP: f64 = 0.02;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
+/// In the second frame after a reset the body's motion is not known yet: this much more of it is unexpected.
+const UNKNOWN_MOTION: f64 = 4.0;
 
 /// Follows one body through frames.
 #[derive(Debug)]
@@ -257,7 +260,7 @@ impl Tracker {
     fn match_all(&mut self, frame: &Frame, step: usize) {
         // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
         let gate = self.solver.gate(&self.config, step);
-        self.match_points(&gate);
+        self.match_points(&gate, self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
         if self.config.outline && step >= OUTLINE_FROM {
@@ -296,7 +299,11 @@ impl Tracker {
         if self.solver.starts_from_prediction() {
             self.poses.clone_from(&self.predicted);
         }
-        step.map_or(1.0, |step| (step * 30.0).clamp(0.1, 10.0))
+        let pace = step.map_or(1.0, |step| (step * 30.0).clamp(0.1, 10.0));
+        match self.interval {
+            None if step.is_some() => pace * UNKNOWN_MOTION,
+            _ => pace,
+        }
     }
 
     /// Fits the girths to the first frame after a reset, whose pose is known.
@@ -305,7 +312,8 @@ impl Tracker {
         let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
         let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
-            self.match_points(&gate);
+            // The pose is known: what is closest is what was seen.
+            self.match_points(&gate, false);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
                 let matches = &self.correspondences.limbs[limb];
@@ -380,7 +388,7 @@ impl Tracker {
         });
     }
 
-    fn match_points(&mut self, gate: &Gate) {
+    fn match_points(&mut self, gate: &Gate, facing: bool) {
         let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
         assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
@@ -395,6 +403,9 @@ impl Tracker {
                 gate.distance,
                 matches,
             );
+            if facing {
+                face_cameras(&body.limbs()[index].shape, &poses[index], candidates, gate.distance, matches);
+            }
         };
         match threads {
             // Every limb is worked on by one thread in a fixed order: the result does not depend on their number.

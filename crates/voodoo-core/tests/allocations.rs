@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use voodoo_core::body::HumanModel;
 use voodoo_core::frame::{Frame, PositionRelation, RayRelation};
 use voodoo_core::geometry::Vec3;
+use voodoo_core::render::{Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Tracker};
 
 struct Counting;
@@ -77,12 +78,32 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     count
 }
 
+/// Allocations of a rendering after one of the same size.
+fn allocations_of_a_rendering() -> usize {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let view = Viewpoint {
+        width: 160,
+        height: 124,
+        intrinsics: [145.0, 145.0, 79.5, 61.5],
+        rays: None,
+        world_from_sensor: scene::DepthCamera::world_from_sensor(),
+    };
+    let poses = scene::standing(&body);
+    let mut image = Rendering::default();
+    image.render(&body, &poses, &view, None).unwrap();
+    let before = COUNT.load(Ordering::Relaxed);
+    image.render(&body, &poses, &view, None).unwrap();
+    COUNT.load(Ordering::Relaxed) - before
+}
+
 /// One test only: the counter is global, another test in this process would be counted, too.
 #[test]
-fn a_warm_step_allocates_nothing() {
+fn a_warm_step_or_rendering_allocates_nothing() {
     let before = COUNT.load(Ordering::Relaxed);
     drop(std::hint::black_box(Vec::<u8>::with_capacity(100)));
     assert!(COUNT.load(Ordering::Relaxed) > before, "the counter counts nothing");
+
+    assert_eq!(allocations_of_a_rendering(), 0);
 
     let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);
     // To and fro, so that the frames after the warm-up need no more memory than those before.

@@ -8,6 +8,7 @@ mod errors;
 mod estimate;
 mod frame;
 mod ik;
+mod render;
 mod shape;
 mod tracker;
 
@@ -25,6 +26,8 @@ mod _core {
     use super::frame::PyFrame;
     #[pymodule_export]
     use super::ik::{PyChain, PyView};
+    #[pymodule_export]
+    use super::render::render_depth;
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
     #[pymodule_export]

@@ -47,6 +47,10 @@ impl Solver for Limbwise {
     fn starts_from_prediction(&self) -> bool {
         false
     }
+
+    fn faces_cameras(&self) -> bool {
+        false
+    }
 }
 
 /// Moments of the surface matches of one limb about `centre`, four lanes wide so that they vectorise.

@@ -59,6 +59,9 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
 
     /// Whether a frame starts from the predicted poses; the published method starts from the last ones.
     fn starts_from_prediction(&self) -> bool;
+
+    /// Whether depth pixels match only what faces their camera; the published method takes the closest point wherever it is.
+    fn faces_cameras(&self) -> bool;
 }
 
 /// The solver of a configuration.

@@ -55,6 +55,10 @@ impl Solver for WholeBody {
     fn starts_from_prediction(&self) -> bool {
         true
     }
+
+    fn faces_cameras(&self) -> bool {
+        true
+    }
 }
 
 impl WholeBody {
@@ -76,7 +80,7 @@ impl WholeBody {
         let terms: [&dyn Term; 5] = [
             &Surface { correspondences, information, slide: SLIDE, scale },
             &Sites { correspondences, information, scale: 3.0 * scale },
-            &Outline { edges: &correspondences.edges, information: edge_information, scale },
+            &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
             &Prior { predicted, root, joints: &self.joint_sigmas },
             &Limits { sigma: LIMIT_SIGMA },
         ];

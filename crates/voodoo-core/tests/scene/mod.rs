@@ -11,6 +11,7 @@ use std::f64::consts::{PI, TAU};
 use voodoo_core::config::RawValue;
 use voodoo_core::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
 use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::render::{NO_LIMB, Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Estimate};
 
 /// SplitMix64: small, and the same for ever.
@@ -121,23 +122,21 @@ impl DepthCamera {
     /// Millimetres along the optical axis to the body before a wall at 3.6 m, with noise of `sigma` metres; returns the
     /// number of pixels on the body, too.
     pub fn shoot(&self, body: &Body, poses: &[Pose], sigma: f64, noise: &mut Noise) -> (Vec<u16>, usize) {
-        let world_from_sensor = Self::world_from_sensor();
-        let limb_from_sensor: Vec<Pose> = poses.iter().map(|pose| pose.inv_mul(&world_from_sensor)).collect();
-        let [fx, fy, cx, cy] = self.intrinsics();
-        let (mut pixels, mut seen) = (Vec::with_capacity(self.width * self.height), 0);
-        for row in 0..self.height {
-            for column in 0..self.width {
-                let ray = Vec3::new((column as f64 - cx) / fx, (row as f64 - cy) / fy, 1.0);
-                let direction = ray.normalize();
-                let hits = body.limbs().iter().zip(&limb_from_sensor).filter_map(|(limb, pose)| {
-                    let hit = limb.shape.cast_ray(pose.translation, pose.rotation * direction, 10.0)?;
-                    Some(hit.distance * direction.z)
-                });
-                let depth = hits.fold(3.6, f64::min);
-                seen += usize::from(depth < 3.6);
-                pixels.push(((depth + sigma * noise.normal()) * 1000.0).round() as u16);
-            }
-        }
+        let view = Viewpoint {
+            width: self.width,
+            height: self.height,
+            intrinsics: self.intrinsics(),
+            rays: None,
+            world_from_sensor: Self::world_from_sensor(),
+        };
+        let mut image = Rendering::default();
+        image.render(body, poses, &view, None).unwrap();
+        let seen = image.limb().iter().filter(|limb| **limb != NO_LIMB).count();
+        let measured = |depth: &f32| {
+            let depth = if *depth > 0.0 { f64::from(*depth) } else { 3.6 };
+            ((depth + sigma * noise.normal()) * 1000.0).round() as u16
+        };
+        let pixels = image.depth().iter().map(measured).collect();
         (pixels, seen)
     }
 
