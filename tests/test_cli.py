@@ -149,7 +149,7 @@ def test_usage_errors_end_with_2(run):
 
 
 def test_bad_result_name_is_refused_before_the_work(run):
-    assert_one_line(run("track", "x", "--out", "pose.txt", "--overlay", "look"), 1, ".csv or .npz")
+    assert_one_line(run("track", "x", "--out", "pose.txt", "--overlay", "look"), 1, ".csv, .npz, .bvh")
     assert not Path("look").exists()
 
 

@@ -12,7 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 import voodoo
 from voodoo.errors import VoodooError
+from voodoo.markers import body_with_markers
 from voodoo.recordings import RecordedFrame, Recording
+from voodoo.recordings.marker_files import MarkerMap
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
 
 HumanModel = Literal["papers", "full"]
@@ -91,6 +93,7 @@ def start_tracker(
     height: float | None = None,
     model: HumanModel = "full",
     config: voodoo.Config | None = None,
+    markers: MarkerMap | None = None,
 ) -> voodoo.Tracker:
     """A tracker that stands in the first pose of the recording.
 
@@ -101,6 +104,7 @@ def start_tracker(
         height: stature of the default human [m]; not together with `body`.
         model: how finely that human is divided, see `voodoo.Body.human`.
         config: None means the defaults.
+        markers: those worn on limbs become sites of the body.
 
     Raises:
         VoodooError: there is no first pose, it does not fix the pose of this body, or both body and height are given.
@@ -117,6 +121,8 @@ def start_tracker(
     if body is None:
         height = height if height is not None else init.height_m
         body = voodoo.Body.human(model=model) if height is None else voodoo.Body.human(height=height, model=model)
+    if markers is not None and markers.limbs:
+        body = body_with_markers(body, markers.worn())
     tracker = voodoo.Tracker(body, config=config if config is not None else voodoo.Config())
     tracker.reset(joints=dict(init.joints), fit_sizes=True)
     return tracker
