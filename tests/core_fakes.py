@@ -206,7 +206,6 @@ class FakeRecording(Recording):
 def install(monkeypatch):
     """Put the stand-ins where the package looks for the core."""
     import voodoo
-
     from voodoo import results
 
     # The fake body has no joints to take angles from.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 import voodoo
 from voodoo.errors import MeasurementError
@@ -117,6 +118,8 @@ class FrontEnd:
         self.reports: dict[str, KeypointReport] = {}
         self.skin: dict[str, SkinTracker] = {}
         self.rays: list[SiteRay] = []
+        self.frozen: tuple[str, ...] = ()
+        self._contents: dict[str, npt.NDArray[Any]] = {}
         self._predictor = SitePredictor()
         chosen = self.settings
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
@@ -138,15 +141,16 @@ class FrontEnd:
 
     def frame(self, recorded: RecordedFrame) -> voodoo.Frame:
         """The tracker's frame, without stepping."""
+        measurements = self._alive(recorded.measurements)
         frame = voodoo.Frame(stamp=recorded.stamp)
         if self.settings.ground_z is not None:
             frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
         predicted = self._predictor.predict(recorded.stamp)
         self.rays = []
-        depths = [item for item in recorded.measurements if isinstance(item, DepthImage)]
+        depths = [item for item in measurements if isinstance(item, DepthImage)]
         if "depth" not in self.settings.use:
             depths = []
-        for item in recorded.measurements:
+        for item in measurements:
             if isinstance(item, ColorImage):
                 if "skin" in self.settings.use:
                     self._add_skin(item, predicted, depths[0] if depths else None)
@@ -159,6 +163,27 @@ class FrontEnd:
             self.rays = agreed(self.rays, predicted=predicted, scale=self.settings.agreement)
         add_rays(frame, self.rays, model=self.settings.model)
         return frame
+
+    def _alive(self, measurements: Sequence[Measurement]) -> list[Measurement]:
+        """Those measurements whose sensor is not frozen; `frozen` names the others.
+
+        A sensor is frozen when it repeats its last measurement bit by bit while another one measures something new:
+        real sensors have noise. A frozen depth camera would else say with all its points that nobody moves.
+        """
+        repeats, changes = [], False
+        for item in measurements:
+            content = _content(item)
+            if content is None:
+                continue
+            before = self._contents.get(item.sensor)
+            self._contents[item.sensor] = content
+            if before is not None and np.array_equal(before, content):
+                repeats.append(item)
+            else:
+                changes = changes or before is not None
+        stuck = repeats if changes else []
+        self.frozen = tuple(item.sensor for item in stuck)
+        return [item for item in measurements if not any(item is other for other in stuck)]
 
     def _add(self, frame: voodoo.Frame, item: Measurement, predicted: Mapping[str, FloatArray]) -> None:
         use = self.settings.use
@@ -265,6 +290,14 @@ class FrontEnd:
         body = np.mean(list(predicted.values()), axis=0)
         away = max(float(np.linalg.norm(in_sensor(item.root_from_sensor, body[None])[0])), 0.1)
         return self.settings.model.weight(noise.sigma(away), sharing=sharing)
+
+
+def _content(item: Measurement) -> npt.NDArray[Any] | None:
+    if isinstance(item, DepthImage):
+        return item.image
+    if isinstance(item, PointCloud):
+        return item.points
+    return item.ranges if isinstance(item, LaserScan) else None
 
 
 def _same_camera(depth: DepthImage, item: KeypointImage) -> bool:
