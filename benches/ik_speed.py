@@ -1,7 +1,7 @@
 """Postures a second of J10's arm: two joints of three freedoms, 15 steps, with and without the image constraint, one
 core.
 
-python benches/ik_speed.py
+    python benches/ik_speed.py
 """
 
 from __future__ import annotations
@@ -36,6 +36,9 @@ position = [0.0, 0.0, 0.26]
 """
 
 
+ROUNDS = 15
+
+
 def main() -> None:
     chain = ik.Chain(voodoo.Body.from_toml(TEXT), limbs=("upper", "lower"))
     camera = voodoo.Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
@@ -45,7 +48,8 @@ def main() -> None:
     # A narrow person the arm hardly fits into, so that the image step never comes to rest early.
     image = ik.Silhouette((np.abs(u - 150) < 6) & (np.abs(v - 120) < 60), camera=camera, world_from_camera=pose)
     rng = np.random.default_rng(0)
-    count = 20_000
+    count = 5_000
+    parts = np.split(np.arange(count), count // 50)
     starts = rng.uniform(-0.8, 0.8, (count, 6))
     goals = np.array([chain.forward(row)[1]["wrist"] for row in rng.uniform(-0.8, 0.8, (count, 6))])[:, None]
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {count} postures, 15 steps a phase")
@@ -53,13 +57,18 @@ def main() -> None:
         "| images | postures a second | us a posture | steps | us a step | reached within 0.1 mm |\n|---|---|---|---|---|---|"
     )
     for views in (0, 1, 2):
-        seconds = []
-        for _ in range(3):
-            began = time.perf_counter()
-            found = ik.solve_many(chain, ["wrist"], goals, images=[image] * views, starts=starts, steps=15)
-            seconds.append(time.perf_counter() - began)
-        best, steps = min(seconds), found.steps.sum()
-        reached = np.linalg.norm(found.joints[:, 0] - goals[:, 0], axis=1) < 1e-4
+        # The fastest of some rounds for each few hundred postures: waiting for other programs does not count.
+        fastest = np.full(len(parts), np.inf)
+        for _ in range(ROUNDS):
+            found = []
+            for index, part in enumerate(parts):
+                began = time.perf_counter()
+                found.append(
+                    ik.solve_many(chain, ["wrist"], goals[part], images=[image] * views, starts=starts[part], steps=15)
+                )
+                fastest[index] = min(fastest[index], time.perf_counter() - began)
+        best, steps = fastest.sum(), sum(some.steps.sum() for some in found)
+        reached = np.linalg.norm(np.concatenate([some.joints[:, 0] for some in found]) - goals[:, 0], axis=1) < 1e-4
         print(
             f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {1e6 * best / steps:.2f} | "
             f"{100 * reached.mean():.1f} % |"

@@ -65,7 +65,9 @@ class Result:
 def run(job: tuple[Path, str, str]) -> Result:
     path, solver, mode = job
     recording = open_recording(path)
-    body = voodoo.Body.human(height=recording.start["height_m"])
+    # The papers' solver with the papers' ten limbs, any other with the human of the command line.
+    model = "papers" if solver == "limbwise" else "full"
+    body = voodoo.Body.human(height=recording.start["height_m"], model=model)
     tracker = voodoo.Tracker(body, config=voodoo.Config(solver=solver))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
     settings = FrontEndSettings(use=MODES[mode], ground_z=0.0)

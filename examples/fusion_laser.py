@@ -22,9 +22,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 HIP_M, HALF_WIDTH_M, LEG_M, FIRST = 0.90, 0.10, 0.85, 3
-CONFIG = voodoo.Config(
-    solver="limbwise", body_box_margin=0.35, limb_box_margin=0.25, max_distance=0.35, fit_girths=False
-)
+CONFIG = voodoo.Config()
 # A leg hangs on the pelvis by a universal joint; the laser cuts it at the height of the shin.
 LEG = """
 [[limbs]]

@@ -3,8 +3,7 @@
     python examples/fusion_pose2sim.py ../shared/data/pose2sim --out out/pose2sim
 
 Writes table.md, errors.png (error over time) and skeletons.png (the pose drawn into the cameras' pictures). The body
-is the ten-limb one, because the keypoints say nothing about waist and neck, and motion is smoothed less than by
-default: at 60 Hz four cameras see every movement.
+is the ten-limb one, because the keypoints say nothing about waist and neck; the tracker's parameters are the defaults.
 """
 
 import argparse
@@ -26,7 +25,7 @@ from voodoo.sensors.pixels import in_sensor
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-CONFIG = voodoo.Config(motion_scale=1.0)
+CONFIG = voodoo.Config()
 BONES = (
     ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"), ("shoulder", "hip"),
 )  # fmt: skip

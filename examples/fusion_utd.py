@@ -1,6 +1,6 @@
 """Kinect depth (UTD-MHAD) alone, and with simulated 2-D rays of head and hands.
 
-    python examples/fusion_utd.py ../shared/data/utd-mhad/Depth/a*_s1_t1_depth.mat --out out/fusion_utd
+    python examples/fusion_utd.py ../shared/data/utd-mhad/Depth/a{3,4,6,7,13,22,23,24,26,27}_s[1-4]_t1_depth.mat
 
 The rays go to the reference skeleton's joints, projected with 3 px noise; 5 % of them point anywhere in the picture.
 The reference is the Kinect SDK's skeleton, which leads the depth by two frames. Writes table.md.
@@ -18,10 +18,12 @@ from voodoo.recordings.utd_mhad import CAMERA
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import world_rays
-from voodoo.sensors.rays import SiteRay, add_rays
+from voodoo.sensors.pixels import ray_distance, world_rays
+from voodoo.sensors.rays import SiteRay, add_rays, beyond_bias
 
 SITES = ("head_center", "l_hand", "r_hand")
+BIAS_M = 0.05
+"""A Kinect skeleton's head or hand is that far from the body model's, always to the same side."""
 LAG, NOISE_PX, WRONG = 2, 3.0, 0.05
 GROUPS = {
     "all twelve": JOINTS,
@@ -35,7 +37,9 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
     """Mean error [m] of each group."""
     recording = open_recording(path)
     reference = recording.reference
-    tracker = voodoo.Tracker(voodoo.Body.human(), config=voodoo.Config(solver=solver))
+    # The papers' solver with the papers' ten limbs, any other with the human of the command line.
+    body = voodoo.Body.human(model="papers" if solver == "limbwise" else "full")
+    tracker = voodoo.Tracker(body, config=voodoo.Config(solver=solver))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth",), depth_filter=None))
     chance = np.random.default_rng(11)
@@ -53,7 +57,14 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
         if rays:
             origin, directions = world_rays(CAMERA, np.eye(4), pixels)
             seen = [
-                SiteRay(site, origin, direction, noise.sigma(float(predicted[site][2]), CAMERA.fx), "rays")
+                SiteRay(
+                    site,
+                    origin,
+                    direction,
+                    noise.sigma(float(predicted[site][2]), CAMERA.fx),
+                    "rays",
+                    beyond_bias(BIAS_M, float(ray_distance(origin, direction, predicted[site]))),
+                )
                 for site, direction in zip(SITES, directions, strict=True)
                 if np.isfinite(direction).all()
                 and gate.accepts_ray(site, predicted[site], origin, direction, recorded.stamp, "rays")

@@ -4,8 +4,7 @@ images.
     python examples/ik_virtual.py [--out DIR]
 
 Writes experiment_1.png, _2.png and _3.png: above without, below with the image constraint; grey the start, red the
-chain, blue
-the end point it shall reach, white (experiment 3: black) the silhouette it shall lie in (the object it shall avoid).
+chain, blue the end point it shall reach, white (experiment 3: black) the silhouette it shall lie in (the object it shall avoid).
 """
 
 from __future__ import annotations
@@ -32,8 +31,7 @@ def planar_chain(segments: int = 4) -> ik.Chain:
     """Segments of 0.25 m in the x-y plane, hinged about z, the first at the origin; at rest all along y."""
     text = 'name = "planar"\n[[limbs]]\nname = "base"\nshape = { length = 0.01, a0 = 0.01, b0 = 0.01, a1 = 0.01, b1 = 0.01 }\n'
     # Hinges turn about the joint's x axis, limbs run along their z: a turn of -120 degrees about (1, 1, 1) puts these
-    # on the
-    # base's z and y.
+    # on the base's z and y.
     first = "on_parent = { rotation = [-1.2091995761561452, -1.2091995761561452, -1.2091995761561452] }\n"
     for index in range(segments):
         parent = f"segment_{index - 1}" if index else "base"
@@ -100,7 +98,9 @@ def experiments(chain: ik.Chain) -> list[Experiment]:
 
 def run(chain: ik.Chain, experiment: Experiment, *, with_image: bool, steps: int) -> ik.Posture:
     images = [experiment.image] if with_image else []
-    return ik.solve(chain, {"tip": experiment.tip}, images=images, start=experiment.start, steps=steps, caution=0.02)
+    return ik.solve(
+        chain, {"tip": experiment.tip}, images=images, start=experiment.start, steps=steps, caution=0.02, margin=0.0
+    )
 
 
 def picture(chain: ik.Chain, experiment: Experiment, angles: np.ndarray, words: str) -> np.ndarray:

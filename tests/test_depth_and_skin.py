@@ -8,7 +8,9 @@ import voodoo
 from voodoo import Camera, MeasurementError
 from voodoo.sensors.assignment import assign
 from voodoo.sensors.depth import BodyView, DepthFilter, body_view
-from voodoo.sensors.skin import SkinSettings, SkinTracker, candidates
+from voodoo.sensors.rays import beyond_bias
+from voodoo.sensors.skin import SkinSettings, SkinTracker
+from voodoo.sensors.skin_regions import candidates
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 # at the origin of a world whose z points up, looking along x
@@ -88,8 +90,67 @@ def test_a_hand_behind_the_body_does_not_jump_to_what_is_in_front():
     image = picture(head, left, right, seed=11)
     assert len(skin.observe(image, CAMERA, POSE, joints, body=body)) == 3
     joints["l_hand"] = at(left, Z + 0.4)
+    hidden = picture(head, right, right, seed=12)
+    for _ in range(10):
+        skin.observe(hidden, CAMERA, POSE, joints, body=body)
     rays = skin.observe(image, CAMERA, POSE, joints, body=body)
     assert {ray.site for ray in rays} == {"head_center", "r_hand"}
+
+
+def test_a_hand_keeps_its_name_while_the_model_falls_behind():
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    joints = Pose(head, left, right).joints  # the model stands still, 20 cm and more from where the hand goes
+    for step in range(1, 8):
+        moved = (left[0] - 5 * step, left[1] - 6 * step)
+        skin.observe(picture(head, moved, right, seed=step), CAMERA, POSE, joints)
+        assert pixel_error(skin, "l_hand", moved) < 2.0
+
+
+def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
+    head, left, right = (160, 60), (110, 120), (210, 120)
+    far = (80, 90)
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
+    found = {}
+    for outside in (0.0, 0.2):
+        skin = SkinTracker()
+        learnt(skin)
+        joints = Pose(head, left, right).joints
+        for seed in range(12):  # long enough to have lost it
+            skin.observe(picture(head, right, right, seed=seed), CAMERA, POSE, joints, body=body)
+        for seed in range(12):
+            rays = skin.observe(
+                picture(head, far, right, seed=seed),
+                CAMERA,
+                POSE,
+                joints,
+                body=body,
+                surface=lambda places, outside=outside: np.full(len(places), outside),
+            )
+        found[outside] = {ray.site: ray for ray in rays}
+    assert set(found[0.0]) == {"head_center", "r_hand"}
+    place = found[0.2]["l_hand"].place  # behind the surface that the depth camera saw
+    assert np.linalg.norm(place - at(far, Z)) == pytest.approx(0.04, abs=0.02)
+
+
+def test_a_shirt_behind_one_hand_is_not_learnt():
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    shirt = (120, 110, 200)  # pink
+    pose = Pose(head, left, right)
+    for seed in range(20):
+        image = picture(head, left, right, seed=seed)
+        cv2.circle(image, left, 30, shirt, -1)
+        cv2.circle(image, left, 5, SKIN, -1)
+        skin.observe(image, CAMERA, POSE, pose.joints)
+        skin.learn(image, CAMERA, POSE, pose)
+    assert "l_hand" in skin.assigned and pixel_error(skin, "l_hand", left) < 3.0
+
+
+def test_within_its_bias_a_cue_says_nothing():
+    assert beyond_bias(0.05, 0.0) == beyond_bias(0.05, 0.04) == 0.0
+    assert beyond_bias(0.05, 0.10) == pytest.approx(0.5)
 
 
 def test_a_bare_forearm_does_not_take_the_hand_away():

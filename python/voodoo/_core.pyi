@@ -311,7 +311,15 @@ class Chain:
         margin: float,
         views: Sequence[View],
         how: tuple[int, float, float, float, float, float],
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], int, bool, float]: ...
+    ) -> tuple[
+        npt.NDArray[np.float64],
+        npt.NDArray[np.float64],
+        npt.NDArray[np.float64],
+        tuple[float, ...],
+        int,
+        bool,
+        float,
+    ]: ...
     def solve_many(
         self,
         base: npt.ArrayLike,

@@ -3,15 +3,12 @@
 Angles are radians, in the order of the body's limbs. The joint to a limb's parent has either
 
 * one angle `JOINT_flexion` (hinge): about the hinge's axis; for the default human flexion is positive, or
-* three, `JOINT_rx`, `JOINT_ry`, `JOINT_rz`: the components of the rotation vector (axis times angle, at most pi long)
-that
+* three, `JOINT_rx`, `JOINT_ry`, `JOINT_rz`: the components of the rotation vector (axis times angle, at most pi long) that
   turns the joint frame on the parent into the joint frame on the limb, in the axes of that frame.
 
-The default human's joint frames: x is the axis of flexion (it points to the person's right at shoulder, elbow, hip
-and ankle,
-to the left at knee and spine, so that flexion is positive everywhere), z runs along the limb towards its far end, y
-completes
-them. Every angle is zero when the person stands upright with hanging arms. A rotation vector has no order of axes and
+The default human's joint frames: x is the axis of flexion (it points to the person's right at shoulder, elbow, hip and ankle, to
+the left at knee and spine, so that flexion is positive everywhere), z runs along the limb towards its far end, y completes them.
+Every angle is zero when the person stands upright with hanging arms. A rotation vector has no order of axes and
 no
 gimbal lock; for Euler angles after the ISB's recommendations turn it into a matrix first (scipy's
 Rotation.from_rotvec).
@@ -45,8 +42,7 @@ def joint_angles(body: voodoo.Body, estimate: voodoo.Estimate) -> Mapping[str, f
 
     Args:
         body: the tracked body, `tracker.body`.
-        estimate: of that body. If its joints are apart (limbwise solver), the angles are those of the closed chain
-        nearest to
+        estimate: of that body. If its joints are apart (limbwise solver), the angles are those of the closed chain nearest to
             it in the least-squares sense.
 
     Raises:

@@ -239,6 +239,9 @@ def ik_command(
     pictures: Annotated[
         str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), or none (plain).")
     ] = "depth",
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Solve every frame by itself, from the first pose, not from the one before.")
+    ] = False,
     init: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
@@ -270,7 +273,8 @@ def ik_command(
         positions = Positions.of(source, None if targets is None else Track.load(targets))
         tracker = start_tracker(source, init=None if init is None else Init.load(init))
         known = KNOWN if sites is None else tuple(name.strip() for name in sites.split(","))
-        result, errors = follow(source, tracker, positions, sites=known, pictures=pictures)  # type: ignore[arg-type]
+        how: Any = {"sites": known, "pictures": pictures, "warm": not alone}
+        result, errors = follow(source, tracker, positions, **how)
         result.save(target)
         for name, values in errors.items():
             if np.isfinite(values).any():
@@ -294,6 +298,9 @@ def eval_command(
     model: _ModelOption = "full",
     use: _UseOption = None,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
+    ablation: Annotated[
+        bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
+    ] = False,
     loader: _LoaderOption = None,
 ) -> None:
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
@@ -301,12 +308,18 @@ def eval_command(
     Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
     summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end.
 
+    With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
+    switch turned over, the other solvers, no prediction) and prints a row each; --out gets ablation.md and ablation.csv.
+
     [bold]Examples[/bold]
 
     voodoo eval rendered/ --only '*_cmu' --out report
 
     voodoo eval utd-mhad/ --jobs 4 --out report
+
+    voodoo eval rendered/ --ablate --out report
     """
+    from voodoo.ablate import ablate, table, variants, write_tables
     from voodoo.evaluate import evaluate_all, find_recordings
     from voodoo.report import markdown, write_reports
 
@@ -315,6 +328,17 @@ def eval_command(
         paths = find_recordings(recordings, only=only or ())
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else _kinds(use)
+        if ablation:
+            chosen = _config(config)
+            runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, jobs=jobs)
+            ablations = list(_progress(runs, "ablating", len(variants(chosen))))
+            typer.echo(table(ablations))
+            if out is not None:
+                typer.echo("wrote " + ", ".join(str(file) for file in write_tables(out, ablations)))
+            failed = [score for item in ablations for score in item.failures]
+            if failed:
+                raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
+            return
         done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, jobs=jobs)
         ordered = sorted(_progress(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]

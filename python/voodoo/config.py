@@ -85,6 +85,11 @@ class Config(_Model):  # type: ignore[misc] # made from the table of the core
             lines += [f"{name} = {text}", ""]
         return "\n".join(lines)
 
+    @classmethod
+    def words(cls, key: str) -> tuple[str, ...]:
+        """The words an entry can be; empty for one that is a number or a switch, or unknown."""
+        return tuple(_FIELDS[key][4]) if key in _FIELDS else ()
+
     def values(self) -> dict[str, float | int | bool | str]:
         """Plain values by key."""
         return dict(self.model_dump())

@@ -32,6 +32,13 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
 """How far a joint may be from exact truth, and from another tracker's skeleton, before it counts as lost [m]."""
 
+_CARRIER = {
+    f"{side}_{joint}": f"{side}_{limb}"
+    for side in ("l", "r")
+    for joint, limb in (("elbow", "upperarm"), ("wrist", "forearm"), ("knee", "thigh"), ("ankle", "calf"))
+}
+"""The limb that ends at a joint."""
+
 _SEGMENTED_LOADERS = ("utd-mhad",)
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3", ".zip")
 
@@ -60,6 +67,8 @@ class Score:
         standing_jitter_m, reference_standing_jitter_m: the same over the joints and frames in which the reference stands
             still, see metrics.standing_still.
         degraded_share, lost_share: frames in which the tracker itself said so.
+        far_told, near_doubted: of the elbows, wrists, knees and ankles farther than 10 cm from the truth the share whose
+            limb was not called measured; and of the nearer ones.
         step_s: mean time of a frame from measurements to estimate.
     """
 
@@ -88,6 +97,8 @@ class Score:
     reference_standing_jitter_m: float = np.nan
     degraded_share: float = np.nan
     lost_share: float = np.nan
+    far_told: float = np.nan
+    near_doubted: float = np.nan
     step_s: float = np.nan
 
 
@@ -134,7 +145,8 @@ def evaluate(
         truth = _truth_at(recording, estimate.stamp)
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
         seen = witness(frame.recorded, tracker, estimate, truth, selection)
-        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, joints, seen))
+        measured = np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
+        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, joints, measured, seen))
     if not steps:
         raise RecordingError(f"{path}: expected at least one frame, found none")
     return _score(recording, path, selection, steps)
@@ -270,6 +282,7 @@ class _Step:
     status: str
     seconds: float
     joints: FloatArray
+    measured: npt.NDArray[np.bool_]
     witness: FrameWitness
 
 
@@ -289,6 +302,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     class_, lost = metrics.tracking_class(errors, stamps, limit=limit)
     still = metrics.standing_still(reference, stamps)
     distances = np.concatenate([step.witness.distances for step in steps])
+    measured = np.array([step.measured for step in steps])
     score = Score(
         name=recording.name,
         path=path,
@@ -314,10 +328,19 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         reference_standing_jitter_m=metrics.standing_jitter(reference, still),
         degraded_share=float(np.mean([word == "degraded" for word in status])),
         lost_share=float(np.mean([word == "lost" for word in status])),
+        far_told=_told(errors, measured, far=True),
+        near_doubted=_told(errors, measured, far=False),
         step_s=float(seconds.mean()),
     )
     within = np.array([step.witness.within for step in steps])
     return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
+
+
+def _told(errors: FloatArray, measured: npt.NDArray[np.bool_], *, far: bool) -> float:
+    """Share of the limbs' ends, those farther than LIMIT_EXACT_M or the others, whose limb was not called measured."""
+    ends = np.array([name in _CARRIER for name in metrics.JOINTS])
+    group = np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far)
+    return float(np.mean(~measured[group])) if group.any() else float("nan")
 
 
 def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:

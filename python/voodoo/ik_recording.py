@@ -12,11 +12,12 @@ import numpy.typing as npt
 
 import voodoo
 from voodoo.errors import VoodooError
-from voodoo.ik import Chain, Follower, Options, Posture, Silhouette
+from voodoo.ik import Chain, Follower, Options, Posture, Silhouette, solve
 from voodoo.recordings import ColorImage, DepthImage, RecordedFrame, Recording
 from voodoo.results import Track
+from voodoo.sensors.background import StillBackground
 from voodoo.sensors.front_end import LEVEL_FRAMES
-from voodoo.silhouettes import StillBackground, from_depth
+from voodoo.silhouettes import StillScene, from_depth, surroundings
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Pictures: TypeAlias = Literal["depth", "color", "none"]
@@ -69,6 +70,7 @@ def follow(
     sites: Sequence[str] = KNOWN,
     pictures: Pictures = "depth",
     options: Options | None = None,
+    warm: bool = True,
 ) -> tuple[Track, dict[str, FloatArray]]:
     """Postures of all frames from the known sites and the silhouettes.
 
@@ -77,10 +79,11 @@ def follow(
         tracker: at the first pose, see voodoo.running.start_tracker; gives body and start.
         positions: of the known sites.
         sites: which ones are taken for known; those that `positions` lack are left out.
-        pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known
-        sites; "color" by
-            the difference from the still background; "none": plain inverse kinematics.
-        options: see voodoo.ik.Options; None: margin 0.8.
+        pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known sites and the
+            last posture, or stands before the still scene; "color" by the difference from the still background; "none":
+            plain inverse kinematics.
+        options: see voodoo.ik.Options.
+        warm: start each frame from the posture before; else solve it by itself, from the first pose.
 
     Returns:
         The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
@@ -96,17 +99,26 @@ def follow(
     known = [name for name in sites if name in positions.names and name in chain.site_names]
     if not known:
         raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
-    options = Options(margin=0.8) if options is None else options
+    options = Options() if options is None else options
     start = chain.project(tracker.estimate.world_from_limb)
     follower = Follower(chain, start=start, **{name: getattr(options, name) for name in Options.__dataclass_fields__})
-    backgrounds = _backgrounds(recording) if pictures == "color" else {}
+    scenes = {} if pictures == "none" else _scenes(recording, positions, known, pictures)
     others = [name for name in positions.names if name in chain.site_names and name not in known]
     postures: list[Posture] = []
     stamps, rows = [], []
+    last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}
+    level = recording.root_frame in LEVEL_FRAMES
     for recorded in recording:
         targets = positions.at(recorded.stamp, known)
-        images = _silhouettes(recorded, targets, pictures, backgrounds, level=recording.root_frame in LEVEL_FRAMES)
-        posture = follower.step(targets, images=images if targets else [])
+        images = (
+            _silhouettes(recorded, {**last, **targets} if warm else targets, scenes, level=level) if targets else []
+        )
+        posture = (
+            follower.step(targets, images=images)
+            if warm
+            else solve(chain, targets, images=images, start=start, options=options)
+        )
+        last = posture.joints
         truth = positions.at(recorded.stamp, others)
         rows.append(
             [float(np.linalg.norm(posture.joints[n] - truth[n])) if n in truth else float("nan") for n in others]
@@ -140,32 +152,44 @@ def _track(stamps: Sequence[float], postures: Sequence[Posture]) -> Track:
 
 def _silhouettes(
     recorded: RecordedFrame,
-    known: Mapping[str, FloatArray],
-    pictures: Pictures,
-    backgrounds: Mapping[str, StillBackground],
+    sites: Mapping[str, FloatArray],
+    scenes: Mapping[str, StillScene | StillBackground],
     *,
     level: bool,
 ) -> list[Silhouette]:
+    """Silhouettes of all pictures whose scene is known; `sites`: where the person is and was (3,) [m]."""
     found = []
     for item in recorded.measurements:
-        if pictures == "depth" and isinstance(item, DepthImage):
-            mask = from_depth(item, known, level=level)
-        elif pictures == "color" and isinstance(item, ColorImage):
-            mask = backgrounds[item.sensor].mask(item.image)
+        scene = scenes.get(item.sensor)
+        if isinstance(item, DepthImage) and isinstance(scene, StillScene):
+            mask = from_depth(item, sites, scene=scene, level=level)
+        elif isinstance(item, ColorImage) and isinstance(scene, StillBackground):
+            mask = scene.mask(item.image)
         else:
             continue
         found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor))
     return found
 
 
-def _backgrounds(recording: Recording) -> dict[str, StillBackground]:
+def _scenes(
+    recording: Recording, positions: Positions, known: Sequence[str], pictures: Pictures
+) -> dict[str, StillScene | StillBackground]:
+    """What each camera sees without the person, from pictures spread over the recording; cameras are taken to stand still."""
     chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
-    seen: dict[str, list[npt.NDArray[np.uint8]]] = {}
+    depths: dict[str, list[DepthImage]] = {}
+    colours: dict[str, list[tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_]]]] = {}
     for index, recorded in enumerate(recording):
+        if index not in chosen:
+            continue
         for item in recorded.measurements:
-            if index in chosen and isinstance(item, ColorImage):
-                seen.setdefault(item.sensor, []).append(item.image)
-    # A sensor that none of the chosen frames holds is not known to stand still.
-    if not seen:
-        raise VoodooError(f"{recording.name}: expected colour pictures, found none")
-    return {sensor: StillBackground(images) for sensor, images in seen.items()}
+            if pictures == "depth" and isinstance(item, DepthImage):
+                depths.setdefault(item.sensor, []).append(item)
+            elif pictures == "color" and isinstance(item, ColorImage):
+                there = surroundings(positions.at(recorded.stamp, known), item.camera, item.root_from_sensor)
+                colours.setdefault(item.sensor, []).append((item.image, there))
+    if not depths and not colours:
+        raise VoodooError(f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look")
+    scenes: dict[str, StillScene | StillBackground] = {name: StillScene(images) for name, images in depths.items()}
+    for name, pairs in colours.items():
+        scenes[name] = StillBackground([image for image, _ in pairs], occupied=[there for _, there in pairs])
+    return scenes

@@ -51,7 +51,7 @@ class Summary:
 _MEANS = (
     "error_m", "error_lag0_m", "error_best_lag_m", "within_5cm", "within_10cm", "depth_within_5cm", "depth_median_m",
     "depth_p95_m", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
-    "reference_standing_jitter_m", "degraded_share", "lost_share", "step_s",
+    "reference_standing_jitter_m", "degraded_share", "lost_share", "far_told", "near_doubted", "step_s",
 )  # fmt: skip
 
 _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
@@ -70,6 +70,8 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("reference_standing_jitter_m", "... of the reference itself there", lambda value: f"{1000 * value:.1f} mm"),
     ("degraded_share", "frames called degraded", lambda value: f"{100 * value:.1f} %"),
     ("lost_share", "frames called lost", lambda value: f"{100 * value:.1f} %"),
+    ("far_told", "limbs off by 10 cm and not called measured", lambda value: f"{100 * value:.0f} %"),
+    ("near_doubted", "nearer limbs not called measured", lambda value: f"{100 * value:.1f} %"),
     ("step_s", "time of a frame", lambda value: f"{1000 * value:.2f} ms"),
 )
 

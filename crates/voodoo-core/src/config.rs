@@ -204,6 +204,8 @@ words! {
         Limbwise = "limbwise",
         /// All limbs at once with exact joints, by damped Gauss-Newton on robust terms (R07, method section 4.3).
         Chain = "chain",
+        /// All limbs at once, each with a twist of its own, joined by strong elastic bands (K07 section 4).
+        Tree = "tree",
     }
 }
 
@@ -235,6 +237,8 @@ config! {
     max_distance: f64 = 0.15, "m", 0.001 ..= 10.0;
     /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7).
     band_ratio: f64 = 0.5, "", 0.0 ..= 100.0;
+    /// Standard deviation of the length of an elastic band (tree solver).
+    band_sigma: f64 = 0.003, "m", 0.00001 ..= 1.0;
     /// Standard deviation of a surface point of weight one, for the whole-body solvers.
     point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
     /// Greatest distance of a matched point in the first step of a frame, for the whole-body solvers; it narrows.
@@ -259,6 +263,8 @@ config! {
     hypotheses: bool = false, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
     outline: bool = true, "";
+    /// Limbs that are not joined push each other apart where they overlap (whole-body solvers).
+    penetration: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// After a reset that fits sizes, the frames that follow refine the limbs' lengths (whole-body solvers).

@@ -199,6 +199,7 @@ impl Tracker {
         if std::mem::take(&mut self.girths_open) {
             self.fit_girths(frame);
         }
+        self.lead(frame, pace);
         let mut steps = 0;
         let mut previous = f64::INFINITY;
         while steps < self.config.max_steps {
@@ -271,6 +272,19 @@ impl Tracker {
         }
     }
 
+    /// Lets the solver follow the named sites before the points are assigned.
+    fn lead(&mut self, frame: &Frame, pace: f64) {
+        let mut step = 0;
+        loop {
+            self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+            let Self { body, correspondences, previous, config, solver, poses, .. } = self;
+            if !solver.lead(&Problem { body, correspondences, predicted: previous, step, pace, config }, poses) {
+                break;
+            }
+            step += 1;
+        }
+    }
+
     /// One ICP step (2-7); returns the mean squared distance it started from.
     fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) -> f64 {
         self.match_all(frame, step);
@@ -299,7 +313,9 @@ impl Tracker {
         if self.solver.starts_from_prediction() {
             self.poses.clone_from(&self.predicted);
         }
+        // Unexpected motion of short intervals adds up like noise; over long ones nothing is known of the speed.
         let pace = step.map_or(1.0, |step| (step * 30.0).clamp(0.1, 10.0));
+        let pace = pace.max(pace.sqrt());
         match self.interval {
             None if step.is_some() => pace * UNKNOWN_MOTION,
             _ => pace,

@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use voodoo_core::body::HumanModel;
 use voodoo_core::frame::{Frame, PositionRelation, RayRelation};
-use voodoo_core::geometry::Vec3;
+use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::ik::{Aim, Criterion, Goal, Model, Options, Root, Solver, View, bones};
 use voodoo_core::render::{Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Tracker};
 
@@ -78,6 +79,39 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     count
 }
 
+/// Allocations of a warm solver with two levels, limits and an image, for targets and starts it has not seen.
+fn ik_allocations() -> usize {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let model = Model::new(&body, &[], Root::Free).unwrap();
+    let image: Vec<f32> =
+        (0..160 * 120).map(|i| ((i % 160) as f32 - 70.0).hypot((i / 160) as f32 - 60.0) - 9.0).collect();
+    // Optical frame: z towards -x of the world, 3 m away.
+    let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
+    let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
+    let view =
+        View { distance: &image, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+    let segments = bones(&body, &model, 1.0);
+    let criterion = Criterion { views: &[view], segments: &segments };
+    let mut solver = Solver::default();
+    let mut count = 0;
+    for index in 0..WARM_UP + COUNTED {
+        let by = 0.02 * index as f64;
+        let goals = [("l_hand", 0), ("r_ankle", 0), ("head_center", 1)].map(|(name, level)| {
+            let site = &body.sites()[body.site_index(name).unwrap()];
+            // Some in reach, some not.
+            let aim = Aim::Position(Vec3::new(by, 0.3 - by, 0.2 + 0.5 * by));
+            Goal { part: model.part_of(site.limb).unwrap(), point: site.position, aim, weight: 1.0, level }
+        });
+        let mut angles = vec![0.1; model.freedoms()];
+        let before = COUNT.load(Ordering::Relaxed);
+        solver.solve(&model, &Pose::identity(), &goals, Some(&criterion), &Options::default(), &mut angles);
+        if index >= WARM_UP {
+            count += COUNT.load(Ordering::Relaxed) - before;
+        }
+    }
+    count
+}
+
 /// Allocations of a rendering after one of the same size.
 fn allocations_of_a_rendering() -> usize {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
@@ -103,6 +137,7 @@ fn a_warm_step_or_rendering_allocates_nothing() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(100)));
     assert!(COUNT.load(Ordering::Relaxed) > before, "the counter counts nothing");
 
+    assert_eq!(ik_allocations(), 0, "inverse kinematics");
     assert_eq!(allocations_of_a_rendering(), 0);
 
     let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);

@@ -109,7 +109,7 @@ proptest! {
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
         let view = View { distance: &image, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
         let mut segments = bones(&body, &model, 0.0);
-        segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = radius);
+        segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
         let criterion = Criterion { views: &[view, view], segments: &segments };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);

@@ -9,7 +9,7 @@ use voodoo_core::chain::exp;
 use voodoo_core::correspondence::{Correspondences, EdgePair, LimbMatches, SitePair};
 use voodoo_core::geometry::{Mat3, Pose, Vec3};
 use voodoo_core::normal::Normal;
-use voodoo_core::terms::{Limits, Outline, Prior, Sites, Surface, Term};
+use voodoo_core::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Compares the analytic gradient with central differences of the cost; `evaluate` fills the system at given poses.
 fn check(body: &Body, poses: &[Pose], evaluate: &dyn Fn(&[Pose], &mut Normal)) -> Result<(), TestCaseError> {
@@ -119,6 +119,22 @@ proptest! {
             }).collect();
             Outline { edges: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
         })?;
+    }
+
+    #[test]
+    fn penetration(angles in angles(), folded in 1.5..2.6_f64) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let mut poses = random_pose(&body, &angles);
+        // The left forearm lies in the trunk in every case.
+        let forearm = body.limb_index("l_forearm").unwrap();
+        let thorax = body.limb_index("thorax").unwrap();
+        poses[forearm] = poses[thorax] * Pose::new(Vec3::new(0.05, 0.12, 0.1), Vec3::new(folded, 0.4, 0.0));
+        let term = Penetration { sigma: 1.0, share: 0.8 };
+        check(&body, &poses, &|poses, normal| term.add(&body, poses, normal))?;
+        let mut normal = Normal::default();
+        normal.clear(poses.len());
+        term.add(&body, &poses, &mut normal);
+        prop_assert!(normal.limbs[forearm].g.norm() > 1e-3, "the overlap is not felt");
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! `Chain` and `View` of inverse kinematics; voodoo.ik validates and names what goes in and out.
 
-use numpy::{PyArrayDyn, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::geometry::{Pose, Vec3};
 use voodoo_core::ik::{self, Aim, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver};
@@ -11,6 +12,8 @@ use crate::body::PyBody;
 use crate::errors::{IntoPy, exception};
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+/// angles, poses, sites, residuals, steps, converged, h
+type Solved<'py> = (Array<'py>, Array<'py>, Array<'py>, Bound<'py, PyTuple>, usize, bool, f64);
 /// site, "position" or "line", position or (direction, moment), weight, level
 type GoalParts = (String, String, [f64; 6], f64, usize);
 /// site, site, radius
@@ -83,7 +86,7 @@ impl PyChain {
     }
 
     fn goals(&self, py: Python<'_>, parts: &[GoalParts]) -> PyResult<Vec<Goal>> {
-        let mut goals = parts
+        parts
             .iter()
             .map(|(site, kind, v, weight, level)| {
                 let (part, point) = self.site(py, site)?;
@@ -91,15 +94,13 @@ impl PyChain {
                 let aim = if kind == "line" { Aim::Line { n: first, m: second } } else { Aim::Position(first) };
                 Ok(Goal { part, point, aim, weight: *weight, level: *level })
             })
-            .collect::<PyResult<Vec<_>>>()?;
-        goals.sort_by_key(|goal| goal.level);
-        Ok(goals)
+            .collect()
     }
 
     fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Segment>> {
         parts
             .iter()
-            .map(|(a, b, radius)| Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: *radius }))
+            .map(|(a, b, radius)| Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2] }))
             .collect()
     }
 
@@ -236,29 +237,33 @@ impl PyChain {
         Ok(angles)
     }
 
-    /// One posture: angles, steps, converged, h.
+    /// One posture: angles, poses `(P, 4, 4)`, sites `(S, 3)`, residual of every goal, steps, converged, h.
     #[allow(clippy::too_many_arguments, reason = "called by voodoo.ik only")]
     fn solve<'py>(
         &self,
         base: &Bound<'py, PyAny>,
-        start: Vec<f64>,
+        start: PyReadonlyArray1<'py, f64>,
         goals: Vec<GoalParts>,
         segments: Option<Vec<SegmentParts>>,
         margin: f64,
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
-    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, usize, bool, f64)> {
+    ) -> PyResult<Solved<'py>> {
         let py = base.py();
-        self.checked(py, &start)?;
+        let mut angles = start.as_slice()?.to_vec();
+        self.checked(py, &angles)?;
         let base = pose("world_from_base", Some(base))?;
         let goals = self.goals(py, &goals)?;
+        let mut ordered = goals.clone();
+        ordered.sort_by_key(|goal| goal.level);
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, margin)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
         let criterion = Criterion { views: &views, segments: &segments };
-        let mut angles = start;
         let mut solver = Solver::default();
-        let report = solver.solve(&self.model, &base, &goals, Some(&criterion), &options(how), &mut angles);
+        let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &options(how), &mut angles);
         let at = solver.kinematics();
+        let residuals = goals.iter().map(|goal| goal.residual(at).length());
+        let residuals = PyTuple::new(py, residuals.collect::<Vec<_>>())?;
         let poses: Vec<f64> = at.poses.iter().flat_map(matrix).flatten().collect();
         let sites: Vec<f64> =
             self.site_parts().flat_map(|(_, part, x)| at.poses[part].transform_point(x).to_array()).collect();
@@ -267,6 +272,7 @@ impl PyChain {
             frozen(py, angles, &[n])?,
             frozen(py, poses, &[limbs, 4, 4])?,
             frozen(py, sites, &[points, 3])?,
+            residuals,
             report.steps,
             report.converged,
             report.h,

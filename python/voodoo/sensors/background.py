@@ -1,14 +1,23 @@
-"""Silhouettes from static colour cameras by background subtraction."""
+"""Silhouettes from static colour cameras by background subtraction: `Silhouettes` learns while it runs, `StillBackground` from
+pictures that are there beforehand, even if the person never leaves the place."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.silhouettes import without_specks
 
-ByteImage = npt.NDArray[np.uint8]
+ByteImage: TypeAlias = npt.NDArray[np.uint8]
+Mask: TypeAlias = npt.NDArray[np.bool_]
+
+_SMOOTH_PX = 1.5
+_INPAINT_PX = 5
 
 
 class Silhouettes:
@@ -39,7 +48,7 @@ class Silhouettes:
         self._smallest = smallest
         self._shape: tuple[int, ...] | None = None
 
-    def apply(self, image: ByteImage, *, learn: bool = True) -> npt.NDArray[np.bool_]:
+    def apply(self, image: ByteImage, *, learn: bool = True) -> Mask:
         """(H, W): True where something stands in front of the background.
 
         Args:
@@ -49,15 +58,84 @@ class Silhouettes:
         Raises:
             MeasurementError: another type, or another size than before.
         """
-        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
-            raise MeasurementError(f"image: expected (H, W, 3) uint8, found {image.dtype} of {image.shape}")
-        if self._shape is not None and image.shape != self._shape:
-            raise MeasurementError(f"image: expected {self._shape} as before, found {image.shape}")
+        _check(image, self._shape)
         self._shape = image.shape
         moving = (np.asarray(self._model.apply(image, learningRate=-1.0 if learn else 0.0)) == 255).astype(np.uint8)
-        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
-        moving = np.asarray(cv2.morphologyEx(cv2.medianBlur(moving, 5), cv2.MORPH_CLOSE, kernel), dtype=np.uint8)
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(moving, connectivity=8)
-        large = stats[:, cv2.CC_STAT_AREA] >= self._smallest
-        large[0] = False  # label 0 is the background
-        return np.asarray(large[labels])
+        return _large(np.asarray(cv2.medianBlur(moving, 5), dtype=np.uint8), self._smallest)
+
+
+class StillBackground:
+    """What a camera that stands still sees behind the person: in each pixel the median colour of those pictures in which the
+    person cannot be there. Where that is never the case (`unknown`) the background around is continued (Telea 2004).
+
+    Args:
+        pictures: some tens spread over a recording, (H, W, 3) BGR uint8.
+        occupied: for each picture, (H, W) where the person may be; None: anywhere, so that the person must leave every place in
+            more than half of the pictures.
+        threshold: least difference of the foreground in any colour, 0 to 255.
+        smallest: regions of less area are specks [px].
+
+    Raises:
+        MeasurementError: no picture, pictures or masks of different sizes, a number that cannot be used, or a person who may be
+            everywhere in all pictures.
+    """
+
+    def __init__(
+        self,
+        pictures: Sequence[ByteImage],
+        *,
+        occupied: Sequence[Mask] | None = None,
+        threshold: float = 30.0,
+        smallest: int = 100,
+    ) -> None:
+        """Learn the background; see the class."""
+        if not pictures:
+            raise MeasurementError("pictures: expected some, found none")
+        if not (0.0 < threshold < 255.0 and smallest > 0):
+            raise MeasurementError(
+                f"background: expected threshold 0 to 255 and smallest > 0, found {threshold!r}, {smallest!r}"
+            )
+        for picture in pictures:
+            _check(picture, pictures[0].shape)
+        if occupied is not None and [mask.shape for mask in occupied] != [picture.shape[:2] for picture in pictures]:
+            raise MeasurementError(f"occupied: expected {len(pictures)} masks of the pictures' size, found others")
+        stack = np.stack([_smooth(picture) for picture in pictures]).astype(np.float32)
+        if occupied is not None:
+            stack[np.stack(occupied)] = np.nan
+        # Sorting puts NaN last, so the median of what is left is in the middle of the valid ones.
+        free = np.isfinite(stack[..., 0]).sum(axis=0)
+        middle = np.maximum(free - 1, 0) // 2
+        median = np.take_along_axis(np.sort(stack, axis=0), middle[None, ..., None], axis=0)[0]
+        self.unknown: Mask = np.asarray(free == 0, dtype=bool)
+        if self.unknown.all():
+            raise MeasurementError("occupied: expected pixels where the person is not in some picture, found none")
+        hidden = self.unknown.astype(np.uint8)
+        self._background = cv2.inpaint(np.nan_to_num(median).astype(np.uint8), hidden, _INPAINT_PX, cv2.INPAINT_TELEA)
+        self._shape, self._threshold, self._smallest = pictures[0].shape, threshold, smallest
+
+    def mask(self, picture: ByteImage) -> Mask:
+        """(H, W): True where the picture differs from the background.
+
+        Raises:
+            MeasurementError: another type or size than the background's.
+        """
+        _check(picture, self._shape)
+        difference = cv2.absdiff(_smooth(picture), self._background).max(axis=2)
+        return _large((difference > self._threshold).astype(np.uint8), self._smallest)
+
+
+def _check(image: ByteImage, shape: tuple[int, ...] | None) -> None:
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise MeasurementError(f"image: expected (H, W, 3) uint8, found {image.dtype} of {image.shape}")
+    if shape is not None and image.shape != shape:
+        raise MeasurementError(f"image: expected {shape} as before, found {image.shape}")
+
+
+def _smooth(picture: ByteImage) -> ByteImage:
+    return np.asarray(cv2.GaussianBlur(picture, (0, 0), _SMOOTH_PX), dtype=np.uint8)
+
+
+def _large(mask: ByteImage, smallest: int) -> Mask:
+    """What is large enough of a mask, small gaps closed."""
+    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
+    return without_specks(np.asarray(closed != 0, dtype=bool), smallest=smallest)

@@ -94,7 +94,7 @@ class BodyView:
     """What a depth camera saw of the body, in the picture of a colour camera beside it.
 
     Args:
-        mask: (H, W) of the picture: True where something near the body was seen.
+        mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
         pixels: (N, 2) of the points in the picture.
         depths: (N,) of the points along the colour camera's optical axis [m].
     """
@@ -142,14 +142,21 @@ def body_view(
     """
     places = np.asarray(joints, dtype=np.float64)
     low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
-    z = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
-    rays = depth_camera.rays()[::step, ::step]
+    rows, columns = _window(depth_camera, world_from_depth, low, high)
+    z = depth[rows, columns][::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
+    rays = depth_camera.rays()[rows, columns][::step, ::step]
     valid = np.isfinite(z) & (z > 0.0)
-    points = np.column_stack([rays[valid] * z[valid, None], z[valid]]) @ world_from_depth[:3, :3].T.astype(np.float32)
-    points = points + world_from_depth[:3, 3].astype(np.float32)
-    points = points[((points > low) & (points < high)).all(axis=1)]
+    z = z[valid]
+    x, y = rays[..., 0][valid] * z, rays[..., 1][valid] * z
+    near = np.ones(len(z), dtype=np.bool_)
+    for axis in range(3):
+        turn, shift = world_from_depth[axis, :3].astype(np.float32), np.float32(world_from_depth[axis, 3])
+        place = turn[0] * x + turn[1] * y + turn[2] * z + shift
+        near &= (place > low[axis]) & (place < high[axis])
+    x, y, z = x[near], y[near], z[near]
+    color_from_depth = np.linalg.inv(world_from_color) @ world_from_depth
+    in_color = np.column_stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in color_from_depth[:3]])
     mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
-    in_color = in_sensor(world_from_color, points)
     pixels = color_camera.project(in_color)
     seen = np.isfinite(pixels).all(axis=1)
     pixels, in_color = pixels[seen], in_color[seen]
@@ -159,4 +166,39 @@ def body_view(
     # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
     grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
-    return BodyView(grown, pixels, in_color[:, 2])
+    beyond = _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
+    return BodyView(grown | beyond, pixels, in_color[:, 2])
+
+
+def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high: FloatArray) -> tuple[slice, slice]:
+    """Rows and columns of a depth image that can show the box between two corners (3,); all where the lens distorts."""
+    corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+    corners = in_sensor(world_from_depth, corners)
+    if camera.distorted or (corners[:, 2] < 0.05).any():
+        return slice(0, camera.height), slice(0, camera.width)
+    pixels = camera.project(corners)
+    first = np.clip(np.floor(pixels.min(axis=0)), 0, (camera.width, camera.height)).astype(int)
+    last = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, (camera.width, camera.height)).astype(int)
+    return slice(first[1], last[1]), slice(first[0], last[0])
+
+
+def _beyond(
+    depth_camera: Camera,
+    world_from_depth: FloatArray,
+    color_camera: Camera,
+    world_from_color: FloatArray,
+    places: FloatArray,
+) -> npt.NDArray[np.bool_]:
+    """(H, W) of the colour image: True where the depth camera does not look, at the distance of the body."""
+    z = max(float(np.median(in_sensor(world_from_depth, places)[:, 2])), 0.1)
+    right, bottom = depth_camera.width - 1, depth_camera.height - 1
+    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]].astype(np.float64)
+    corners = np.column_stack([rays * z, np.full(4, z)]) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
+    outline = color_camera.project(in_sensor(world_from_color, corners))
+    # The corners are the centres of the outermost pixels.
+    middle = outline.mean(axis=0)
+    outline = middle + (outline - middle) * (1.0 + 4.0 / min(depth_camera.width, depth_camera.height))
+    seen = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
+    if np.isfinite(outline).all():
+        cv2.fillConvexPoly(seen, np.clip(np.round(outline), -9999, 9999).astype(np.int32), 1)
+    return np.asarray(seen == 0)

@@ -63,7 +63,6 @@ class FrontEndSettings:
         depth_filter: what is dropped from depth images; None takes them as they are.
         skin: settings of the skin-colour cue.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
-        lost_points: a forearm with fewer matched points has lost its hand.
 
     Raises:
         MeasurementError: an unknown kind.
@@ -85,7 +84,6 @@ class FrontEndSettings:
     depth_filter: DepthFilter | None = None
     skin: SkinSettings = field(default_factory=SkinSettings)
     ground_z: float | None = None
-    lost_points: int = 10
 
     def __post_init__(self) -> None:
         """Check the kinds."""
@@ -172,7 +170,7 @@ class FrontEnd:
         """
         repeats, changes = [], False
         for item in measurements:
-            content = _content(item)
+            content = _content(item, self.settings.use)
             if content is None:
                 continue
             before = self._contents.get(item.sensor)
@@ -229,16 +227,16 @@ class FrontEnd:
                 step=max(depth.camera.width // 200, 1),
             )
         rays = skin.observe(
-            item.image, item.camera, item.root_from_sensor, then, body=body, lost=self._lost(), source=item.sensor
+            item.image,
+            item.camera,
+            item.root_from_sensor,
+            then,
+            stamp=item.stamp,
+            body=body,
+            surface=self.tracker.distance,
+            source=item.sensor,
         )
-        for ray in rays:
-            moved = ray.origin + (predicted[ray.site] - then[ray.site])
-            self.rays.append(SiteRay(ray.site, moved, ray.direction, ray.sigma, ray.source, ray.trust))
-
-    def _lost(self) -> list[str]:
-        """Hands whose forearm had too few points in the last step to say where it is."""
-        points = self.tracker.estimate.limb_points
-        return [f"{side}_hand" for side in "lr" if points.get(f"{side}_forearm", 0) < self.settings.lost_points]
+        self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
 
     def _add_keypoints(
         self,
@@ -292,12 +290,13 @@ class FrontEnd:
         return self.settings.model.weight(noise.sigma(away), sharing=sharing)
 
 
-def _content(item: Measurement) -> npt.NDArray[Any] | None:
-    if isinstance(item, DepthImage):
+def _content(item: Measurement, use: Sequence[str]) -> npt.NDArray[Any] | None:
+    """What a range sensor of a kind in use measured."""
+    if isinstance(item, DepthImage) and "depth" in use:
         return item.image
-    if isinstance(item, PointCloud):
+    if isinstance(item, PointCloud) and "points" in use:
         return item.points
-    return item.ranges if isinstance(item, LaserScan) else None
+    return item.ranges if isinstance(item, LaserScan) and "scan" in use else None
 
 
 def _same_camera(depth: DepthImage, item: KeypointImage) -> bool:

@@ -1,46 +1,49 @@
 """Skin colour as a cue for head and hands (K06 III-A): segmentation that adapts, regions, and their assignment.
 
-All regions become candidates without a label; candidates and sites are matched one to one within a gate around the
-predicted
-sites, what is left over is ignored. Three things keep a hand with its owner:
+All regions become candidates without a label. They are followed in space (see `blobs`), so that a hand keeps its name
+while the body model falls behind. What keeps a hand with its owner:
 
-* A region that is larger than a hand (a bare forearm, a door) offers its tips, not its middle.
-* What has had skin's colour for long where no head or hand was is background (a wooden door); with a depth image, so
-is what
-  lies nowhere near the body.
-* A site that other sensors measure well has a narrow gate, and where two candidates could both be it, neither is taken.
-* The colours are learnt at the projected head and hands while they are matched, with a forgetting factor, so that they
-  follow the light and the person.
+* A region that is larger than a hand (a bare forearm, a door) offers its tips, not its middle, and of the tips of a
+  forearm the one that is not the elbow's.
+* What has had skin's colour for long where no head or hand was is background (a wooden door); with a depth image, so is
+  what lies nowhere near the body.
+* Where two new candidates could both be a site, neither is taken. A site that was lost is taken up far from where it is
+  expected only in a region that belongs to no other site and that the body does not explain where it is thought to be.
+* The colours are learnt where two of head and hands show them, with a forgetting factor, so that they follow the light and
+  the person.
+
+With a depth image a region is a place in space, not only a ray.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d
 
 from voodoo._core import Estimate
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
-from voodoo.sensors.assignment import assign
+from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
-from voodoo.sensors.rays import SiteRay
+from voodoo.sensors.rays import SiteRay, beyond_bias
 from voodoo.sensors.skin_colour import Colours, SkinColour
+from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
 
-PALM_M, FACE_M = 0.045, 0.085
-"""Radii of a palm and of a face."""
-LONGEST_HAND = 6.0
-"""A hand with stretched fingers in radii of its palm, measured across the box around it."""
+Surface: TypeAlias = Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
+"""Distances of places (N, 3) from the surface of the body (N,) [m]."""
+FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
+"""The middle of a head lies this far behind its face, that of a hand behind its skin."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +51,16 @@ class SkinSettings:
     """How skin regions become rays.
 
     Args:
-        sites: site -> standard deviation [m] of a region's centre from it. A face is the front of the head.
-        gate: a candidate farther than this from the predicted site is not it [m].
-        lost_gate: the same for a site whose limb nothing else measures.
-        depth_gate: with a depth image, a candidate must be as deep as its site up to its gate and this [m]: the
-            surface is not the site.
+        sites: site -> how far [m] a region's middle may always be from it, see `beyond_bias`. A face is the front of the
+            head.
+        gate: a new region farther than this from the predicted site is not it [m]; one that has its name keeps it.
+        lost_gate: see gate_growth [m].
+        gate_growth: a gate grows by this while its site is not seen [m/s], up to `lost_gate`, or to `widest_gate` for a
+            hand that a depth camera sees.
+        widest_gate: see above [m].
+        unexplained: a region is taken far from where its site is expected only if it is this far outside the body [m].
         ambiguity: a second candidate that is not this many times as far as the first makes both useless.
-        noise: of a region's centre in the image; its spread is that of the site.
+        noise: of a region's centre in the image; and how much it changes from picture to picture.
         static_seconds: what has skin's colour for so long away from head and hands is background [s].
         settled_frames: pictures to learn from before the cue is used.
         learn_every: of the pictures after those, every n-th is learnt from.
@@ -64,13 +70,15 @@ class SkinSettings:
     """
 
     sites: Mapping[str, float] = field(
-        default_factory=lambda: {"head_center": 0.05, "l_hand": 0.04, "r_hand": 0.04},
+        default_factory=lambda: {"head_center": 0.06, "l_hand": 0.06, "r_hand": 0.06},
     )
     gate: float = 0.12
     lost_gate: float = 0.35
-    depth_gate: float = 0.10
+    gate_growth: float = 1.0
+    widest_gate: float = 0.80
+    unexplained: float = 0.06
     ambiguity: float = 1.5
-    noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.0))
+    noise: PixelNoise = field(default_factory=lambda: PixelNoise(pixels=1.5, spread=0.03))
     static_seconds: float = 1.0
     settled_frames: int = 1
     learn_every: int = 3
@@ -78,27 +86,11 @@ class SkinSettings:
     def __post_init__(self) -> None:
         """Check the numbers."""
         numbers = {"gate": self.gate, "lost_gate": self.lost_gate, "static_seconds": self.static_seconds, **self.sites}
+        numbers |= {"gate_growth": self.gate_growth, "widest_gate": self.widest_gate, "unexplained": self.unexplained}
         numbers["learn_every"] = float(self.learn_every)
         for name, value in numbers.items():
             if not (math.isfinite(value) and value > 0.0):
                 raise MeasurementError(f"skin {name}: expected a number > 0, found {value!r}")
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A place in the image where a head or hand may be.
-
-    Args:
-        pixel: (u, v).
-        region: number of the region it is of.
-        area: of that region [px].
-        hand: False for the middle of a region that is longer than a hand: it may be a face, but not a hand.
-    """
-
-    pixel: tuple[float, float]
-    region: int
-    area: int
-    hand: bool = True
 
 
 class SkinTracker:
@@ -108,6 +100,8 @@ class SkinTracker:
         """Start with the colours of all skins; `learn` makes them one person's."""
         self.settings = settings or SkinSettings()
         self.colour = SkinColour()
+        self.blobs = Blobs()
+        self._stamp = 0.0
         self.candidates: list[Candidate] = []
         self.assigned: dict[str, Candidate] = {}
         self._skin: Mask | None = None
@@ -135,8 +129,9 @@ class SkinTracker:
         world_from_sensor: npt.ArrayLike,
         predicted: Mapping[str, FloatArray],
         *,
+        stamp: float | None = None,
         body: BodyView | None = None,
-        lost: Collection[str] = (),
+        surface: Surface | None = None,
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -146,9 +141,10 @@ class SkinTracker:
             camera: calibration.
             world_from_sensor: (4, 4).
             predicted: site name -> (3,) in the world at the time of the picture.
+            stamp: of the picture [s]; None: 1/30 s after the last.
             body: what a depth camera saw near the body; None: not known. A candidate must then lie at about the depth
                 of its site, so that a hand hidden behind the body does not jump to what is in front.
-            lost: sites whose limb nothing else measures.
+            surface: distances of places (N, 3) from the body's surface (N,) [m], as `Tracker.distance` gives them.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -165,44 +161,110 @@ class SkinTracker:
             skin &= body.mask
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
+        # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
+        skin = np.asarray(
+            cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool
+        )
         self._skin = skin
-        focal = math.sqrt(camera.fx * camera.fy)
         self.candidates, self.assigned = [], {}
+        stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
+        self._stamp = stamp
         if not places or not self.settled:
             return []
+        focal = math.sqrt(camera.fx * camera.fy)
         nearest = min(z for _, z in places.values())
         self.candidates = candidates(skin, palm_px=PALM_M * focal / nearest)
         if not self.candidates:
             return []
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
+        axis = pose[:3, 2]
+        sights = []
+        for item, direction in zip(self.candidates, directions, strict=True):
+            along = None if body is None else body.depth_at(item.pixel, 1.5 * PALM_M * focal / nearest)
+            z = nearest if along is None else along
+            place = origin + direction * (z / float(direction @ axis))
+            sights.append(Sight(direction, place, along is not None, item.hand, item.region))
+        seen = self.blobs.follow(sights, stamp)
         sites = list(places)
-        cost = np.array([ray_distance(origin, directions, predicted[site]) for site in sites])
-        cost[:, ~np.isfinite(directions).all(axis=1)] = np.inf
-        no_hand = np.flatnonzero([not item.hand for item in self.candidates])
-        hands = np.flatnonzero([not site.startswith("head") for site in sites])
-        cost[np.ix_(hands, no_hand)] = np.inf
-        if body is not None:
-            reach = 1.5 * PALM_M * focal / nearest
-            depths = [body.depth_at(item.pixel, reach) for item in self.candidates]
-            for row, site in enumerate(sites):
-                limit = self.settings.depth_gate + (self.settings.lost_gate if site in lost else self.settings.gate)
-                for column, depth in enumerate(depths):
-                    if depth is None or abs(depth - places[site][1]) > limit:
-                        cost[row, column] = np.inf
-        gates = np.array([self.settings.lost_gate if site in lost else self.settings.gate for site in sites])
-        pixels = np.array([item.pixel for item in self.candidates])
+        distance = np.array(
+            [
+                [
+                    float(np.linalg.norm(self._inside(site, sight) - predicted[site]))
+                    if sight.deep
+                    else float(ray_distance(origin, sight.direction, predicted[site]))
+                    for sight in sights
+                ]
+                for site in sites
+            ]
+        )
+        found = self.blobs.name(
+            seen,
+            distance,
+            self._allowed(sites, sights, seen, predicted, surface),
+            sites=sites,
+            gates=dict.fromkeys(sites, self.settings.gate),
+            growth=self.settings.gate_growth,
+            widest={
+                site: self.settings.widest_gate
+                if body is not None and not site.startswith("head")
+                else self.settings.lost_gate
+                for site in sites
+            },
+            ambiguity=self.settings.ambiguity,
+            stamp=stamp,
+        )
         rays = []
-        # Distances in units of each site's own gate.
-        for row, column in assign(cost / gates[:, None], gate=1.0):
-            site = sites[row]
-            z = places[site][1]
-            apart = np.linalg.norm(pixels - pixels[column], axis=1) > 2.0 * PALM_M * focal / z
-            if (cost[row][apart] < max(self.settings.ambiguity * cost[row, column], 0.5 * gates[row])).any():
-                continue
+        for site, column in found.items():
             self.assigned[site] = self.candidates[column]
-            across = self.settings.noise.sigma(z, focal, spread=self.settings.sites[site])
-            rays.append(SiteRay(site, origin, directions[column], across, source))
+            across = self.settings.noise.sigma(places[site][1], focal)
+            sight = sights[column]
+            place = self._inside(site, sight) if sight.deep else None
+            trust = beyond_bias(self.settings.sites[site], float(distance[sites.index(site), column]))
+            rays.append(SiteRay(site, origin, sight.direction, across, source, trust, place))
         return rays
+
+    def _inside(self, site: str, sight: Sight) -> FloatArray:
+        """Where the site is when a sight is its surface."""
+        return sight.place + sight.direction * (FACE_BEHIND_M if site.startswith("head") else HAND_BEHIND_M)
+
+    def _allowed(
+        self,
+        sites: list[str],
+        sights: list[Sight],
+        seen: list[Blob],
+        predicted: Mapping[str, FloatArray],
+        surface: Surface | None,
+    ) -> FloatArray:
+        """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
+
+        A site that was lost is taken up far from where it is expected only in a region that no other site has, and which
+        the body does not explain where it is thought to be.
+        """
+        owned = {blob.sight.region for blob in seen if blob.label is not None}
+        away: npt.NDArray[np.floating[Any]] = np.zeros(len(sights))
+        if surface is not None:
+            away = surface(np.array([sight.place for sight in sights]))
+        far = np.array(
+            [
+                sight.deep and sight.region not in owned and outside > self.settings.unexplained
+                for sight, outside in zip(sights, away, strict=True)
+            ]
+        )
+        allowed = np.tile(1.0 + far, (len(sites), 1))
+        for row, site in enumerate(sites):
+            side = site[0]
+            shoulder = predicted.get(f"{side}_shoulder")
+            if site.startswith("head"):
+                continue
+            allowed[row] *= [sight.hand for sight in sights]
+            if shoulder is not None:
+                reach = _reach(side, predicted)
+                distance = [float(np.linalg.norm(sight.place - shoulder)) for sight in sights]
+                allowed[row] *= [not sight.deep or d < reach for sight, d in zip(sights, distance, strict=True)]
+            elbow = predicted.get(f"{side}_elbow")
+            if elbow is not None:
+                allowed[row] *= _hand_ends(sights, predicted[site], elbow)
+        return allowed
 
     def learn(
         self,
@@ -227,7 +289,7 @@ class SkinTracker:
         _check_image(image, camera)
         places = self._places(camera, pose, estimate.joints)
         focal = math.sqrt(camera.fx * camera.fy)
-        inside = np.zeros(image.shape[:2], dtype=np.uint8)
+        inside = []
         near = np.zeros(image.shape[:2], dtype=np.uint8)
         for site, (pixel, z) in places.items():
             radius = (FACE_M if site.startswith("head") else PALM_M) * focal / z
@@ -236,7 +298,9 @@ class SkinTracker:
                 continue
             cv2.circle(near, centre, max(round(2.5 * radius), 2), 1, -1)
             if site in self.assigned or not self.settled:
-                cv2.circle(inside, centre, max(round(0.8 * radius), 1), 1, -1)
+                place = np.zeros(image.shape[:2], dtype=np.uint8)
+                cv2.circle(place, centre, max(round(0.8 * radius), 1), 1, -1)
+                inside.append(place.astype(bool))
         self._pictures += 1
         if self._seen is not None:
             self._learn_static(self._seen, ~near.astype(bool), rate_hz)
@@ -245,7 +309,7 @@ class SkinTracker:
             return
         known = self._colours
         colours = known[1] if known is not None and known[0] is image else Colours.of(image)
-        if self.colour.learn(colours, inside.astype(bool), outside=~near.astype(bool), body=self._body):
+        if self.colour.learn(colours, inside, outside=~near.astype(bool), body=self._body):
             self._learnt += 1
 
     def _learn_static(self, seen: Mask, away: Mask, rate_hz: float) -> None:
@@ -271,57 +335,23 @@ class SkinTracker:
         }
 
 
-def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
-    """Where in a skin mask (H, W) a head or a hand may be.
-
-    Regions with less than a fifth of a palm's area are noise. Each other one offers its middle, unless it is larger
-    than four faces (a door); one that is longer than a hand also offers its tips: the middles of what lies within a
-    palm's reach of the contour's farthest points.
-
-    Args:
-        skin: True where the colour is skin's.
-        palm_px: radius of a palm in the image [px].
-    """
-    smallest = max(0.2 * math.pi * palm_px**2, 6.0)
-    largest = 4.0 * math.pi * (FACE_M / PALM_M * palm_px) ** 2
-    count, labels, stats, centres = cv2.connectedComponentsWithStats(skin.astype(np.uint8), connectivity=8)
-    found = []
-    for region in range(1, count):
-        left, top, width, height, area = (int(value) for value in stats[region])
-        if not smallest <= area <= largest:
-            continue
-        extent = math.hypot(width, height)
-        middle = (float(centres[region][0]), float(centres[region][1]))
-        found.append(Candidate(middle, region, area, hand=extent <= LONGEST_HAND * palm_px))
-        if extent > LONGEST_HAND * palm_px:
-            mask = labels[top : top + height, left : left + width] == region
-            for u, v in _tips(mask, palm_px):
-                found.append(Candidate((u + left, v + top), region, area))
-    return found
+def _reach(side: str, predicted: Mapping[str, FloatArray]) -> float:
+    """How far a hand can be from its shoulder [m], with room for a model that is not where the person is."""
+    joints = [predicted.get(f"{side}_{name}") for name in ("shoulder", "elbow", "hand")]
+    if any(joint is None for joint in joints):
+        return math.inf
+    shoulder, elbow, hand = (np.asarray(joint) for joint in joints)
+    return 1.2 * float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(hand - elbow)) + 0.15
 
 
-def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
-    """Middles of the parts of a region around its tips, farthest first, at most four."""
-    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    outline = max(contours, key=len).reshape(-1, 2).astype(np.float64)
-    rows, columns = np.nonzero(mask)
-    pixels = np.column_stack([columns, rows]).astype(np.float64)
-    distance = np.linalg.norm(outline - pixels.mean(axis=0), axis=1)
-    # A tip is farther out than all of the contour around it.
-    peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
-    tips: list[tuple[float, float]] = []
-    taken: list[FloatArray] = []
-    for index in np.argsort(-distance, kind="stable"):
-        if len(tips) == 4 or distance[index] < 1.5 * palm_px:
-            break
-        tip = outline[index]
-        if not peak[index] or any(float(np.linalg.norm(tip - other)) < 3.0 * palm_px for other in taken):
-            continue
-        taken.append(tip)
-        near = pixels[np.linalg.norm(pixels - tip, axis=1) < 3.2 * palm_px]
-        u, v = near.mean(axis=0)
-        tips.append((float(u), float(v)))
-    return tips
+def _hand_ends(sights: list[Sight], hand: FloatArray, elbow: FloatArray) -> list[bool]:
+    """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region."""
+    towards = [float(np.linalg.norm(item.place - hand) - np.linalg.norm(item.place - elbow)) for item in sights]
+    least: dict[int, float] = {}
+    for item, value in zip(sights, towards, strict=True):
+        if item.hand:
+            least[item.region] = min(value, least.get(item.region, math.inf))
+    return [value <= least.get(item.region, math.inf) for item, value in zip(sights, towards, strict=True)]
 
 
 def _check_image(image: ByteImage, camera: Camera) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -20,6 +21,8 @@ _SHAPE = (LUMA_BINS, CHROMA_BINS, CHROMA_BINS)
 _SIZE = LUMA_BINS * CHROMA_BINS**2
 _SMOOTHING = (0.7, 0.8, 0.8)
 
+_IN_COMMON = 0.1
+"""Two places that share less of their colours than this do not both show skin."""
 _PRIOR_CENTRE, _PRIOR_SPREAD = (150.0, 110.0), (8.0, 8.0)
 """Chroma (Cr, Cb) of human skin of any tone under white light, and its spread."""
 
@@ -66,12 +69,15 @@ class SkinColour:
         table = (self.skin > self.ratio * self.rest).astype(np.uint8).ravel()
         return np.asarray(cv2.medianBlur(table[colours.bins] & colours.lit, 3), dtype=bool)
 
-    def learn(self, colours: Colours, inside: Mask, *, outside: Mask, body: Mask | None = None) -> bool:
+    def learn(self, colours: Colours, inside: Sequence[Mask], *, outside: Mask, body: Mask | None = None) -> bool:
         """Learn from the pixels where skin must be, and from those far from it.
+
+        A colour is learnt as far as two places show it: a shirt behind one hand is not skin.
 
         Args:
             colours: of the picture.
-            inside: (H, W) where head and hands are. Only pixels whose colour is near to what skin was are learnt.
+            inside: (H, W) each, where the head is and where each hand is. Only pixels whose colour is near to what skin
+                was are learnt.
             outside: (H, W) where no head or hand is.
             body: (H, W) where the body is, if known: half of the rest is learnt from its clothes.
 
@@ -80,12 +86,18 @@ class SkinColour:
         """
         bins = colours.bins
         near = (self.skin > 0.5 * self.ratio * self.rest).ravel()
-        chosen = inside & near[bins] & colours.lit.astype(bool)
-        if int(chosen.sum()) < 20:
+        likely = near[bins] & colours.lit.astype(bool)
+        places = [bins[place & likely] for place in inside]
+        places = [place for place in places if len(place) >= 8]
+        if len(places) < 2 or sum(len(place) for place in places) < 20:
+            return False
+        shown = np.sort([_histogram(place) for place in places], axis=0)[-2]
+        total = float(shown.sum())
+        if total < _IN_COMMON:
             return False
         # The first pictures make the general skin this person's; later ones follow slowly.
         keep = np.float32(self.forgetting if self._pictures >= 5 else 0.5)
-        self.skin = keep * self.skin + (1 - keep) * _histogram(bins[chosen])
+        self.skin = keep * self.skin + (1 - keep) * (shown / np.float32(total))
         rest = _histogram(bins[outside])
         if body is not None and (clothes := outside & body).any():
             rest = 0.5 * rest + 0.5 * _histogram(bins[clothes])

@@ -6,8 +6,8 @@ use crate::body::Body;
 use crate::geometry::Vec3;
 
 /// One segment from the joint of every limb to each joint of its children in the chain, or to the end of a last limb: its
-/// farthest site, else its distal end. A root limb without a joint has none. Radius: the mean of the limb's semi-axes times
-/// `margin`; with 0 the criterion is J10's.
+/// farthest site, else its distal end. A root limb without a joint has none. Radius: the smaller semi-axes
+/// times `margin`, since a limb is at least as wide as they are, however it is turned about itself; with 0 the criterion is J10's.
 pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Segment> {
     let mut segments = Vec::new();
     for (index, part) in model.parts().iter().enumerate() {
@@ -15,7 +15,7 @@ pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Segment> {
         let Some((_, joint)) = &limb.parent else { continue };
         let start = joint.limb_from_joint.translation;
         let shape = &limb.shape;
-        let radius = margin * 0.25 * (shape.a0() + shape.b0() + shape.a1() + shape.b1());
+        let radius = [margin * shape.a0().min(shape.b0()), margin * shape.a1().min(shape.b1())];
         let children = model.parts().iter().filter(|child| child.parent == Some(index));
         let mut ends: Vec<Vec3> = children.map(|child| child.parent_from_joint.translation).collect();
         if ends.is_empty() {

@@ -58,12 +58,16 @@ pub struct Goal {
     pub level: usize,
 }
 
+impl Goal {
+    /// The residual at a pose of the chain, see [`Aim::residual`].
+    pub fn residual(&self, at: &Kinematics) -> Vec3 {
+        self.aim.residual(at.poses[self.part].transform_point(self.point))
+    }
+}
+
 /// Weighted squared residual of the goals.
 pub fn level_cost(goals: &[Goal], at: &Kinematics) -> f64 {
-    goals
-        .iter()
-        .map(|goal| goal.weight * goal.aim.residual(at.poses[goal.part].transform_point(goal.point)).length_squared())
-        .sum()
+    goals.iter().map(|goal| goal.weight * goal.residual(at).length_squared()).sum()
 }
 
 /// Residuals and Jacobian (row-major, three rows a goal) of the goals, both times the roots of the weights.

@@ -5,6 +5,8 @@ use crate::geometry::{Mat3, Pose, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
 pub const SAMPLES: usize = 8;
+/// A silhouette's border is known to a pixel: that much less deep is deep enough.
+const BORDER: f64 = 1.0;
 /// Points nearer to the camera plane than this, or behind it, are not seen; metres.
 const NEAREST: f64 = 0.05;
 
@@ -28,11 +30,12 @@ pub struct View<'a> {
 pub struct Segment {
     /// Part and point in its frame of both ends.
     pub ends: [(usize, Vec3); 2],
-    /// How deep inside it shall lie at least: the limb's radius, metres; 0 is J10's criterion.
-    pub radius: f64,
+    /// How deep inside it shall lie at both ends, and in proportion between: the limb's radius, metres; 0 is J10's criterion.
+    pub radius: [f64; 2],
 }
 
-/// `h`: mean over all samples of all views of `max(distance + projected radius, 0)`, pixels (J10 eq. 5).
+/// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less a
+/// pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
@@ -75,7 +78,8 @@ impl Criterion<'_> {
                 let mut pull = [Vec3::ZERO; 2];
                 for sample in 0..SAMPLES {
                     let t = (sample as f64 + 0.5) / SAMPLES as f64;
-                    let (value, slope) = view.outside(a + t * (b - a), segment.radius);
+                    let radius = segment.radius[0] + t * (segment.radius[1] - segment.radius[0]);
+                    let (value, slope) = view.outside(a + t * (b - a), radius);
                     h += value;
                     pull[0] += (1.0 - t) * slope;
                     pull[1] += t * slope;
@@ -100,7 +104,7 @@ impl Criterion<'_> {
 }
 
 impl View<'_> {
-    /// `max(distance + projected radius, 0)` of a point in the optical frame and its derivative by that point.
+    /// `max(distance + depth, 0)` of a point in the optical frame and its derivative by that point.
     fn outside(&self, x: Vec3, radius: f64) -> (f64, Vec3) {
         if x.z < NEAREST {
             return (0.0, Vec3::ZERO);
@@ -109,13 +113,15 @@ impl View<'_> {
         let inverse = 1.0 / x.z;
         let (px, py) = (x.x * inverse, x.y * inverse);
         let (distance, du, dv) = self.sample(fx * px + cx, fy * py + cy);
-        let margin = fx * radius * inverse;
-        let value = distance + margin;
+        let depth = fx * radius * inverse - BORDER;
+        // The derivative of the depth by the distance from the camera plane.
+        let (depth, closer) = if depth > 0.0 { (depth, depth + BORDER) } else { (0.0, 0.0) };
+        let value = distance + depth;
         if value <= 0.0 {
             return (0.0, Vec3::ZERO);
         }
         let (gx, gy) = (du * fx, dv * fy);
-        (value, Vec3::new(gx, gy, -(gx * px + gy * py) - margin) * inverse)
+        (value, Vec3::new(gx, gy, -(gx * px + gy * py) - closer) * inverse)
     }
 
     /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the

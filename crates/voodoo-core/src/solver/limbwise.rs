@@ -1,6 +1,6 @@
 //! The published solver: weighted absolute orientation, each limb alone (K06 IV-B.7, K07 3.2).
 
-use super::{Gate, Problem, Solver};
+use super::{Gate, Guide, Problem, Solver};
 use crate::config::Config;
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Mat3, Pose, Vec3};
@@ -11,7 +11,12 @@ const STAY: f64 = 0.05;
 
 /// Each limb moves to the optimum of its own pairs; information crosses one joint a step through the bands.
 #[derive(Debug, Default)]
-pub struct Limbwise;
+pub struct Limbwise {
+    guide: Guide,
+}
+
+/// Rounds in which the chain follows the sites.
+const LEAD: usize = 3;
 
 impl Solver for Limbwise {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
@@ -38,6 +43,14 @@ impl Solver for Limbwise {
                 *pose = Pose::from_parts(centre + motion.translation, rotation);
             }
         }
+    }
+
+    fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+        if problem.correspondences.sites.is_empty() {
+            return false;
+        }
+        self.guide.step(problem, poses);
+        problem.step + 1 < LEAD
     }
 
     fn gate(&self, config: &Config, _step: usize) -> Gate {

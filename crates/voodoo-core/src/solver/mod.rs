@@ -2,14 +2,18 @@
 
 mod chain;
 mod cholesky;
+mod guide;
 mod lengths;
 mod limbwise;
+mod tree;
 mod whole_body;
 
 pub use chain::ChainSolver;
 pub(crate) use cholesky::solve_in_place;
+pub use guide::Guide;
 pub use lengths::{Pair, pairs};
 pub use limbwise::Limbwise;
+pub use tree::TreeSolver;
 pub use whole_body::WholeBody;
 
 use crate::body::Body;
@@ -48,6 +52,12 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
     /// One update of all poses (working frame).
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
 
+    /// Follows the named sites before the first step of a frame; true asks for another round. Solvers that move all limbs
+    /// at once need no such lead. `problem.predicted` are the poses before the frame.
+    fn lead(&mut self, _problem: &Problem, _poses: &mut [Pose]) -> bool {
+        false
+    }
+
     /// Relative changes of the lengths of `pairs` that the correspondences ask for at `poses`, into `change`, which holds how
     /// far the lengths are below the ones set. False when the solver knows none.
     fn lengths(&mut self, _problem: &Problem, _poses: &[Pose], _pairs: &[Pair], _change: &mut [f64]) -> bool {
@@ -67,7 +77,8 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
 /// The solver of a configuration.
 pub fn solver(kind: SolverKind) -> Box<dyn Solver> {
     match kind {
-        SolverKind::Limbwise => Box::new(Limbwise),
+        SolverKind::Limbwise => Box::new(Limbwise::default()),
         SolverKind::Chain => Box::new(WholeBody::default()),
+        SolverKind::Tree => Box::new(WholeBody::tree()),
     }
 }

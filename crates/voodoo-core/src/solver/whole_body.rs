@@ -1,16 +1,19 @@
-//! All limbs at once: the terms are summed into one system, which the chain solves.
+//! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Pair, Problem, Solver};
+use super::{ChainSolver, Gate, Pair, Problem, Solver, TreeSolver};
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
-use crate::terms::{Limits, Outline, Prior, Sites, Surface, Term};
+use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Share of a surface point's information across its normal (method section 1: 0.05 to 0.1 stops sliding).
 const SLIDE: f64 = 0.07;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
+/// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter.
+const OVERLAP_SIGMA: f64 = 0.03;
+const FREE_SHARE: f64 = 0.8;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
@@ -31,14 +34,21 @@ fn narrowed(start: f64, end: f64, step: usize) -> f64 {
 pub struct WholeBody {
     normal: Normal,
     chain: ChainSolver,
+    /// Moves the limbs instead of the chain, if there.
+    tree: Option<TreeSolver>,
     lengths: Lengths,
     joint_sigmas: Vec<f64>,
+    /// Weight of the sites on each limb and beyond it.
+    sites: Vec<f64>,
 }
 
 impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses);
-        self.chain.step(problem.body, &self.normal, DAMPING, poses);
+        match &mut self.tree {
+            Some(tree) => tree.step(problem.body, &self.normal, DAMPING, problem.config.band_sigma, poses),
+            None => self.chain.step(problem.body, &self.normal, DAMPING, poses),
+        }
     }
 
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
@@ -62,15 +72,32 @@ impl Solver for WholeBody {
 }
 
 impl WholeBody {
+    /// The same terms, solved with elastic bands.
+    pub fn tree() -> Self {
+        Self { tree: Some(TreeSolver::default()), ..Self::default() }
+    }
+
     fn sum_terms(&mut self, problem: &Problem, poses: &[Pose]) {
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
+        // A site speaks for every joint between it and the root: what a hand is seen to do, its arm does.
+        self.sites.clear();
+        self.sites.resize(poses.len(), 0.0);
+        for pair in &correspondences.sites {
+            self.sites[pair.limb] += pair.weight;
+        }
+        for (limb, part) in body.limbs().iter().enumerate().rev() {
+            if let Some((parent, _)) = &part.parent {
+                self.sites[*parent] += self.sites[limb];
+            }
+        }
         self.joint_sigmas.clear();
         for (limb, part) in body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
-            let shown = (correspondences.measured_weight(limb) / SHOWN).clamp(HIDDEN_MOTION, 1.0);
+            let measured = correspondences.limbs[limb].total_weight() + self.sites[limb];
+            let shown = (measured / SHOWN).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.pace * config.motion_scale);
         }
         let root =
@@ -86,6 +113,9 @@ impl WholeBody {
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);
+        }
+        if config.penetration {
+            Penetration { sigma: OVERLAP_SIGMA, share: FREE_SHARE }.add(body, poses, &mut self.normal);
         }
     }
 }

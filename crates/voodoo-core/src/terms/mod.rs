@@ -2,12 +2,14 @@
 
 mod limits;
 mod outline;
+mod penetration;
 mod prior;
 mod sites;
 mod surface;
 
 pub use limits::Limits;
 pub use outline::Outline;
+pub use penetration::Penetration;
 pub use prior::Prior;
 pub(crate) use prior::ShortestAxis;
 pub use sites::Sites;

@@ -1,15 +1,16 @@
 //! The solver (J10 eq. 4): damped pseudo-inverse steps, strictly ordered levels, the image criterion in what is left free.
 
+mod accept;
+mod step;
+
 use std::ops::Range;
 
-use super::goal::{Goal, level_cost, level_ranges, level_rows};
+use super::goal::{Goal, level_cost, level_ranges};
 use super::image::Criterion;
-use super::linear::{Damped, Taken, dot, largest};
+use super::linear::{Damped, Taken};
 use super::model::{Kinematics, Model};
 use crate::geometry::Pose;
 
-/// Least damping, m^2: small beside `J J^T` of anything a person can see, so that the last steps are Newton's.
-const LEAST_DAMPING: f64 = 1e-10;
 /// Residual that a lower level may leave in a higher one, metres.
 const SETTLED: f64 = 1e-10;
 /// Turn that leaves a stationary pose with a residual, radians.
@@ -35,7 +36,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, caution: 0.4, largest_turn: 0.5 }
+        Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, caution: 0.3, largest_turn: 0.5 }
     }
 }
 
@@ -166,7 +167,8 @@ impl Solver {
         report.converged &= rest;
     }
 
-    /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they are as good as before the phase.
+    /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
+    /// are as good as before the phase.
     fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
@@ -230,202 +232,6 @@ impl Solver {
         std::mem::swap(&mut self.cost, &mut self.trial_cost);
         std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
         self.h = self.trial_h;
-    }
-
-    /// One step of the first `count` levels, and of the image; the largest change of an unknown.
-    fn step(&mut self, problem: &Problem, count: usize, image: bool, slack: bool, angles: &mut [f64]) -> f64 {
-        let n = angles.len();
-        self.taken.clear(n);
-        for level in 0..count {
-            self.level_part(problem, level, angles);
-            if level + 1 < count || image {
-                self.taken.take(&self.jacobian);
-            }
-        }
-        if image {
-            self.image_part(problem, count, angles);
-        }
-        let moved = self.advance(problem, count, image, slack, angles);
-        problem.model.normalise(angles);
-        moved
-    }
-
-    /// The part of one level: `(J P)^+ (-e - J d)` after the step `d` of the levels above (Baerlocher and Boulic 2004), cut at
-    /// the limits and solved again without the unknowns that stand there.
-    fn level_part(&mut self, problem: &Problem, level: usize, angles: &[f64]) {
-        let n = angles.len();
-        let goals = &problem.goals[self.levels[level].clone()];
-        level_rows(problem.model, goals, &self.at, &mut self.jacobian, &mut self.residual);
-        self.inherit(level, n);
-        let damping = self.trust[level] * self.cost[level] + LEAST_DAMPING;
-        for attempt in 0..=n {
-            let stage = &self.stages[level * n..(level + 1) * n];
-            self.wanted.clear();
-            let rows = self.jacobian.chunks_exact(n).zip(&self.residual);
-            self.wanted.extend(rows.map(|(row, e)| -e - dot(row, stage)));
-            if attempt == 0 {
-                self.before[level] = dot(&self.wanted, &self.wanted).sqrt();
-            }
-            if self.taken.is_empty() {
-                self.damped.solve(&self.jacobian, &self.wanted, damping, &mut self.part);
-            } else {
-                self.projected.clear();
-                self.projected.extend_from_slice(&self.jacobian);
-                self.projected.chunks_exact_mut(n).for_each(|row| self.taken.project(row));
-                self.damped.solve(&self.projected, &self.wanted, damping, &mut self.part);
-            }
-            if !self.add_part(problem, level, angles) {
-                break;
-            }
-        }
-    }
-
-    /// The image's part: `-alpha (I - J^+ J) grad h` (J10 eq. 4) with Polyak's step `alpha = gain h / |P grad h|^2`, since the
-    /// least `h` is zero. Where the images hardly see the free motion (along the line of sight) the gradient is small and
-    /// says little, so `alpha = gain h / (|P grad h|^2 + (caution reach)^2)`.
-    fn image_part(&mut self, problem: &Problem, count: usize, angles: &[f64]) {
-        let n = angles.len();
-        self.inherit(count, n);
-        let blind = problem.options.caution * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.at));
-        for _ in 0..=n {
-            self.part.copy_from_slice(&self.gradient);
-            self.taken.project(&mut self.part);
-            let square = dot(&self.part, &self.part);
-            if square < 1e-16 {
-                break;
-            }
-            let alpha = self.gain * self.h / (square + blind * blind);
-            self.part.iter_mut().for_each(|value| *value *= -alpha);
-            if !self.add_part(problem, count, angles) {
-                break;
-            }
-        }
-    }
-
-    /// A stage starts from the one before it.
-    fn inherit(&mut self, stage: usize, n: usize) {
-        if stage == 0 {
-            self.stages[..n].fill(0.0);
-        } else {
-            self.stages.copy_within((stage - 1) * n..stage * n, stage * n);
-        }
-    }
-
-    /// Adds the part to a stage as far as the limits allow; true when one was hit, whose unknown then is taken.
-    fn add_part(&mut self, problem: &Problem, stage: usize, angles: &[f64]) -> bool {
-        let n = angles.len();
-        let most = largest(&self.part);
-        if !most.is_finite() {
-            return false;
-        }
-        let mut share = (problem.options.largest_turn / most.max(problem.options.largest_turn)).min(1.0);
-        let step = &mut self.stages[stage * n..(stage + 1) * n];
-        let mut hit = None;
-        for (i, [low, high]) in problem.model.limits().iter().enumerate() {
-            let (from, by) = (angles[i] + step[i], self.part[i]);
-            let room = if by < -1e-15 {
-                low - from
-            } else if by > 1e-15 {
-                high - from
-            } else {
-                continue;
-            };
-            if share * by.abs() > room.abs() {
-                share = (room / by).max(0.0);
-                hit = Some(i);
-            }
-        }
-        step.iter_mut().zip(&self.part).for_each(|(step, part)| *step += share * part);
-        hit.is_some_and(|unknown| self.taken.pin(unknown))
-    }
-
-    /// Takes the whole step, or as much of it as leaves no level worse than those above it must make it.
-    fn advance(&mut self, problem: &Problem, count: usize, image: bool, slack: bool, angles: &mut [f64]) -> f64 {
-        let n = angles.len();
-        let last = if image { count } else { count.saturating_sub(1) };
-        if count == 0 && !image {
-            return 0.0;
-        }
-        self.propose(problem, angles, last, 1.0);
-        self.evaluate(problem, true);
-        let Some(failed) = self.first_failure(n, count, image, slack, last) else {
-            for level in 0..count {
-                // Slow progress is the sign of a goal out of reach, where less damping would overshoot.
-                let shrink = if self.trial_cost[level] < 0.9 * self.cost[level] { 0.3 } else { 0.8 };
-                self.trust[level] = (shrink * self.trust[level]).max(1e-6);
-            }
-            self.gain = (1.5 * self.gain).min(problem.options.gain);
-            return self.take_trial(angles);
-        };
-        if failed < count {
-            self.trust[failed] = (4.0 * self.trust[failed]).min(1e6);
-        } else {
-            self.gain *= 0.5;
-        }
-        // Without what is below; then a quarter of its own part; then nothing but the levels above.
-        for (stage, share) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
-            if (stage == last && share == 1.0) || (stage == 0 && share == 0.0) {
-                continue;
-            }
-            self.propose(problem, angles, stage, share);
-            self.evaluate(problem, true);
-            if (share == 0.0 && slack)
-                || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
-            {
-                return self.take_trial(angles);
-            }
-        }
-        // A refused step is not rest: more damping comes next.
-        if self.trust[0] < 1e5 { f64::INFINITY } else { 0.0 }
-    }
-
-    fn propose(&mut self, problem: &Problem, angles: &[f64], stage: usize, share: f64) {
-        let n = angles.len();
-        let limits = problem.model.limits();
-        for i in 0..n {
-            let above = if stage == 0 { 0.0 } else { self.stages[(stage - 1) * n + i] };
-            let step = above + share * (self.stages[stage * n + i] - above);
-            // The clamp only takes off rounding: stages end at the limits.
-            self.trial[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
-        }
-    }
-
-    /// The first level that the trial leaves worse than it was before its own part, beyond the second-order effect of the
-    /// others' parts; `count` stands for the image.
-    fn first_failure(&self, n: usize, count: usize, image: bool, slack: bool, stage: usize) -> Option<usize> {
-        let length = |from: Option<usize>| -> f64 {
-            let step = &self.stages[stage * n..(stage + 1) * n];
-            (0..n).map(|i| step[i] - from.map_or(0.0, |from| self.stages[from * n + i])).map(|d| d * d).sum()
-        };
-        for level in 0..count.min(stage + 1) {
-            let rise = match level {
-                0 if stage == 0 => 0.0,
-                0 => length(Some(0)),
-                _ => length(None),
-            };
-            let limit = match self.best.get(level) {
-                Some(best) if !slack => (best + 0.1 * SETTLED).max(self.before[level]),
-                _ => self.before[level] + rise + 1e-13,
-            };
-            let residual = self.trial_cost[level].sqrt();
-            if residual.is_nan() || residual > limit {
-                return Some(level);
-            }
-        }
-        if image && stage == self.levels.len() {
-            let above = if stage == 0 { 0.0 } else { dot(&self.gradient, &self.stages[(stage - 1) * n..stage * n]) };
-            if self.trial_h.is_nan() || self.trial_h > self.h + above.max(0.0) + 1e-9 {
-                return Some(self.levels.len());
-            }
-        }
-        None
-    }
-
-    fn take_trial(&mut self, angles: &mut [f64]) -> f64 {
-        let moved = angles.iter().zip(&self.trial).fold(0.0_f64, |most, (old, new)| most.max((old - new).abs()));
-        angles.copy_from_slice(&self.trial);
-        self.accept();
-        moved
     }
 
     fn nudge(&mut self, problem: &Problem, angles: &mut [f64]) {

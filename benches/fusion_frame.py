@@ -1,0 +1,100 @@
+"""Where the time of a fused frame goes: depth, skin, 2-D keypoints and a laser scan, from images to the estimate.
+
+    python benches/fusion_frame.py [RECORDING]
+
+The recording (default: the bundled one, time of flight 176x144, colour 320x240, laser) gets simulated keypoints of its own
+reference in the colour picture. Pictures are decoded beforehand. Prints CPU milliseconds of one thread, mean over the
+frames that have a picture.
+"""
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+import voodoo
+from voodoo.keypoints import LAYOUTS
+from voodoo.recordings import ColorImage, KeypointImage, RecordedFrame, open_recording, sample_path
+from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+from voodoo.sensors.pixels import in_sensor
+
+
+def keypoints(item: ColorImage, positions: dict[str, np.ndarray], chance: np.random.Generator) -> KeypointImage:
+    """A person of COCO's seventeen keypoints, 3 px noise."""
+    names = {"l_shoulder": 5, "r_shoulder": 6, "l_elbow": 7, "r_elbow": 8, "l_wrist": 9, "r_wrist": 10}
+    names |= {"l_hip": 11, "r_hip": 12, "l_knee": 13, "r_knee": 14, "l_ankle": 15, "r_ankle": 16}
+    person = np.zeros((17, 3))
+    for name, row in names.items():
+        pixel = item.camera.project(in_sensor(item.root_from_sensor, positions[name][None]))[0]
+        person[row] = [*(pixel + chance.normal(0.0, 3.0, 2)), 0.9]
+    return KeypointImage(
+        sensor="keypoints",
+        stamp=item.stamp,
+        layout="coco17",
+        people=(person,),
+        camera=item.camera,
+        root_from_sensor=item.root_from_sensor,
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recording", type=Path, nargs="?", default=sample_path())
+    options = parser.parse_args()
+    cv2.setNumThreads(1)
+    if "coco17" not in LAYOUTS:
+        raise SystemExit("expected the layout coco17")
+    recording = open_recording(options.recording)
+    chance = np.random.default_rng(3)
+    frames: list[RecordedFrame] = []
+    for index, recorded in enumerate(paired(recording)):
+        items = list(recorded.measurements)
+        for item in recorded.measurements:
+            if isinstance(item, ColorImage):
+                _ = item.image
+                names, places = recording.reference.names, recording.reference.positions[index]
+                items.append(keypoints(item, dict(zip(names, places, strict=True)), chance))
+        frames.append(replace(recorded, measurements=tuple(items)))
+    body = voodoo.Body.human(height=recording.start["height_m"], model="full")
+    tracker = voodoo.Tracker(body)
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    spent = {"whole frame": 0.0, "of it the tracker's step": 0.0, "skin: body in the picture": 0.0}
+    spent |= {"skin: regions and their names": 0.0, "skin: learning": 0.0, "keypoints": 0.0}
+    parts = {
+        "of it the tracker's step": (tracker, "step"),
+        "keypoints": (front_end, "_add_keypoints"),
+    }
+
+    def timed(label, function):
+        def run(*arguments, **named):
+            began = time.process_time()
+            try:
+                return function(*arguments, **named)
+            finally:
+                spent[label] += time.process_time() - began
+
+        return run
+
+    for label, (owner, name) in parts.items():
+        setattr(owner, name, timed(label, getattr(owner, name)))
+    import voodoo.sensors.front_end as module
+    from voodoo.sensors.skin import SkinTracker
+
+    module.body_view = timed("skin: body in the picture", module.body_view)
+    SkinTracker.observe = timed("skin: regions and their names", SkinTracker.observe)
+    SkinTracker.learn = timed("skin: learning", SkinTracker.learn)
+    for recorded in frames:
+        began = time.process_time()
+        front_end.step(recorded)
+        spent["whole frame"] += time.process_time() - began
+    for label, seconds in spent.items():
+        print(f"{label:32s} {1e3 * seconds / len(frames):6.2f} ms")
+    print(f"{len(frames)} frames, {len(frames) / spent['whole frame']:.0f} Hz of one thread")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+//! What of a step is taken: no level may become worse than those above it must make it.
+
+use super::super::linear::dot;
+use super::{Problem, SETTLED, Solver};
+
+impl Solver {
+    /// Takes the whole step, or as much of it as leaves no level worse than those above it must make it.
+    pub(super) fn advance(
+        &mut self,
+        problem: &Problem,
+        count: usize,
+        image: bool,
+        slack: bool,
+        angles: &mut [f64],
+    ) -> f64 {
+        let n = angles.len();
+        let last = if image { count } else { count.saturating_sub(1) };
+        if count == 0 && !image {
+            return 0.0;
+        }
+        self.propose(problem, angles, last, 1.0);
+        self.evaluate(problem, true);
+        let Some(failed) = self.first_failure(n, count, image, slack, last) else {
+            for level in 0..count {
+                // Slow progress is the sign of a goal out of reach, where less damping would overshoot.
+                let shrink = if self.trial_cost[level] < 0.9 * self.cost[level] { 0.3 } else { 0.8 };
+                self.trust[level] = (shrink * self.trust[level]).max(1e-6);
+            }
+            self.gain = (1.5 * self.gain).min(problem.options.gain);
+            return self.take_trial(angles);
+        };
+        if failed < count {
+            self.trust[failed] = (4.0 * self.trust[failed]).min(1e6);
+        } else {
+            self.gain *= 0.5;
+        }
+        // Without what is below; then a quarter of its own part; then nothing but the levels above.
+        for (stage, share) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
+            if (stage == last && share == 1.0) || (stage == 0 && share == 0.0) {
+                continue;
+            }
+            self.propose(problem, angles, stage, share);
+            self.evaluate(problem, true);
+            if (share == 0.0 && slack)
+                || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
+            {
+                return self.take_trial(angles);
+            }
+        }
+        // A refused step is not rest: more damping comes next.
+        if self.trust[0] < 1e5 { f64::INFINITY } else { 0.0 }
+    }
+
+    fn propose(&mut self, problem: &Problem, angles: &[f64], stage: usize, share: f64) {
+        let n = angles.len();
+        let limits = problem.model.limits();
+        for i in 0..n {
+            let above = if stage == 0 { 0.0 } else { self.stages[(stage - 1) * n + i] };
+            let step = above + share * (self.stages[stage * n + i] - above);
+            // The clamp only takes off rounding: stages end at the limits.
+            self.trial[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
+        }
+    }
+
+    /// The first level that the trial leaves worse than it was before its own part, beyond the second-order effect of the
+    /// others' parts; `count` stands for the image.
+    fn first_failure(&self, n: usize, count: usize, image: bool, slack: bool, stage: usize) -> Option<usize> {
+        let length = |from: Option<usize>| -> f64 {
+            let step = &self.stages[stage * n..(stage + 1) * n];
+            (0..n).map(|i| step[i] - from.map_or(0.0, |from| self.stages[from * n + i])).map(|d| d * d).sum()
+        };
+        for level in 0..count.min(stage + 1) {
+            let rise = match level {
+                0 if stage == 0 => 0.0,
+                0 => length(Some(0)),
+                _ => length(None),
+            };
+            let limit = match self.best.get(level) {
+                Some(best) if !slack => (best + 0.1 * SETTLED).max(self.before[level]),
+                _ => self.before[level] + rise + 1e-13,
+            };
+            let residual = self.trial_cost[level].sqrt();
+            if residual.is_nan() || residual > limit {
+                return Some(level);
+            }
+        }
+        if image && stage == self.levels.len() {
+            let above = if stage == 0 { 0.0 } else { dot(&self.gradient, &self.stages[(stage - 1) * n..stage * n]) };
+            if self.trial_h.is_nan() || self.trial_h > self.h + above.max(0.0) + 1e-9 {
+                return Some(self.levels.len());
+            }
+        }
+        None
+    }
+
+    fn take_trial(&mut self, angles: &mut [f64]) -> f64 {
+        let moved = angles.iter().zip(&self.trial).fold(0.0_f64, |most, (old, new)| most.max((old - new).abs()));
+        angles.copy_from_slice(&self.trial);
+        self.accept();
+        moved
+    }
+}

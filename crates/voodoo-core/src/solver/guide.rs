@@ -1,0 +1,76 @@
+//! Named sites lead: before a solver that moves each limb alone sees a frame, the joint chain follows the sites.
+//!
+//! A position of a hand says something about the whole arm, but a limb alone hears of it one joint a step (K06 IV-B.7). Here
+//! the sites with positions and rays move the chain as one, each joint by no more than its motion allows (R07, J10).
+
+use super::{ChainSolver, Problem};
+use crate::body::Body;
+use crate::chain::{joint_turn, place};
+use crate::geometry::Pose;
+use crate::normal::Normal;
+use crate::terms::{Limits, Prior, Sites, Term};
+
+/// Standard deviation of a violated joint limit, radians.
+const LIMIT_SIGMA: f64 = 0.05;
+/// Relative damping of the normal matrix.
+const DAMPING: f64 = 1e-3;
+/// Share of the sites' information that leads: the limbs' own points have their say afterwards.
+const LED: f64 = 0.1;
+/// Scale of the kernel, metres: sites that are led come from far.
+const SCALE: f64 = 0.5;
+
+/// Damped Gauss-Newton steps on the sites alone.
+#[derive(Debug, Default)]
+pub struct Guide {
+    normal: Normal,
+    chain: ChainSolver,
+    joint_sigmas: Vec<f64>,
+    /// The poses with their joints closed: before the frame, now, and before the last step.
+    start: Vec<Pose>,
+    closed: Vec<Pose>,
+    before: Vec<Pose>,
+}
+
+impl Guide {
+    /// One step: the limbs move as those of a body with closed joints would; gaps that the bands left stay as they are.
+    pub fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
+        let Problem { body, correspondences, config, .. } = problem;
+        if problem.step == 0 {
+            self.start.clear();
+            self.start.extend_from_slice(poses);
+            close(body, &mut self.start);
+            self.closed.clone_from(&self.start);
+        }
+        let pace = problem.pace * config.motion_scale;
+        self.joint_sigmas.clear();
+        self.joint_sigmas
+            .extend(body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * pace));
+        let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * pace);
+        self.normal.clear(poses.len());
+        let information = LED / (config.point_sigma * config.point_sigma);
+        let terms: [&dyn Term; 3] = [
+            &Sites { correspondences, information, scale: SCALE },
+            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas },
+            &Limits { sigma: LIMIT_SIGMA },
+        ];
+        for term in terms {
+            term.add(body, &self.closed, &mut self.normal);
+        }
+        self.before.clone_from(&self.closed);
+        self.chain.step(body, &self.normal, DAMPING, &mut self.closed);
+        for ((pose, before), after) in poses.iter_mut().zip(&self.before).zip(&self.closed) {
+            *pose = *after * before.inverse() * *pose;
+            pose.rotation = pose.rotation.normalize();
+        }
+    }
+}
+
+/// Closes the joints from the root outwards, orientations kept.
+fn close(body: &Body, poses: &mut [Pose]) {
+    for (index, limb) in body.limbs().iter().enumerate() {
+        if let Some((parent, joint)) = &limb.parent {
+            let turn = joint_turn(joint, &poses[*parent], &poses[index]);
+            poses[index] = place(joint, &poses[*parent], turn);
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! All limbs at once with the elastic bands kept (K07 section 4): every limb has a twist of its own, and the normal matrix
+//! has the shape of the body's tree, so that elimination from the leaves to the root solves it in time linear in the limbs.
+
+use nalgebra::{Cholesky, Matrix6, Vector6};
+
+use crate::body::{Body, Joint, JointKind};
+use crate::chain::exp;
+use crate::geometry::{Pose, Vec3};
+use crate::normal::{LimbBlock, Normal, line};
+
+/// Largest turn of a limb in one step, radians.
+const LARGEST_TURN: f64 = 0.5;
+/// Information every unknown has from the start, so that nothing is singular.
+const FLOOR: f64 = 1e-6;
+
+/// The system of one step, and its solution.
+#[derive(Debug, Default)]
+pub struct TreeSolver {
+    /// Parent of each limb, always before it; the root is its own.
+    pub parent: Vec<usize>,
+    /// A limb's own block of the matrix and half the gradient of its twist.
+    pub own: Vec<LimbBlock>,
+    /// The block of the matrix between a limb (rows) and its parent (columns); unused for the root.
+    pub mixed: Vec<Matrix6<f64>>,
+    /// The step of every limb's twist (working frame).
+    pub twist: Vec<Vector6<f64>>,
+}
+
+impl TreeSolver {
+    /// One damped step from the normal equations at `poses`; `band_sigma` is a band's standard deviation, metres.
+    pub fn step(&mut self, body: &Body, normal: &Normal, damping: f64, band_sigma: f64, poses: &mut [Pose]) {
+        self.assemble(body, normal, damping, 1.0 / (band_sigma * band_sigma), poses);
+        if !self.solve() {
+            return;
+        }
+        let turn = |twist: &Vector6<f64>| twist.fixed_rows::<3>(0).amax();
+        let largest = self.twist.iter().map(turn).fold(0.0_f64, f64::max);
+        let shrink = LARGEST_TURN / largest.max(LARGEST_TURN);
+        for (pose, twist) in poses.iter_mut().zip(&self.twist) {
+            *pose = exp(&(twist * shrink)) * *pose;
+            pose.rotation = pose.rotation.normalize();
+        }
+    }
+
+    fn assemble(&mut self, body: &Body, normal: &Normal, damping: f64, strength: f64, poses: &[Pose]) {
+        self.parent.clear();
+        self.parent.extend(body.limbs().iter().map(|limb| limb.parent.as_ref().map_or(0, |(parent, _)| *parent)));
+        self.own.clone_from(&normal.limbs);
+        for block in &mut self.own {
+            for i in 0..6 {
+                block.h[(i, i)] += damping * block.h[(i, i)] + FLOOR;
+            }
+        }
+        self.mixed.clear();
+        self.mixed.resize(poses.len(), Matrix6::zeros());
+        for (child, limb) in body.limbs().iter().enumerate() {
+            let Some((parent, joint)) = &limb.parent else { continue };
+            for end in bands(joint) {
+                let on_child = poses[child] * (joint.limb_from_joint * end);
+                let on_parent = poses[*parent] * (joint.parent_from_joint * end);
+                self.add_band([child, *parent], strength, on_child, on_parent);
+            }
+            self.add_turn([child, *parent], normal);
+        }
+    }
+
+    /// A band between `on_child` and `on_parent`: `d = x_child - x_parent`, three rows.
+    fn add_band(&mut self, [child, parent]: [usize; 2], strength: f64, on_child: Vec3, on_parent: Vec3) {
+        let gap = on_child - on_parent;
+        for (axis, d) in Vec3::AXES.into_iter().zip(gap.to_array()) {
+            let (moves, follows) = (line(on_child, axis), line(on_parent, axis));
+            self.own[child].add_row(strength, &moves, d);
+            self.own[parent].add_row(strength, &-follows, d);
+            self.mixed[child].ger(-strength, &moves, &follows, 1.0);
+        }
+    }
+
+    /// What the terms say about the joint's relative turn `omega_child - omega_parent`.
+    fn add_turn(&mut self, [child, parent]: [usize; 2], normal: &Normal) {
+        let joint = &normal.joints[child];
+        for i in 0..3 {
+            self.own[child].g[i] += joint.g[i];
+            self.own[parent].g[i] -= joint.g[i];
+            for j in 0..3 {
+                self.own[child].h[(i, j)] += joint.h[(i, j)];
+                self.own[parent].h[(i, j)] += joint.h[(i, j)];
+                self.mixed[child][(i, j)] -= joint.h[(i, j)];
+            }
+        }
+    }
+
+    /// Eliminates every limb into its parent, leaves first, then finds the twists from the root on. False, and no twist to
+    /// be used, when the matrix is not positive definite. `own` and `mixed` are used up.
+    pub fn solve(&mut self) -> bool {
+        let Self { parent, own, mixed, twist } = self;
+        twist.clear();
+        twist.resize(own.len(), Vector6::zeros());
+        for limb in (0..own.len()).rev() {
+            let Some(factor) = Cholesky::new(own[limb].h) else { return false };
+            twist[limb] = -factor.solve(&own[limb].g);
+            if limb == 0 {
+                break;
+            }
+            // x = -H^-1 g - H^-1 M x_parent; what remains for the parent is the Schur complement.
+            let carried = factor.solve(&mixed[limb]);
+            let above = &mut own[parent[limb]];
+            above.h -= mixed[limb].tr_mul(&carried);
+            above.g += mixed[limb].tr_mul(&twist[limb]);
+            mixed[limb] = carried;
+        }
+        for limb in 1..own.len() {
+            let follows = mixed[limb] * twist[parent[limb]];
+            twist[limb] -= follows;
+        }
+        twist.iter().all(|twist| twist.iter().all(|value| value.is_finite()))
+    }
+}
+
+/// Ends of the bands that hold a joint together, joint frame: a hinge's two, so that it turns about its axis only, else one
+/// at the centre. Strong bands at the four ends of an ellipse would let it turn no more; how far it may is the limits' say.
+fn bands(joint: &Joint) -> impl Iterator<Item = Vec3> + use<> {
+    let count = if joint.kind() == JointKind::Hinge { 2 } else { 1 };
+    let centre = joint.kind() == JointKind::Elliptic;
+    joint.band_points().take(count).map(move |end| if centre { Vec3::ZERO } else { end })
+}

@@ -1,0 +1,97 @@
+//! Limbs do not pass through each other: points of a limb's axis keep their own radius from the surfaces of other limbs.
+
+use super::Term;
+use crate::body::Body;
+use crate::geometry::{Pose, Vec3};
+use crate::normal::Normal;
+use crate::shape::TaperedEllipticCylinder;
+
+/// Where on a limb's axis it is felt, as shares of the length.
+const FELT: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
+/// Error of `approximate_distance` that is allowed for before the exact distance is asked, metres.
+const APPROXIMATE: f64 = 0.01;
+
+/// One-sided: `r = max(0, share * radius - distance)` for every felt point against every limb that is neither joined to its
+/// own nor hangs on the same parent. Those overlap at their joints in any pose.
+#[derive(Debug)]
+pub struct Penetration {
+    /// Standard deviation of the overlap, metres.
+    pub sigma: f64,
+    /// Share of the lesser local semi-axis that is kept free: limbs are soft, and fatter here than they are.
+    pub share: f64,
+}
+
+impl Term for Penetration {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
+        let limbs = body.limbs();
+        for first in 1..limbs.len() {
+            for second in 0..first {
+                if apart(body, first, second)
+                    && near(&limbs[first].shape, &poses[first], &limbs[second].shape, &poses[second])
+                {
+                    self.add_points(body, poses, [first, second], normal);
+                    self.add_points(body, poses, [second, first], normal);
+                }
+            }
+        }
+    }
+}
+
+impl Penetration {
+    /// Points of `limb` against the surface of `other`.
+    fn add_points(&self, body: &Body, poses: &[Pose], [limb, other]: [usize; 2], normal: &mut Normal) {
+        let (shape, surface) = (&body.limbs()[limb].shape, &body.limbs()[other].shape);
+        let weight = 1.0 / (self.sigma * self.sigma);
+        let start = poses[other].inverse_transform_point(poses[limb].translation);
+        let along = poses[other].rotation.inverse() * (poses[limb].rotation * Vec3::Z);
+        for share in FELT {
+            let z = share * shape.length();
+            let free = self.share * shape.least_radius(z);
+            let local = start + along * z;
+            if far(surface, local, free) || surface.approximate_distance(local) > free + APPROXIMATE {
+                continue;
+            }
+            let found = surface.closest_point(local);
+            let overlap = free - found.signed_distance;
+            if overlap <= 0.0 {
+                continue;
+            }
+            // The distance grows as the point moves along the normal, and as the surface moves against it.
+            let row = crate::normal::line(poses[other] * local, poses[other].rotation * found.normal);
+            normal.cost += weight * overlap * overlap;
+            // The mixed block of the two twists is left out: the system is one of single limbs and joints.
+            normal.limbs[limb].add_row(weight, &-row, overlap);
+            normal.limbs[other].add_row(weight, &row, overlap);
+        }
+    }
+}
+
+/// True when two limbs are neither joined nor joined to the same parent.
+fn apart(body: &Body, first: usize, second: usize) -> bool {
+    let parent = |limb: usize| body.limbs()[limb].parent.as_ref().map(|(parent, _)| *parent);
+    !body.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
+}
+
+/// Whether a point, limb frame, lies outside the box around the shape enlarged by `margin`.
+fn far(shape: &TaperedEllipticCylinder, q: Vec3, margin: f64) -> bool {
+    q.x.abs() > shape.a0().max(shape.a1()) + margin
+        || q.y.abs() > shape.b0().max(shape.b1()) + margin
+        || q.z < -margin
+        || q.z > shape.length() + margin
+}
+
+/// Whether the spheres around two limbs meet.
+fn near(
+    first: &TaperedEllipticCylinder,
+    world_from_first: &Pose,
+    second: &TaperedEllipticCylinder,
+    world_from_second: &Pose,
+) -> bool {
+    let sphere = |shape: &TaperedEllipticCylinder, pose: &Pose| {
+        let half = 0.5 * shape.length();
+        let radius = shape.a0().max(shape.a1()).max(shape.b0()).max(shape.b1());
+        (*pose * (Vec3::Z * half), half.hypot(radius))
+    };
+    let ((from, reach), (to, other_reach)) = (sphere(first, world_from_first), sphere(second, world_from_second));
+    (to - from).length_squared() < (reach + other_reach).powi(2)
+}

@@ -1,0 +1,115 @@
+"""J10's experiment, limb by limb: trunk and wrists (ankles) known, elbows (knees) estimated from the first frame on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+import voodoo
+from voodoo import ik
+
+LIMBS = {
+    f"{side}_{joint}": (tuple(f"{side}_{limb}" for limb in limbs), f"{side}_{first}", f"{side}_{last}")
+    for side in "lr"
+    for joint, limbs, first, last in (
+        ("elbow", ("upperarm", "forearm"), "shoulder", "wrist"),
+        ("knee", ("thigh", "calf"), "hip", "ankle"),
+    )
+}
+"""Estimated joint -> limbs of its chain, and the known joints at its ends."""
+TRUNK = ("l_shoulder", "r_shoulder", "vc7", "l_hip", "r_hip")
+
+Truth = Mapping[str, np.ndarray]
+Silhouettes = Callable[[int, Mapping[str, np.ndarray]], Sequence[ik.Silhouette]]
+"""Of a frame, given where the estimated joints (3,) were last."""
+
+
+def rotation(local: np.ndarray, world: np.ndarray) -> np.ndarray:
+    """The rotation (3, 3) that turns points (N, 3) best (Kabsch)."""
+    u, _, vt = np.linalg.svd((local - local.mean(0)).T @ (world - world.mean(0)))
+    return vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
+
+
+def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **options: float) -> dict[str, np.ndarray]:
+    """Positions (F, 3) of elbows and knees, each a chain of two limbs on the trunk that ends at its known joint.
+
+    Args:
+        truth: site -> positions (F, 3) [m]; the ten-limb body is sized by the frame whose limbs are as long as usual (the
+            first one, if the truth is exact).
+        height: stature [m].
+        silhouettes: None: plain inverse kinematics.
+        **options: of ik.Options.
+    """
+    tracker = voodoo.Tracker(voodoo.Body.human(height=height, model="papers"))
+    frames = sorted({0, typical_frame(truth)}, reverse=True)
+    for frame in frames:
+        joints = {name: places[frame] for name, places in truth.items()}
+        estimate = tracker.reset(joints=joints, fit_sizes=frame == frames[0])
+    torso = estimate.world_from_limb["torso"]
+    local = {name: (np.linalg.inv(torso) @ [*places[0], 1.0])[:3] for name, places in truth.items()}
+    trunk = [name for name in TRUNK if name in truth]
+    followers = {}
+    for joint, (limbs, _, _) in LIMBS.items():
+        chain = ik.Chain(tracker.body, limbs=limbs)
+        start = chain.project(estimate.world_from_limb, world_from_base=torso, closest=False)
+        followers[joint] = ik.Follower(chain, start=start, **options)
+    last = {joint: truth[joint][0] for joint in LIMBS}
+    found: dict[str, list[np.ndarray]] = {joint: [] for joint in LIMBS}
+    for frame in range(len(truth["l_hip"])):
+        images = [] if silhouettes is None else silhouettes(frame, last)
+        base = np.eye(4)
+        base[:3, :3] = rotation(
+            np.stack([local[name] for name in trunk]), np.stack([truth[name][frame] for name in trunk])
+        )
+        for joint, (_, first, end) in LIMBS.items():
+            base[:3, 3] = truth[first][frame] - base[:3, :3] @ local[first]
+            posture = followers[joint].step({end: truth[end][frame]}, images=images, world_from_base=base)
+            last[joint] = posture.joints[joint]
+            found[joint].append(last[joint])
+    return {joint: np.array(places) for joint, places in found.items()}
+
+
+def limb_lengths(truth: Truth) -> dict[str, np.ndarray]:
+    """Lengths (F, 2) [m] of the two limbs of every chain."""
+    return {
+        joint: np.stack([np.linalg.norm(truth[joint] - truth[end], axis=1) for end in (first, last)], axis=1)
+        for joint, (_, first, last) in LIMBS.items()
+    }
+
+
+def typical_frame(truth: Truth) -> int:
+    """The frame whose limbs are nearest to their median lengths; the first one if all are as near."""
+    lengths = np.concatenate(list(limb_lengths(truth).values()), axis=1).round(3)
+    return int(np.argmin(np.square(lengths - np.median(lengths, axis=0)).sum(axis=1)))
+
+
+def reachable(truth: Truth) -> dict[str, np.ndarray]:
+    """The places (F, 3) nearest to every estimated joint that limbs of the median lengths can reach between the known ends.
+
+    With exact truth these are the joints themselves; triangulated limbs change their lengths from frame to frame.
+    """
+    found = {}
+    for joint, (_, first, last) in LIMBS.items():
+        upper, lower = np.median(limb_lengths(truth)[joint], axis=0)
+        axis = truth[last] - truth[first]
+        distance = np.linalg.norm(axis, axis=1)[:, None]
+        axis = axis / distance
+        straight = np.minimum(distance, upper + lower)
+        along = (straight**2 + upper**2 - lower**2) / (2.0 * straight)
+        radius = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
+        offset = truth[joint] - truth[first]
+        across = offset - (offset * axis).sum(axis=1)[:, None] * axis
+        found[joint] = truth[first] + along * axis + radius * across / np.linalg.norm(across, axis=1)[:, None]
+    return found
+
+
+def errors(found: Mapping[str, np.ndarray], truth: Truth) -> dict[str, np.ndarray]:
+    """Distance (F,) [m] of every estimated joint from its truth."""
+    return {joint: np.linalg.norm(places - truth[joint], axis=1) for joint, places in found.items()}
+
+
+def row(name: str, joint: str, variants: Sequence[Mapping[str, np.ndarray]]) -> str:
+    """A row of the table: mean error [mm] over both sides, for each way to solve."""
+    means = [1e3 * np.mean([error[f"{side}_{joint}"] for side in "lr"]) for error in variants]
+    return f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |"

@@ -1,0 +1,112 @@
+"""Bodies, or parts of them, with exact joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo import _core
+from voodoo.body import Body
+from voodoo.errors import MeasurementError
+from voodoo.ik.image import Silhouette
+from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, named, vector
+
+
+class Chain:
+    """A body, or limbs of one that hang together, with exact joints; made from any Body, hence from TOML."""
+
+    def __init__(self, body: Body, *, limbs: Sequence[str] = (), root: Literal["free", "fixed"] | None = None) -> None:
+        """Lay out the joint angles.
+
+        Args:
+            body: any body.
+            limbs: limb names; () for all of them. All but the first must hang on another one of them.
+            root: "free": the first limb's pose are six unknowns; "fixed": it stands still (a whole body) or turns in its
+                joint to a base that does (chosen limbs). None: free for a whole body, fixed for chosen limbs.
+
+        Raises:
+            BodyError: an unknown limb, or limbs that do not hang together.
+            MeasurementError: another word for root.
+        """
+        root = root if root is not None else ("fixed" if limbs else "free")
+        if root not in ("free", "fixed"):
+            raise MeasurementError(f'root: expected "free" or "fixed", found {root!r}')
+        self.body = body
+        self._core = _core.Chain(body.core, list(limbs), root == "free")
+        self.angle_names: tuple[str, ...] = tuple(self._core.angle_names)
+        self.limb_names: tuple[str, ...] = tuple(self._core.limb_names)
+        self.site_names: tuple[str, ...] = tuple(self._core.site_names)
+        self.limits: FloatArray = np.array(self._core.limits, dtype=np.float64).reshape(-1, 2)
+        self.limits.setflags(write=False)
+
+    @property
+    def core(self) -> _core.Chain:
+        """The chain of the compiled core."""
+        return self._core
+
+    def rest(self) -> FloatArray:
+        """The angles (n,) at rest: zeros, moved into the limits."""
+        return np.clip(np.zeros(len(self.angle_names)), self.limits[:, 0], self.limits[:, 1])
+
+    def forward(
+        self, angles: npt.ArrayLike, *, world_from_base: npt.ArrayLike | None = None
+    ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray]]:
+        """Poses (4, 4) of the limbs and positions (3,) [m] of the sites at angles (n,).
+
+        Raises:
+            MeasurementError: the angles are not n finite numbers, or the base is not rigid.
+        """
+        poses, sites = self._core.forward(base_pose(world_from_base), vector(angles))
+        return named(self.limb_names, poses), named(self.site_names, sites)
+
+    def jacobian(self, site: str, angles: npt.ArrayLike, *, world_from_base: npt.ArrayLike | None = None) -> FloatArray:
+        """Derivative (3, n) of the position of a site by the angles (J10 eq. 2).
+
+        Raises:
+            BodyError: the site is not on the chain.
+            MeasurementError: the angles are not n finite numbers, or the base is not rigid.
+        """
+        return self._core.jacobian(base_pose(world_from_base), vector(angles), site)
+
+    def project(
+        self,
+        world_from_limb: Mapping[str, npt.ArrayLike],
+        *,
+        world_from_base: npt.ArrayLike | None = None,
+        closest: bool = True,
+    ) -> FloatArray:
+        """Angles (n,) of a pose of the whole body whose joints may be apart (the papers' elastic bands).
+
+        Args:
+            world_from_limb: rigid (4, 4) of every limb of the body.
+            world_from_base: where the chain is rooted.
+            closest: of the closed chain nearest to the pose in the least-squares sense; else only read each joint's turn.
+
+        Raises:
+            MeasurementError: a limb is missing, or a matrix is not rigid.
+        """
+        missing = [name for name in self.body.limb_names if name not in world_from_limb]
+        if missing:
+            raise MeasurementError(f"world_from_limb: expected every limb of the body, found no {', '.join(missing)}")
+        poses = [np.asarray(world_from_limb[name], dtype=np.float64) for name in self.body.limb_names]
+        return np.array(self._core.project(base_pose(world_from_base), poses, closest), dtype=np.float64)
+
+    def criterion(
+        self,
+        angles: npt.ArrayLike,
+        images: Sequence[Silhouette],
+        *,
+        world_from_base: npt.ArrayLike | None = None,
+        margin: float = 1.1,
+        bones: Sequence[Bone] | None = None,
+    ) -> tuple[float, FloatArray]:
+        """The image criterion h [px] and its gradient (n,) (J10 eq. 5, 8); see `solve` for the arguments."""
+        views = [image.core for image in images if not image.empty]
+        return self._core.criterion(base_pose(world_from_base), vector(angles), listed_bones(bones), margin, views)
+
+    def __repr__(self) -> str:
+        """Limbs and unknowns."""
+        return f"Chain({', '.join(self.limb_names)}; {len(self.angle_names)} angles)"

@@ -1,0 +1,84 @@
+"""Calibrated silhouettes and their signed Euclidean distance transform."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo import _core
+from voodoo.camera import Camera
+from voodoo.errors import MeasurementError
+
+_UNDISTORTED = 0.5
+
+
+class Silhouette:
+    """The person's outline in one calibrated picture, as its Euclidean distance transform (J10 section 3)."""
+
+    def __init__(self, mask: npt.ArrayLike, *, camera: Camera, world_from_camera: npt.ArrayLike) -> None:
+        """Transform a mask; lens distortion is taken out of it first.
+
+        Args:
+            mask: (height, width), true (or not 0) where the person is.
+            camera: its calibration.
+            world_from_camera: rigid (4, 4) pose of the optical frame.
+
+        Raises:
+            MeasurementError: the mask has not the camera's size, or the pose is not rigid.
+        """
+        person = np.asarray(mask)
+        if person.shape != (camera.height, camera.width):
+            raise MeasurementError(
+                f"mask: expected shape {(camera.height, camera.width)} of its camera, found {person.shape}"
+            )
+        person = (person != 0).astype(np.uint8)
+        if camera.distorted:
+            person = _undistorted(person, camera)
+        self.camera = camera
+        self.distance: npt.NDArray[np.float32] = signed_distance(person)
+        self.distance.setflags(write=False)
+        # A picture without the person says nothing; it takes no part.
+        self.empty = not person.any()
+        pose = np.asarray(world_from_camera, dtype=np.float64)
+        if pose.shape != (4, 4) or not np.isfinite(pose).all():
+            raise MeasurementError(f"world_from_camera: expected a rigid 4x4 transform, found {world_from_camera!r}")
+        intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
+        # The core checks that the pose is rigid, so the inverse is the transposed one.
+        inverse = np.eye(4)
+        inverse[:3, :3] = pose[:3, :3].T
+        inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+        self._core = _core.View(self.distance, intrinsics, inverse)
+
+    @property
+    def core(self) -> _core.View:
+        """The silhouette of the compiled core."""
+        return self._core
+
+    def __repr__(self) -> str:
+        """Size, and whether there is anyone in it."""
+        height, width = self.distance.shape
+        return f"Silhouette({width}x{height}, {'empty' if self.empty else 'a person'})"
+
+
+def signed_distance(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
+    """Distance (height, width) [px] to the border of a mask, negative inside; its zero is half-way between two
+    pixels."""
+    if mask.all():
+        return np.full(mask.shape, -float(max(mask.shape)), dtype=np.float32)
+    if not mask.any():
+        return np.zeros(mask.shape, dtype=np.float32)
+    outside = cv2.distanceTransform((mask == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    inside = cv2.distanceTransform((mask != 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    distance = np.where(mask != 0, 0.5 - inside, outside - 0.5)
+    return np.ascontiguousarray(distance, dtype=np.float32)
+
+
+def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:
+    """The mask as a pinhole camera of the same focal lengths and centre would see it."""
+    u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
+    rays = [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)]
+    pixels = camera.project(np.stack(rays, axis=-1).reshape(-1, 3)).astype(np.float32)
+    at = pixels.reshape(camera.height, camera.width, 2)
+    soft = cv2.remap(mask.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+    return np.asarray(soft >= _UNDISTORTED, dtype=np.uint8)

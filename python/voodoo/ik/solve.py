@@ -1,0 +1,169 @@
+"""One posture, many postures, and sequences (J10 eq. 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.body import Body
+from voodoo.errors import MeasurementError
+from voodoo.ik.chain import Chain
+from voodoo.ik.image import Silhouette
+from voodoo.ik.options import Options, chosen_options
+from voodoo.ik.posture import Posture, Postures
+from voodoo.ik.targets import Target, Targets, target_parts
+from voodoo.ik.values import FloatArray, base_pose, listed_bones, named, vector
+
+
+def solve(
+    chain: Chain | Body,
+    targets: Targets,
+    *,
+    images: Sequence[Silhouette] = (),
+    start: npt.ArrayLike | Posture | None = None,
+    world_from_base: npt.ArrayLike | None = None,
+    options: Options | None = None,
+    **changes: Any,  # noqa: ANN401 - the fields of Options
+) -> Posture:
+    """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, limits throughout.
+
+    Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing
+    here is ever NaN.
+
+    Args:
+        chain: what moves; a body stands for the chain of all its limbs with a free root.
+        targets: site name -> position (3,) [m], or Targets. Sites may occur more than once.
+        images: silhouettes; empty ones take no part.
+        start: angles (n,) or a posture to start from; None: at rest.
+        world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
+            chosen limbs; None: identity.
+        options: see Options.
+        **changes: single fields of Options, e.g. `steps=30, margin=0.0`.
+
+    Raises:
+        BodyError: a site that is not on the chain.
+        MeasurementError: a number that cannot be used; it says which.
+    """
+    chain = chain if isinstance(chain, Chain) else Chain(chain)
+    options = chosen_options(options, changes)
+    views = [image.core for image in images if not image.empty]
+    begin = start.angles if isinstance(start, Posture) else chain.rest() if start is None else start
+    angles, poses, sites, residuals, steps, converged, h = chain.core.solve(
+        base_pose(world_from_base),
+        vector(begin),
+        target_parts(targets),
+        listed_bones(options.bones),
+        options.margin,
+        views,
+        options.parts(),
+    )
+    return Posture(
+        angles=angles,
+        angle_names=chain.angle_names,
+        joints=named(chain.site_names, sites),
+        world_from_limb=named(chain.limb_names, poses),
+        residuals=residuals,
+        h=h,
+        steps=steps,
+        converged=converged,
+        images=len(views),
+    )
+
+
+def solve_many(
+    chain: Chain,
+    sites: Sequence[str],
+    positions: npt.ArrayLike,
+    *,
+    images: Sequence[Silhouette] = (),
+    starts: npt.ArrayLike | None = None,
+    world_from_base: npt.ArrayLike | None = None,
+    options: Options | None = None,
+    **changes: Any,  # noqa: ANN401 - the fields of Options
+) -> Postures:
+    """`solve` for N sets of positions (N, K, 3) [m] of K sites, with the same images, in one call on one core.
+
+    Args:
+        chain: what moves.
+        sites: K site names.
+        positions: where they shall be.
+        images: silhouettes.
+        starts: angles (n,) or (N, n); None: at rest.
+        world_from_base: as in `solve`.
+        options: see Options.
+        **changes: single fields of Options.
+
+    Raises:
+        BodyError: a site that is not on the chain.
+        MeasurementError: a shape or a number that cannot be used.
+    """
+    options = chosen_options(options, changes)
+    places = np.ascontiguousarray(positions, dtype=np.float64)
+    if places.ndim != 3 or places.shape[1:] != (len(sites), 3) or not np.isfinite(places).all():
+        raise MeasurementError(f"positions: expected finite numbers (N, {len(sites)}, 3), found shape {places.shape}")
+    n = len(chain.angle_names)
+    begin = chain.rest() if starts is None else np.asarray(starts, dtype=np.float64)
+    if begin.shape not in ((n,), (len(places), n)) or not np.isfinite(begin).all():
+        raise MeasurementError(f"starts: expected finite numbers ({n},) or (N, {n}), found shape {begin.shape}")
+    begin = np.ascontiguousarray(np.broadcast_to(begin, (len(places), n)))
+    goals = [Target.at(site, (0.0, 0.0, 0.0)).parts() for site in sites]
+    views = [image.core for image in images if not image.empty]
+    found = chain.core.solve_many(
+        base_pose(world_from_base),
+        begin,
+        goals,
+        places,
+        listed_bones(options.bones),
+        options.margin,
+        views,
+        options.parts(),
+    )
+    angles, joints, h, steps, converged = found
+    return Postures(angles, joints, h, steps, converged != 0.0)
+
+
+class Follower:
+    """Solves a sequence, each posture from the one before."""
+
+    def __init__(self, chain: Chain | Body, *, start: npt.ArrayLike | Posture | None = None, **changes: Any) -> None:  # noqa: ANN401
+        """Stand at a start.
+
+        Args:
+            chain: what moves.
+            start: angles (n,) or a posture; None: at rest.
+            **changes: fields of Options.
+
+        Raises:
+            MeasurementError: an option or an angle that cannot be used.
+        """
+        self.chain = chain if isinstance(chain, Chain) else Chain(chain)
+        self.options = chosen_options(None, changes)
+        begin = start.angles if isinstance(start, Posture) else self.chain.rest() if start is None else start
+        self.angles: FloatArray = np.array(vector(begin))
+        self.chain.forward(self.angles)
+
+    def step(
+        self,
+        targets: Targets,
+        *,
+        images: Sequence[Silhouette] = (),
+        world_from_base: npt.ArrayLike | None = None,
+    ) -> Posture:
+        """The next posture; see `solve`. A refused call leaves the follower where it was."""
+        posture = solve(
+            self.chain,
+            targets,
+            images=images,
+            start=self.angles,
+            world_from_base=world_from_base,
+            options=self.options,
+        )
+        self.angles = posture.angles
+        return posture
+
+    def __repr__(self) -> str:
+        """Chain and options."""
+        return f"Follower({self.chain!r}, {self.options!r})"

@@ -1,0 +1,197 @@
+"""Skin regions followed from picture to picture, and which of them is the head and which a hand.
+
+A face or hand tracker of K06 is a tracker of its own: it knows where its region was a moment ago. So a region keeps its
+name while it moves on continuously, even when the body model has fallen behind, and the model names regions where they
+appear. A name changes hands only when another region agrees with the model better for some time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from voodoo.sensors.assignment import assign
+from voodoo.sensors.pixels import FloatArray
+
+JUMP_M = 0.12
+"""A region is at most this far from where its motion would have it, from one picture to the next."""
+FORGET_S = 0.25
+"""A region that was not seen for so long has lost its name."""
+FASTEST = 8.0
+"""No hand moves faster [m/s]."""
+UNSEEN_SPEED = 2.0
+"""A region that is not seen gets away from its expected place this fast [m/s]."""
+AGREEMENT_S = 0.15
+"""Time over which agreement with the model is averaged."""
+HELD, DRIFTED, TAKEN, NONE = 0.3, 0.75, 0.5, 0.8
+"""Costs: of keeping a name at the edge of the gate, and at most; of taking a name from another region; of having no region.
+A region that keeps its name costs less than none; two that were swapped cost more than changing back."""
+SAME_M = 0.09
+"""Two candidates this near are one hand."""
+OLD_ENOUGH = 3
+"""Pictures in which a region was seen before it may be named from afar."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A candidate in space.
+
+    Args:
+        direction: unit vector (3,) in the world from the camera's focal point.
+        place: (3,) on the surface [m], or at a guessed distance.
+        deep: whether a depth camera saw it.
+        hand: False where it cannot be a hand.
+        region: number of its region.
+    """
+
+    direction: FloatArray
+    place: FloatArray
+    deep: bool
+    hand: bool
+    region: int
+
+
+@dataclass(eq=False)
+class Blob:
+    """A region that is followed: where it was last seen, how it moves, and how far it was from each site."""
+
+    sight: Sight
+    stamp: float
+    velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
+    count: int = 1
+    label: str | None = None
+    far: dict[str, float] = field(default_factory=dict)
+
+    def at(self, stamp: float) -> FloatArray:
+        """Where it should be."""
+        return self.sight.place + (stamp - self.stamp) * self.velocity
+
+    def move(self, sight: Sight, stamp: float) -> None:
+        """It was seen again."""
+        elapsed = stamp - self.stamp
+        if elapsed > 0.0:
+            velocity = (sight.place - self.sight.place) / elapsed
+            if not (sight.deep and self.sight.deep):
+                velocity = velocity - sight.direction * float(velocity @ sight.direction)
+            if float(np.linalg.norm(velocity)) < FASTEST:
+                self.velocity = 0.5 * self.velocity + 0.5 * velocity
+        self.sight, self.stamp = sight, stamp
+        self.count += 1
+
+    def merge(self, seen: Blob, stamp: float) -> bool:
+        """Whether it is the same as a blob that was seen just now, which then takes over its name and history."""
+        if _apart(self, seen.sight, stamp) * _limit(self, stamp) > SAME_M:
+            return False
+        if self.label is not None and seen.label is None:
+            seen.label, seen.far, seen.count = self.label, self.far, max(seen.count, self.count)
+        return True
+
+
+class Blobs:
+    """All regions of one camera's picture that are followed."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self.items: list[Blob] = []
+        self._missed: dict[str, float] = {}
+
+    def follow(self, sights: Sequence[Sight], stamp: float) -> list[Blob]:
+        """The blob of each sight of a picture, new ones included; those that were not seen for long are dropped."""
+        cost = np.array([[_apart(blob, sight, stamp) for sight in sights] for blob in self.items])
+        cost = cost.reshape(len(self.items), len(sights))
+        seen: list[Blob | None] = [None] * len(sights)
+        for row, column in assign(cost, gate=1.0):
+            self.items[row].move(sights[column], stamp)
+            seen[column] = self.items[row]
+        found = [Blob(sight, stamp) if blob is None else blob for blob, sight in zip(seen, sights, strict=True)]
+        unseen = [blob for blob in self.items if blob.stamp < stamp and stamp - blob.stamp < FORGET_S]
+        for blob in unseen:
+            blob.velocity = 0.5 * blob.velocity
+        self.items = found + [blob for blob in unseen if not any(blob.merge(other, stamp) for other in found)]
+        return found
+
+    def name(
+        self,
+        seen: Sequence[Blob],
+        distance: FloatArray,
+        allowed: FloatArray,
+        *,
+        sites: Sequence[str],
+        gates: Mapping[str, float],
+        growth: float,
+        widest: Mapping[str, float],
+        ambiguity: float,
+        stamp: float,
+    ) -> dict[str, int]:
+        """Which of the seen blobs each site is.
+
+        Args:
+            seen: blobs of this picture.
+            distance: (S, B) between the site where the model expects it and the blob [m].
+            allowed: (S, B): 0 the blob cannot be the site, 1 only near where it is expected, 2 anywhere.
+            sites: their names.
+            gates: site -> gate [m].
+            growth: of a gate while its site is not seen [m/s].
+            widest: site -> where that ends [m].
+            ambiguity: a new name needs its second-best candidate this many times as far as the first.
+            stamp: of the picture [s].
+
+        Returns:
+            Site -> number of its blob.
+        """
+        owner = {
+            site
+            for row, site in enumerate(sites)
+            for column, blob in enumerate(seen)
+            if blob.label == site and allowed[row, column]
+        }
+        cost = np.full((len(sites), len(seen)), np.inf)
+        for row, site in enumerate(sites):
+            gate = gates[site]
+            waited = stamp - self._missed.setdefault(site, stamp)
+            reach = max(gate, min(gate + growth * waited, widest[site]))
+            for column, blob in enumerate(seen):
+                near = float(distance[row, column])
+                sample = min(near / gate, 2.0) ** 2
+                share = 1.0 if blob.count == 1 else 1.0 - math.exp(-1.0 / (30.0 * AGREEMENT_S))
+                far = blob.far[site] = (1.0 - share) * blob.far.get(site, sample) + share * sample
+                if not allowed[row, column]:
+                    continue
+                if blob.label == site:
+                    cost[row, column] = min(HELD * far, DRIFTED)
+                elif site in owner or blob.label in owner:
+                    if blob.count >= OLD_ENOUGH and near < gate:
+                        cost[row, column] = TAKEN + far
+                elif near < gate or (near < reach and allowed[row, column] > 1 and blob.count >= OLD_ENOUGH):
+                    rivals = [
+                        float(distance[row, other])
+                        for other in range(len(seen))
+                        if allowed[row, other]
+                        and seen[other].label is None
+                        and float(np.linalg.norm(seen[other].sight.place - blob.sight.place)) > SAME_M
+                    ]
+                    if min(rivals, default=np.inf) >= max(ambiguity * near, 0.5 * gate):
+                        cost[row, column] = DRIFTED * (near / reach) ** 2
+        named = {sites[row]: column for row, column in assign(np.sqrt(cost), gate=1.0, none=NONE)}
+        for blob in self.items:
+            if blob.label in named or blob.stamp == stamp:
+                blob.label = None
+        for site, column in named.items():
+            seen[column].label = site
+            self._missed[site] = stamp
+        return named
+
+
+def _apart(blob: Blob, sight: Sight, stamp: float) -> float:
+    """Distance of a sight from where a blob should be, in units of what is possible."""
+    offset = sight.place - blob.at(stamp)
+    if not (sight.deep and blob.sight.deep):
+        offset = offset - sight.direction * float(offset @ sight.direction)
+    return float(np.linalg.norm(offset)) / _limit(blob, stamp)
+
+
+def _limit(blob: Blob, stamp: float) -> float:
+    return JUMP_M + UNSEEN_SPEED * max(stamp - blob.stamp - 1.0 / 30.0, 0.0)

@@ -1,0 +1,90 @@
+"""Regions of skin in a picture, and where in them a head or a hand may be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d
+
+from voodoo.sensors.pixels import FloatArray
+
+Mask = npt.NDArray[np.bool_]
+
+PALM_M, FACE_M = 0.045, 0.085
+"""Radii of a palm and of a face."""
+LONGEST_HAND = 6.0
+"""A hand with stretched fingers in radii of its palm, measured across the box around it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A place in the image where a head or hand may be.
+
+    Args:
+        pixel: (u, v).
+        region: number of the region it is of.
+        area: of that region [px].
+        hand: False for the middle of a region that is longer than a hand: it may be a face, but not a hand.
+    """
+
+    pixel: tuple[float, float]
+    region: int
+    area: int
+    hand: bool = True
+
+
+def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
+    """Where in a skin mask (H, W) a head or a hand may be.
+
+    Regions with less than a fifth of a palm's area are noise. Each other one offers its middle, unless it is larger
+    than four faces (a door); one that is longer than a hand also offers its tips: the middles of what lies within a
+    palm's reach of the contour's farthest points.
+
+    Args:
+        skin: True where the colour is skin's.
+        palm_px: radius of a palm in the image [px].
+    """
+    smallest = max(0.2 * math.pi * palm_px**2, 6.0)
+    largest = 4.0 * math.pi * (FACE_M / PALM_M * palm_px) ** 2
+    count, labels, stats, centres = cv2.connectedComponentsWithStats(skin.astype(np.uint8), connectivity=8)
+    found = []
+    for region in range(1, count):
+        left, top, width, height, area = (int(value) for value in stats[region])
+        if not smallest <= area <= largest:
+            continue
+        extent = math.hypot(width, height)
+        middle = (float(centres[region][0]), float(centres[region][1]))
+        found.append(Candidate(middle, region, area, hand=extent <= LONGEST_HAND * palm_px))
+        if extent > LONGEST_HAND * palm_px:
+            mask = labels[top : top + height, left : left + width] == region
+            for u, v in _tips(mask, palm_px):
+                found.append(Candidate((u + left, v + top), region, area))
+    return found
+
+
+def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
+    """Middles of the parts of a region around its tips, farthest first, at most four."""
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = max(contours, key=len).reshape(-1, 2).astype(np.float64)
+    rows, columns = np.nonzero(mask)
+    pixels = np.column_stack([columns, rows]).astype(np.float64)
+    distance = np.linalg.norm(outline - pixels.mean(axis=0), axis=1)
+    # A tip is farther out than all of the contour around it.
+    peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
+    tips: list[tuple[float, float]] = []
+    taken: list[FloatArray] = []
+    for index in np.argsort(-distance, kind="stable"):
+        if len(tips) == 4 or distance[index] < 1.5 * palm_px:
+            break
+        tip = outline[index]
+        if not peak[index] or any(float(np.linalg.norm(tip - other)) < 3.0 * palm_px for other in taken):
+            continue
+        taken.append(tip)
+        near = pixels[np.linalg.norm(pixels - tip, axis=1) < 3.2 * palm_px]
+        u, v = near.mean(axis=0)
+        tips.append((float(u), float(v)))
+    return tips

@@ -1,0 +1,154 @@
+"""Inverse kinematics through a recording, and `voodoo ik`."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import voodoo
+from voodoo import cli, ik
+from voodoo.ik_recording import KNOWN, Positions, follow
+from voodoo.recordings.sample import sample_path
+from voodoo.results import Track
+from voodoo.running import start_tracker
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return voodoo.open_recording(sample_path())
+
+
+class Some(voodoo.recordings.Recording):
+    """The first frames of a recording."""
+
+    def __init__(self, recording, frames):
+        self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
+        self.start, self.reference = recording.start, recording.reference
+        self.frames = [frame for _, frame in zip(range(frames), recording, strict=False)]
+
+    def __len__(self):
+        return len(self.frames)
+
+    def __iter__(self):
+        return iter(self.frames)
+
+    def info(self):
+        raise NotImplementedError
+
+
+@pytest.fixture(scope="module")
+def some(recording):
+    return Some(recording, 12)
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, ["ik", *map(str, arguments)], env={"COLUMNS": "200"})
+
+
+def refused(result, *words):
+    assert result.exit_code == 1, result.output
+    assert result.stderr.count("\n") == 1 and result.stderr.startswith("voodoo: "), result.stderr
+    for word in words:
+        assert word in result.stderr
+
+
+def test_follow_reaches_what_is_known_and_tells_the_rest(some):
+    tracker = start_tracker(some)
+    track, errors = follow(some, tracker, Positions.of(some), pictures="depth")
+    assert len(track) == 12 and set(track.status) <= {"tracking", "degraded"}
+    assert set(errors) == set(some.reference.names) - set(KNOWN)
+    assert np.nanmean(errors["l_elbow"]) < 0.08
+    chain = ik.Chain(tracker.body)
+    assert track.angle_names == chain.angle_names
+    assert (track.angles >= chain.limits[:, 0] - 1e-12).all() and (track.angles <= chain.limits[:, 1] + 1e-12).all()
+    # The residual of the file is that of the known sites.
+    names = [name for name in KNOWN if name in some.reference.names]
+    known = [some.reference.names.index(name) for name in names]
+    sites = [track.joint_names.index(name) for name in names]
+    apart = np.linalg.norm(track.joints[3, sites] - some.reference.positions[3, known], axis=1)
+    assert track.residual[3] == pytest.approx(np.sqrt(np.mean(apart**2)), abs=1e-6)
+
+
+def test_pictures_change_the_posture_and_nothing_known(some):
+    tracker = start_tracker(some)
+    plain, _ = follow(some, tracker, Positions.of(some), pictures="none")
+    depth, _ = follow(some, start_tracker(some), Positions.of(some), pictures="depth")
+    assert not np.allclose(plain.angles, depth.angles, atol=1e-3)
+    assert (depth.residual <= plain.residual + 0.005).all()
+
+
+def test_a_frame_without_known_sites_is_degraded_and_stays(some):
+    positions = Positions.of(some)
+    values = positions.values.copy()
+    values[5] = np.nan
+    track, errors = follow(
+        some, start_tracker(some), Positions(positions.stamps, positions.names, values), pictures="none"
+    )
+    assert track.status[5] == "degraded"
+    assert np.array_equal(track.angles[5], track.angles[4])
+    assert np.isnan(errors["l_elbow"][5]) and np.isfinite(errors["l_elbow"][4])
+
+
+def test_every_frame_alone_forgets_the_one_before(some):
+    later = Some(some, 12)
+    later.frames = later.frames[6:]
+    alone, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none", warm=False)
+    only, _ = follow(later, start_tracker(some), Positions.of(some), pictures="none", warm=False)
+    warm, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none")
+    assert np.array_equal(alone.angles[6:], only.angles)
+    assert not np.allclose(alone.angles[6:], warm.angles[6:], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"pictures": "thermal"}, "thermal"),
+        ({"sites": ("nose",)}, "expected some of"),
+        ({"pictures": "color"}, "expected color pictures, found none"),
+    ],
+)
+def test_what_cannot_be_followed(some, change, words):
+    depth_only = Some(some, 3)
+    depth_only.frames = [
+        type(frame)(frame.stamp, tuple(item for item in frame.measurements if type(item).__name__ == "DepthImage"))
+        for frame in depth_only.frames
+    ]
+    with pytest.raises(voodoo.VoodooError, match=words):
+        follow(depth_only, start_tracker(some), Positions.of(some), **change)
+
+
+def test_no_frames_and_no_reference(some):
+    with pytest.raises(voodoo.VoodooError, match="at least one frame"):
+        follow(Some(some, 0), start_tracker(some), Positions.of(some), pictures="none")
+    bare = Some(some, 1)
+    bare.reference = None
+    with pytest.raises(voodoo.VoodooError, match="no reference"):
+        Positions.of(bare)
+
+
+def test_command_line(tmp_path, recording):
+    out = tmp_path / "angles.csv"
+    result = run(sample_path(), "--pictures", "none", "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "mm mean error" in result.stdout and f"{len(recording)} frames" in result.stdout
+    track = Track.load(out)
+    assert len(track) == len(recording) and "l_elbow_flexion" in track.angle_names
+    # Its own result can be the target of another run, with fewer sites.
+    again = run(sample_path(), "--pictures", "none", "--targets", out, "--sites", "l_hand, r_hand,head_center",
+                "--alone", "--out", tmp_path / "again.npz")  # fmt: skip
+    assert again.exit_code == 0, again.output
+    # Alone, from far away, a few frames end in a valley; nearly all reach what the first run reached.
+    assert np.quantile(Track.load(tmp_path / "again.npz").residual, 0.9) < 1e-4
+
+
+def test_command_line_refuses_bad_input(tmp_path):
+    refused(run(tmp_path / "nothing"), "nothing")
+    refused(run(sample_path(), "--pictures", "thermal"), "thermal", "depth")
+    refused(run(sample_path(), "--sites", "nose"), "nose", "l_hand")
+    refused(run(sample_path(), "--out", tmp_path / "angles.doc"), ".csv")
+    refused(run(sample_path(), "--targets", tmp_path / "missing.npz"), "missing.npz")
+    init = tmp_path / "init.json"
+    init.write_text(json.dumps({"joints": {"l_shoulder": [0, 0]}}))
+    refused(run(sample_path(), "--init", init), "l_shoulder")
+    assert not list(tmp_path.glob("*.csv"))
