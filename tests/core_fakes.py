@@ -60,6 +60,7 @@ class Estimate:
     status: str = "tracking"
     residual: float = 0.012
     limb_points: dict = field(default_factory=dict)
+    limb_status: dict = field(default_factory=dict)
 
 
 class Body:
