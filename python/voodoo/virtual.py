@@ -164,6 +164,7 @@ class Disturbance:
     Args:
         noise: share of pixels that show a random depth, R07: 0.15.
         rectangles: random rectangles of random depth in every frame.
+        rectangle_share: their largest width and height, as a share of the image's.
         corrupted, blank, repeated, late: probability that a frame shows nothing but garbage, shows nothing, shows the image
             of the frame before, or comes with a stamp that is not after the last one's.
         seed: of all of it.
@@ -171,6 +172,7 @@ class Disturbance:
 
     noise: float = 0.15
     rectangles: int = 4
+    rectangle_share: float = 0.125
     corrupted: float = 0.02
     blank: float = 0.02
     repeated: float = 0.02
@@ -187,7 +189,7 @@ def disturbed_image(
     hit = rng.random(image.shape) < how.noise
     found[hit] = rng.integers(500, 4500, int(hit.sum()))
     for _ in range(how.rectangles):
-        rows, columns = rng.integers(height // 20, height // 4), rng.integers(width // 20, width // 4)
+        rows, columns = (int(size * how.rectangle_share * rng.uniform(0.2, 1.0)) for size in (height, width))
         top, left = rng.integers(0, height - rows), rng.integers(0, width - columns)
         found[top : top + rows, left : left + columns] = rng.integers(500, 4500)
     return found

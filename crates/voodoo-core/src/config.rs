@@ -257,7 +257,8 @@ config! {
     root_turn_sigma: f64 = 0.12, "rad", 0.0001 ..= 10.0;
     /// Standard deviation of the root's unexpected shift in 1/30 s.
     root_shift_sigma: f64 = 0.04, "m", 0.0001 ..= 10.0;
-    /// Multiplies the standard deviations of all unexpected motion: smaller is smoother and slower.
+    /// Multiplies the standard deviations of all unexpected motion: the one strength of the jitter penalty (R07 eq. 18, 26).
+    /// Smaller is smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones.
     hypotheses: bool = false, "";
