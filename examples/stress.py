@@ -25,7 +25,8 @@ from voodoo import metrics
 from voodoo.angles import angles_of
 from voodoo.ik import Chain
 from voodoo.recordings import DepthImage, RecordedFrame
-from voodoo.running import start_tracker, to_frame
+from voodoo.running import start_tracker
+from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 from voodoo.virtual import Disturbance, VirtualSequence, disturbed, disturbed_image
 
 matplotlib.use("Agg")
@@ -108,13 +109,14 @@ def stressed_recording(path: Path, config: voodoo.Config, how: Disturbance | Non
     """Track a recording whose depth images are disturbed in the same way."""
     recording = voodoo.open_recording(path)
     tracker = start_tracker(recording, config=config, model="papers")
+    front_end = FrontEnd(tracker, settings=FrontEndSettings.of(recording, use=("depth",)))
     chain = Chain(tracker.body)
     truth = recording.reference
     rows: list[tuple] = []
     refused = 0
     for frame in recorded(recording, how):
         try:
-            estimate = tracker.step(to_frame(frame, root_frame=recording.root_frame, depth_only=True))
+            estimate = front_end.step(frame)
         except voodoo.MeasurementError:
             refused += 1
             continue

@@ -59,6 +59,7 @@ class Estimate:
     world_from_limb: dict
     status: str = "tracking"
     residual: float = 0.012
+    limb_points: dict = field(default_factory=dict)
     limb_status: dict = field(default_factory=dict)
 
 
@@ -206,7 +207,12 @@ class FakeRecording(Recording):
 def install(monkeypatch):
     """Put the stand-ins where the package looks for the core."""
     import voodoo
+    from voodoo import results
 
+    # The fake body has no joints to take angles from.
+    monkeypatch.setattr(results, "Chain", lambda body: body)
+    monkeypatch.setattr(results, "angle_names_of", lambda body: ("l_elbow_flexion",))
+    monkeypatch.setattr(results, "angles_of", lambda chain, estimate: np.array([0.25]))
     tracker = type("FreshTracker", (Tracker,), {})
     for name, value in {"Body": Body, "Config": Config, "Frame": Frame, "Tracker": tracker}.items():
         monkeypatch.setattr(voodoo, name, value, raising=False)

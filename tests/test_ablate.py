@@ -57,13 +57,13 @@ def test_every_variant_differs_in_one_entry():
 
 def test_rows_are_the_evaluations_of_the_variants(short, tmp_path):
     config = voodoo.Config(max_steps=2)
-    done = list(ablate([sample_path()], config=config, depth_only=True))
+    done = list(ablate([sample_path()], config=config, use=("depth",)))
     assert [item.name for item in done] == [variant.name for variant in variants(config)]
     for item, variant in zip(done, variants(config), strict=True):
         (score,) = item.scores
         assert score.frames == FEW and not item.failures
         if item.name in (UNCHANGED, "fit_girths = false"):
-            alone, _ = evaluate_module.evaluate(sample_path(), config=variant.config, depth_only=True)
+            alone, _ = evaluate_module.evaluate(sample_path(), config=variant.config, use=("depth",))
             assert score.error_m == alone.error_m
     errors = {item.name: item.scores[0].error_m for item in done}
     assert errors[UNCHANGED] != errors["fit_girths = false"]

@@ -11,7 +11,8 @@ from voodoo import cli
 from voodoo import evaluate as evaluate_module
 from voodoo.errors import RecordingError
 from voodoo.results import Track
-from voodoo.running import Init, start_tracker, to_frame, track
+from voodoo.running import Init, start_tracker, track
+from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 
 
 @pytest.fixture
@@ -148,7 +149,7 @@ def test_usage_errors_end_with_2(run):
 
 
 def test_bad_result_name_is_refused_before_the_work(run):
-    assert_one_line(run("track", "x", "--out", "pose.txt", "--overlay", "look"), 1, ".csv or .npz")
+    assert_one_line(run("track", "x", "--out", "pose.txt", "--overlay", "look"), 1, ".csv, .npz, .bvh")
     assert not Path("look").exists()
 
 
@@ -195,13 +196,15 @@ def test_config_body_info_version(run):
 
 def test_measurements_reach_the_frame_with_pose_and_weight(run):
     recording = FakeRecording(frames=1, depth=False)
-    frame = to_frame(next(iter(recording)), scan_weight=3.0)
+    settings = FrontEndSettings(scan_noise=None)
+    frame = FrontEnd(start_tracker(recording), settings=settings).frame(next(iter(recording)))
     ((kind, shape, options),) = frame.calls
-    assert (kind, shape, options["weight"], options["source"]) == ("points", (11, 3), 3.0, "scan")
+    assert (kind, shape, options["weight"], options["source"]) == ("points", (11, 3), 1.0, "scan")
     assert np.array_equal(options["world_from_sensor"], np.eye(4))
-    frame = to_frame(next(iter(FakeRecording(frames=1))))
+    recording = FakeRecording(frames=1)
+    frame = FrontEnd(start_tracker(recording)).frame(next(iter(recording)))
     ((kind, shape, options),) = frame.calls
-    assert (kind, shape, options["metres_per_unit"]) == ("depth", (60, 80), 0.001)
+    assert (kind, shape, options["metres_per_unit"], options["weight"]) == ("depth", (60, 80), 0.001, 1.0)
     assert frame.stamp == 1700200000.0
 
 

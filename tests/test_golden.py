@@ -11,6 +11,7 @@ import numpy as np
 import voodoo
 from voodoo.recordings import sample_path
 from voodoo.running import start_tracker, track
+from voodoo.sensors.front_end import FrontEndSettings
 
 GOLDEN = Path(__file__).with_name("golden_limbwise.csv")
 FRAMES = (0, 10, 30, 60, 89)
@@ -24,7 +25,10 @@ def tracked():
     config = voodoo.Config(solver="limbwise")
     positions, errors = {}, []
     truth = recording.reference
-    for frame in track(recording, start_tracker(recording, config=config, model="papers")):
+    # A depth image and a scan whose points all weigh 1, as in the papers.
+    settings = FrontEndSettings(use=("depth", "scan"), scan_noise=None, ground_z=0.0)
+    tracker = start_tracker(recording, config=config, model="papers")
+    for frame in track(recording, tracker, settings=settings):
         joints = frame.estimate.joints
         errors += [
             np.linalg.norm(joints[name] - place)

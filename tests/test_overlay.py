@@ -13,7 +13,11 @@ STILL = RecordedFrame(0.0, (depth_of(T_POSE),))
 
 
 def draw(recorded=STILL, joints=T_POSE):
-    return Overlay(FakeRecording()).draw(recorded, *pose(joints), index=0)
+    class Shown(FakeRecording):
+        def __iter__(self):
+            yield recorded
+
+    return Overlay(Shown()).draw(recorded, *pose(joints), index=0)
 
 
 def scale_of(picture):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import voodoo
+from voodoo.errors import MeasurementError
 from voodoo.metrics import JOINTS
 from voodoo.recordings import ColorImage, DepthImage, LaserScan, RecordedFrame, open_recording, sample_path
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
@@ -72,7 +73,8 @@ def test_a_frozen_laser(whole):
         first.extend(item for item in items if isinstance(item, LaserScan) and not first)
         return [replace(first[0], stamp=i.stamp) if isinstance(i, LaserScan) else i for i in items]
 
-    error, _ = run(freeze)
+    error, estimates = run(freeze)
+    assert sum(of(estimate, "scan") is not None for estimate in estimates) == 1
     assert error < whole[0] + 0.03
 
 
@@ -122,3 +124,68 @@ def test_a_colour_camera_with_wrong_extrinsics(whole):
     rays = sum(of(estimate, "color")[0] for estimate in estimates if of(estimate, "color"))
     full = sum(of(estimate, "color")[0] for estimate in whole[1] if of(estimate, "color"))
     assert rays < 0.7 * full
+
+
+def second_camera(change):
+    """The depth camera twice, the second time changed: (frame number, depth image) -> depth image or None."""
+
+    def both(index, items):
+        depth = next(item for item in items if isinstance(item, DepthImage))
+        extra = change(index, replace(depth, sensor="second"))
+        return items + ([] if extra is None else [extra])
+
+    return both
+
+
+def test_of_two_depth_cameras_one_is_frozen(whole):
+    held = []
+
+    def freeze(index, depth):
+        held.append(depth)
+        return replace(held[0], stamp=depth.stamp)
+
+    error, estimates = run(second_camera(freeze), use=("depth", "skin"))
+    assert error < whole[0] + 0.03
+    assert of(estimates[0], "second") is not None
+    assert all(of(estimate, "second") is None for estimate in estimates[1:])
+
+
+def test_of_two_depth_cameras_one_comes_100_ms_late_and_at_random(whole):
+    held, chance = [], np.random.default_rng(3)
+
+    def late(index, depth):
+        held.append(depth)
+        return replace(held[max(index - 3, 0)], stamp=depth.stamp) if chance.random() > 0.3 else None
+
+    error, estimates = run(second_camera(late), use=("depth", "skin"))
+    assert error < whole[0] + 0.03
+    assert 0 < sum(of(estimate, "second") is None for estimate in estimates) < FRAMES
+
+
+def test_of_two_depth_cameras_one_stands_elsewhere(whole):
+    away = np.eye(4)
+    away[0, 3] = 1.0  # a metre to the side
+
+    error, estimates = run(
+        second_camera(lambda index, depth: replace(depth, root_from_sensor=depth.root_from_sensor @ away)),
+        use=("depth", "skin"),
+    )
+    assert error < whole[0] + 0.03
+    good = np.mean([of(estimate, "depth")[1] for estimate in estimates])
+    bad = np.mean([of(estimate, "second")[1] for estimate in estimates])
+    assert bad < 0.5 * good
+
+
+def test_time_that_runs_backwards_is_refused_and_the_next_frame_accepted():
+    recording = open_recording(sample_path())
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker)
+    first, second, third = (recorded for recorded, _ in zip(paired(recording), range(3), strict=False))
+    front_end.step(first)
+    before = front_end.step(second)
+    for again in (first, second):
+        with pytest.raises(MeasurementError, match=r"stamp|time"):
+            front_end.step(again)
+        assert np.array_equal(tracker.estimate.joint_positions, before.joint_positions)
+    assert front_end.step(third).stamp == third.stamp

@@ -39,6 +39,8 @@ def test_file_holds_everything(tmp_path, steps):
     for entity in (
         "/world/body/limbs/l_forearm", "/world/body/joints", "/world/body/bands", "/world/rays", "/world/laser/scan",
         "/world/points/camera_depth_image_rect_raw", "/world/cameras/camera_color_image_raw_compressed/picture",
+        "/world/cameras/camera_color_image_raw_compressed/picture/model",
+        "/world/cameras/camera_depth_image_rect_raw/picture/silhouette",
         "/plots/residual_mm", "/plots/steps", "/plots/step_ms", "/plots/sources/scan/matched",
     ):  # fmt: skip
         assert entity in shown, entity

@@ -13,6 +13,7 @@ import voodoo
 from voodoo.evaluate import Score, evaluate_all
 from voodoo.report import Summary, summarize
 from voodoo.running import HumanModel
+from voodoo.sensors.front_end import INPUTS
 
 UNCHANGED = "as configured"
 _MEASURES = (
@@ -75,7 +76,7 @@ def ablate(
     config: voodoo.Config | None = None,
     loader: str | None = None,
     model: HumanModel = "full",
-    depth_only: bool = False,
+    use: Sequence[str] = INPUTS,
     jobs: int = 1,
 ) -> Iterator[Ablation]:
     """Evaluate `paths` with every variant of `config`, one after another; each is yielded when it is done.
@@ -87,7 +88,7 @@ def ablate(
             # The worker processes read their configuration from a file.
             file = Path(folder) / f"{index}.toml"
             file.write_text(variant.config.to_toml(), encoding="utf-8")
-            done = evaluate_all(paths, config_file=file, loader=loader, model=model, depth_only=depth_only, jobs=jobs)
+            done = evaluate_all(paths, config_file=file, loader=loader, model=model, use=use, jobs=jobs)
             yield Ablation(variant.name, tuple(score for _, score, _ in sorted(done, key=lambda item: item[0])))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -17,11 +17,19 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import voodoo
 from voodoo.errors import VoodooError
-from voodoo.overlay import Overlay, Picture, contact_sheet
+from voodoo.export.files import check_target
+from voodoo.export.files import save as export
+from voodoo.inputs import join, keypoint_folders, loader_options
+from voodoo.keypoint_layouts import LAYOUTS
+from voodoo.overlay import Overlay, contact_sheet
+from voodoo.overlay_inputs import Picture
 from voodoo.picture_writer import PictureWriter, save_picture
 from voodoo.recordings import LOADERS, Recording, open_recording, sample_path
+from voodoo.recordings.marker_files import MarkerMap
 from voodoo.results import Track, check_suffix
 from voodoo.running import HumanModel, Init, start_tracker, track
+from voodoo.sensors.front_end import INPUTS, FrontEndSettings
+from voodoo.view import Viewer
 
 T = TypeVar("T")
 
@@ -34,7 +42,7 @@ app = typer.Typer(
 )
 
 _RecordingArgument = Annotated[
-    Path, typer.Argument(metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, or folder of depth PNGs.")
+    Path, typer.Argument(metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, Pose2Sim or PNG folder, .trc, .c3d.")
 ]
 _LoaderOption = Annotated[
     str | None, typer.Option("--loader", metavar="NAME", help=f"Instead of a guess: {', '.join(LOADERS)}.")
@@ -56,6 +64,10 @@ _ModelOption = Annotated[
 _FrameOption = Annotated[
     str | None,
     typer.Option("--frame", metavar="NAME", help="Root frame of the result, instead of the recording's own."),
+]
+_UseOption = Annotated[
+    str | None,
+    typer.Option("--use", metavar="KIND,...", help=f"Inputs to use, by default all there are: {', '.join(INPUTS)}."),
 ]
 
 
@@ -98,18 +110,47 @@ def track_command(
     model: _ModelOption = "full",
     config: _ConfigOption = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Result, .csv or .npz; by default NAME.csv in this folder.")
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME.csv.",
+        ),
     ] = None,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
+    ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show every step in Rerun (pip install voodoo\\[view]).")
+    ] = False,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
+    ] = None,
+    use: _UseOption = None,
+    with_: Annotated[
+        list[Path] | None,
+        typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),
+    ] = None,
+    offset: Annotated[float, typer.Option(metavar="S", help="Seconds to add to the stamps of --with.")] = 0.0,
+    keypoints: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SENSOR=DIR", help="OpenPose JSON files, one for each image of SENSOR; repeatable."),
+    ] = None,
+    layout: Annotated[str, typer.Option(metavar="NAME", help=f"Of all keypoints: {', '.join(LAYOUTS)}.")] = "body25b",
+    marker_map: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="TOML: which sites the markers of .trc and .c3d files stand for."),
     ] = None,
     frame: _FrameOption = None,
     loader: _LoaderOption = None,
 ) -> None:
     """Track the body through a recording and write one row a frame.
 
+    All inputs the recording has are used: depth images, point clouds, laser scans, skin in colour images, 2-D
+    keypoints, markers. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
+
     The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in metres for every joint and site, in the
-    recording's root frame (base_link if it has one). The .npz adds the pose of every limb.
+    recording's root frame (base_link if it has one), and NAME_rad for every joint angle. The .npz adds the pose of
+    every limb.
 
     --init gives the pose in the first frame, by any subset of names that fixes it:
     [cyan]{"height_m": 1.76, "joints": {"l_shoulder": \\[3.1, -0.3, 1.4], "r_shoulder": \\[3.2, 0.1, 1.4], ...}}[/cyan]
@@ -118,14 +159,28 @@ def track_command(
 
     voodoo track walk_bag/ --init start.json --out walk.csv
 
-    voodoo track a1_s1_t1_depth.mat --height 1.80 --out pose.npz --overlay look.mp4
+    voodoo track a1_s1_t1_depth.mat --height 1.80 --out pose.npz --out pose.bvh --overlay look.mp4
+
+    voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
     with _clear_errors():
         if body is not None and height is not None:
             raise typer.BadParameter("give --body or --height, not both")
-        source = _open(recording, loader, frame)
-        target = out if out is not None else Path(f"{source.name}.csv")
-        check_suffix(target)
+        if view and save is not None:
+            raise typer.BadParameter("give --view or --save, not both")
+        kinds = _kinds(use)
+        markers = None if marker_map is None else MarkerMap.load(marker_map)
+        source = join(
+            _open(recording, loader, frame, **loader_options(recording, loader, markers=markers, layout=layout)),
+            keypoints=keypoint_folders(keypoints or ()),
+            layout=layout,
+            others=with_ or (),
+            offset=offset,
+            markers=markers,
+        )
+        targets = out or [Path(f"{source.name}.csv")]
+        for target in targets:
+            check_target(target)
         tracker = start_tracker(
             source,
             init=None if init is None else Init.load(init),
@@ -133,10 +188,15 @@ def track_command(
             height=height,
             model=model,
             config=_config(config),
+            markers=markers,
         )
-        result, _, _ = _run(source, tracker, overlay)
-        result.save(target)
-        typer.echo(f"{len(result)} frames, {_states(result)}; wrote {target}" + (f" and {overlay}" if overlay else ""))
+        with _viewer(view, save, source.name) as viewer:
+            settings = FrontEndSettings.of(source, use=kinds)
+            result, _, _ = _run(source, tracker, overlay, settings=settings, viewer=viewer)
+        for target in targets:
+            export(result, target, body=tracker.body, root_frame=source.root_frame)
+        written = [str(path) for path in (*targets, overlay, save) if path is not None]
+        typer.echo(f"{len(result)} frames, {_states(result)}; wrote {' and '.join(written)}")
 
 
 @app.command("demo")
@@ -236,9 +296,8 @@ def eval_command(
         list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
     ] = None,
     model: _ModelOption = "full",
-    depth_only: Annotated[
-        bool, typer.Option("--depth-only", help="Leave out everything but depth images (no laser, no clouds).")
-    ] = False,
+    use: _UseOption = None,
+    depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
     ablation: Annotated[
         bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
     ] = False,
@@ -268,9 +327,10 @@ def eval_command(
         _config(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        kinds = ("depth",) if depth_only else _kinds(use)
         if ablation:
             chosen = _config(config)
-            runs = ablate(paths, config=chosen, loader=loader, model=model, depth_only=depth_only, jobs=jobs)
+            runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, jobs=jobs)
             ablations = list(_progress(runs, "ablating", len(variants(chosen))))
             typer.echo(table(ablations))
             if out is not None:
@@ -279,7 +339,7 @@ def eval_command(
             if failed:
                 raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
             return
-        done = evaluate_all(paths, config_file=config, loader=loader, model=model, depth_only=depth_only, jobs=jobs)
+        done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, jobs=jobs)
         ordered = sorted(_progress(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
         typer.echo(markdown(scores))
@@ -326,9 +386,19 @@ def body_command(
         typer.echo(body.to_toml(), nl=False)
 
 
-def _open(path: Path, loader: str | None, frame: str | None) -> Recording:
-    options: dict[str, Any] = {} if frame is None else {"root_frame": frame}
+def _open(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
+    if frame is not None:
+        options["root_frame"] = frame
     return open_recording(path, loader=loader, **options)
+
+
+def _kinds(words: str | None) -> tuple[str, ...]:
+    """The kinds of inputs in "depth,scan"; all of them for None.
+
+    Raises:
+        VoodooError: an unknown kind.
+    """
+    return INPUTS if words is None else FrontEndSettings(use=tuple(word.strip() for word in words.split(","))).use
 
 
 def _config(path: Path | None) -> voodoo.Config:
@@ -336,7 +406,13 @@ def _config(path: Path | None) -> voodoo.Config:
 
 
 def _run(
-    source: Recording, tracker: voodoo.Tracker, overlay: Path | None, *, sheet: int = 0
+    source: Recording,
+    tracker: voodoo.Tracker,
+    overlay: Path | None,
+    *,
+    sheet: int = 0,
+    settings: FrontEndSettings | None = None,
+    viewer: Viewer | None = None,
 ) -> tuple[Track, list[float], list[Picture]]:
     """Track and draw: the result, the time of every frame [s] and `sheet` pictures spread over the recording."""
     estimates, seconds, pictures = [], [], []
@@ -344,22 +420,32 @@ def _run(
     rate = source.info().rate_hz
     drawing = Overlay(source)
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
-    with writer or _nothing():
-        for step in _progress(track(source, tracker), source.name, len(source)):
+    with writer or nullcontext():
+        for step in _progress(track(source, tracker, settings=settings), source.name, len(source)):
             estimates.append(step.estimate)
             seconds.append(step.seconds)
+            if viewer is not None:
+                viewer.log(
+                    step.estimate,
+                    tracker.body,
+                    recorded=step.recorded,
+                    front_end=step.front_end,
+                    seconds=step.seconds,
+                )
             if writer is not None or step.index in chosen:
-                picture = drawing.draw(step.recorded, tracker.body, step.estimate, index=step.index)
+                picture = drawing.draw(
+                    step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end
+                )
                 if writer is not None:
                     writer.write(picture)
                 if step.index in chosen:
                     pictures.append(picture)
-    return Track.of(estimates), seconds, pictures
+    return Track.of(estimates, body=tracker.body), seconds, pictures
 
 
-@contextmanager
-def _nothing() -> Iterator[None]:
-    yield
+def _viewer(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:
+    """The viewer that was asked for, opened before the work so that a missing Rerun is told at once."""
+    return Viewer(save=save, name=name) if view or save is not None else nullcontext()
 
 
 def _states(result: Track) -> str:

@@ -24,6 +24,7 @@ from voodoo.recordings import Recording, open_recording
 from voodoo.recordings.loaders import guess_loader
 from voodoo.results import Track
 from voodoo.running import HumanModel, start_tracker, track
+from voodoo.sensors.front_end import INPUTS, FrontEndSettings
 from voodoo.witness import FrameWitness, Selection, witness
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -128,9 +129,9 @@ def evaluate(
     config: voodoo.Config | None = None,
     loader: str | None = None,
     model: HumanModel = "full",
-    depth_only: bool = False,
+    use: Sequence[str] = INPUTS,
 ) -> tuple[Score, FrameTable]:
-    """Track a recording from its own start and measure the result; with `depth_only` from its depth images alone.
+    """Track a recording from its own start and measure the result; `use` says from which of its inputs, see INPUTS.
 
     Raises:
         VoodooError: it cannot be read, has no start, or a frame was refused.
@@ -139,7 +140,7 @@ def evaluate(
     tracker = start_tracker(recording, config=config, model=model)
     selection = select_by(recording)
     steps = []
-    for frame in track(recording, tracker, depth_only=depth_only):
+    for frame in track(recording, tracker, settings=FrontEndSettings.of(recording, use=use)):
         estimate = frame.estimate
         truth = _truth_at(recording, estimate.stamp)
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
@@ -174,7 +175,7 @@ def evaluate_all(
     config_file: Path | None = None,
     loader: str | None = None,
     model: HumanModel = "full",
-    depth_only: bool = False,
+    use: Sequence[str] = INPUTS,
     jobs: int = 1,
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
     """Evaluate recordings in parallel processes; (index in `paths`, score, frames) as each is done, in any order.
@@ -182,7 +183,7 @@ def evaluate_all(
     A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
     """
     tasks = [
-        (str(path), None if config_file is None else str(config_file), loader, model, depth_only) for path in paths
+        (str(path), None if config_file is None else str(config_file), loader, model, tuple(use)) for path in paths
     ]
     if jobs == 1 or len(tasks) == 1:
         for index, task in enumerate(tasks):
@@ -250,11 +251,11 @@ def _one_thread() -> None:
 
 
 def _task(
-    path: str, config_file: str | None, loader: str | None, model: HumanModel, depth_only: bool
+    path: str, config_file: str | None, loader: str | None, model: HumanModel, use: Sequence[str]
 ) -> tuple[Score, FrameTable | None]:
     try:
         config = None if config_file is None else voodoo.Config.load(config_file)
-        return evaluate(Path(path), config=config, loader=loader, model=model, depth_only=depth_only)
+        return evaluate(Path(path), config=config, loader=loader, model=model, use=use)
     except (VoodooError, OSError) as error:
         return Score(Path(path).name, Path(path), failure=str(error)), None
 

@@ -15,8 +15,8 @@ from voodoo.errors import VoodooError
 from voodoo.ik import Chain, Follower, Options, Posture, Silhouette, solve
 from voodoo.recordings import ColorImage, DepthImage, RecordedFrame, Recording
 from voodoo.results import Track
-from voodoo.running import LEVEL_FRAMES
 from voodoo.sensors.background import StillBackground
+from voodoo.sensors.front_end import LEVEL_FRAMES
 from voodoo.silhouettes import StillScene, from_depth, surroundings
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import TypeAlias
 
 import cv2
@@ -10,16 +11,20 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo
-from voodoo.recordings import ColorImage, DepthImage, LaserScan, PointCloud, RecordedFrame, Recording
+from voodoo.overlay_inputs import Picture, draw_keypoints, draw_points, draw_rays, draw_skin
+from voodoo.recordings import ColorImage, DepthImage, KeypointImage, RecordedFrame, Recording
+from voodoo.sensors.front_end import FrontEnd, paired
 from voodoo.views import Axes, CameraView, TopView, View, limb_outline, limb_rings, transform
 
-Picture: TypeAlias = npt.NDArray[np.uint8]
-"""(H, W, 3) BGR."""
+Pictured: TypeAlias = DepthImage | ColorImage | KeypointImage
+"""Measurements of a camera."""
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _LEFT, _RIGHT, _MIDDLE = (235, 170, 60), (60, 140, 250), (190, 205, 190)  # BGR: blue, orange, grey
 _STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250)}
-_SCAN, _CLOUD, _INK, _PAPER = (90, 230, 90), (225, 225, 120), (250, 250, 250), (24, 20, 18)
+_INK, _PAPER = (250, 250, 250), (24, 20, 18)
+_ORDER: tuple[type, ...] = (DepthImage, ColorImage, KeypointImage)
+_LOOK_AHEAD, _MOST_PANELS = 5, 4
 _OPACITY = 0.62
 _TARGET_HEIGHT = 640
 _TOP_SIZE, _TOP_METRES = 720, 6.0
@@ -35,41 +40,88 @@ class Overlay:
     """
 
     def __init__(self, recording: Recording) -> None:
-        """Remember what the frames have in common."""
+        """Look at the first frames for the cameras: every picture of a film has the same size."""
         self._frames = len(recording)
         self._axes: Axes = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
         self._range: tuple[float, float] | None = None
         self._origin: float | None = None
+        self._panels: dict[str, Pictured] = {}
+        for recorded in islice(paired(recording), _LOOK_AHEAD):
+            for item in recorded.measurements:
+                if isinstance(item, (DepthImage, ColorImage, KeypointImage)) and not self._has(item):
+                    self._panels[item.sensor] = item
+        self._panels = dict(sorted(self._panels.items(), key=lambda pair: _ORDER.index(type(pair[1])))[:_MOST_PANELS])
 
-    def draw(self, recorded: RecordedFrame, body: voodoo.Body, estimate: voodoo.Estimate, *, index: int) -> Picture:
-        """Draw one frame: over its depth image, else over its colour image, else as seen from above.
+    def _has(self, item: Pictured) -> bool:
+        """Whether this sensor has a panel; keypoints are drawn into the picture they were found in."""
+        return item.sensor in self._panels or (
+            isinstance(item, KeypointImage) and any(_same_place(item, other) for other in self._panels.values())
+        )
+
+    def draw(
+        self,
+        recorded: RecordedFrame,
+        body: voodoo.Body,
+        estimate: voodoo.Estimate,
+        *,
+        index: int,
+        front_end: FrontEnd | None = None,
+    ) -> Picture:
+        """Draw one frame over the picture of each camera, side by side, else as seen from above.
 
         Args:
             recorded: the measurements.
             body: with the sizes it had in this frame.
             estimate: the pose.
             index: number of the frame, from 0, for the caption.
+            front_end: gives the rays and skin regions of the frame.
         """
-        depth = [item for item in recorded.measurements if isinstance(item, DepthImage)]
-        color = [item for item in recorded.measurements if isinstance(item, ColorImage)]
-        view: View
-        if depth or color:
-            item = depth[-1] if depth else color[-1]
-            scale = -(-_TARGET_HEIGHT // item.camera.height)
-            background = self._depth_picture(item) if isinstance(item, DepthImage) else np.array(item.image)
-            picture = cv2.resize(background, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
-            view = CameraView(item.camera, item.root_from_sensor, scale)
-        else:
+        current = {item.sensor: item for item in recorded.measurements if isinstance(item, Pictured)}
+        canvases: list[Picture] = []
+        for sensor, first in self._panels.items():
+            scale = _scale(first)
+            picture = self._background(current.get(sensor), first)
+            resized = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+            canvas = np.asarray(resized, dtype=np.uint8)
+            item = current.get(sensor, first)
+            view: View = CameraView(item.camera, item.root_from_sensor, scale)
+            self._draw_all(canvas, recorded, body, estimate, view, front_end)
+            draw_keypoints(canvas, recorded, item.camera, item.root_from_sensor, scale)
+            if front_end is not None and isinstance(first, ColorImage) and sensor in current:
+                draw_skin(canvas, front_end, sensor, scale)
+            canvases.append(canvas)
+        if not canvases:
             joints = np.array(list(estimate.joints.values()))
             x, y, z = (float(value) for value in np.median(joints, axis=0))
-            view = TopView((x, y, z), _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
-            picture = _grid(view)
-        canvas = np.asarray(picture, dtype=np.uint8)
-        draw_points(canvas, recorded, view)
-        draw_body(canvas, body, estimate, view)
+            top = TopView((x, y, z), _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
+            canvases.append(_grid(top))
+            self._draw_all(canvases[0], recorded, body, estimate, top, front_end)
+        canvas = side_by_side(canvases)
         self._origin = estimate.stamp if self._origin is None else self._origin
         caption(canvas, f"{index + 1}/{self._frames}   {estimate.stamp - self._origin:.2f} s", estimate)
         return canvas
+
+    def _draw_all(
+        self,
+        canvas: Picture,
+        recorded: RecordedFrame,
+        body: voodoo.Body,
+        estimate: voodoo.Estimate,
+        view: View,
+        front_end: FrontEnd | None,
+    ) -> None:
+        draw_body(canvas, body, estimate, view)
+        draw_points(canvas, recorded, view)
+        if front_end is not None:
+            draw_rays(canvas, front_end, estimate, view)
+
+    def _background(self, item: Pictured | None, first: Pictured) -> Picture:
+        """What the camera saw; dark paper when it saw nothing new, or only its keypoints are known."""
+        if isinstance(item, DepthImage):
+            return self._depth_picture(item)
+        if isinstance(item, ColorImage):
+            return np.array(item.image)
+        return np.full((first.camera.height, first.camera.width, 3), _PAPER, dtype=np.uint8)
 
     def _depth_picture(self, depth: DepthImage) -> Picture:
         """Depth as colour: near is bright; nothing measured is dark."""
@@ -153,21 +205,20 @@ def _draw_sites(picture: Picture, estimate: voodoo.Estimate, view: View) -> None
             cv2.circle(picture, centre, (radius - 1) << _SUBPIXEL, _INK, -1, cv2.LINE_AA, _SUBPIXEL)
 
 
-def draw_points(picture: Picture, recorded: RecordedFrame, view: View) -> None:
-    """Draw laser returns and cloud points as dots; depth pixels need none, they are the background."""
-    for item in recorded.measurements:
-        if isinstance(item, LaserScan):
-            points, color, radius = item.points(), _SCAN, 2
-        elif isinstance(item, PointCloud):
-            points, color, radius = item.points, _CLOUD, 1
-        else:
-            continue
-        pixels, _ = view.project(transform(item.root_from_sensor, points))
-        height, width = picture.shape[:2]
-        with np.errstate(invalid="ignore"):
-            visible = ((pixels >= 0.0) & (pixels < (width, height))).all(axis=1)
-        for pixel in pixels[visible]:
-            cv2.circle(picture, _point(pixel), radius << _SUBPIXEL, color, -1, cv2.LINE_AA, _SUBPIXEL)
+def side_by_side(pictures: Sequence[Picture]) -> Picture:
+    """Pictures in a row, all as high as the first one."""
+    height = pictures[0].shape[0]
+    row = [
+        picture
+        if picture.shape[0] == height
+        else cv2.resize(
+            picture,
+            (round(picture.shape[1] * height / picture.shape[0]), height),
+            interpolation=cv2.INTER_AREA,
+        )
+        for picture in pictures
+    ]
+    return np.asarray(np.hstack(row), dtype=np.uint8)
 
 
 def caption(picture: Picture, text: str, estimate: voodoo.Estimate) -> None:
@@ -209,6 +260,16 @@ def contact_sheet(pictures: Sequence[Picture], *, columns: int, width: int = 160
 def side_color(name: str) -> tuple[int, int, int]:
     """BGR: blue for the person's left, orange for the right, grey for the middle."""
     return _LEFT if name.startswith("l_") else _RIGHT if name.startswith("r_") else _MIDDLE
+
+
+def _scale(item: Pictured) -> float:
+    """Small pictures are enlarged by a whole number, large ones reduced to the same height."""
+    height = item.camera.height
+    return float(-(-_TARGET_HEIGHT // height)) if height <= _TARGET_HEIGHT else _TARGET_HEIGHT / height
+
+
+def _same_place(item: Pictured, other: Pictured) -> bool:
+    return item.camera == other.camera and np.allclose(item.root_from_sensor, other.root_from_sensor)
 
 
 def _grid(view: TopView) -> Picture:

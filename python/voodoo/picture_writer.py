@@ -8,7 +8,7 @@ from types import TracebackType
 import cv2
 
 from voodoo.errors import VoodooError
-from voodoo.overlay import Picture
+from voodoo.overlay_inputs import Picture
 
 
 class PictureWriter:

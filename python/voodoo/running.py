@@ -12,7 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 import voodoo
 from voodoo.errors import VoodooError
-from voodoo.recordings import DepthImage, LaserScan, PointCloud, RecordedFrame, Recording
+from voodoo.markers import body_with_markers
+from voodoo.recordings import RecordedFrame, Recording
+from voodoo.recordings.marker_files import MarkerMap
+from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
 
 HumanModel = Literal["papers", "full"]
 Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
@@ -71,13 +74,15 @@ class TrackedFrame:
         index: number in the recording, from 0.
         recorded: the measurements.
         estimate: the pose.
-        seconds: wall-clock time from measurements in memory to the estimate [s].
+        seconds: wall-clock time from measurements in memory to the estimate [s]; pictures are decoded within it.
+        front_end: what made the tracker's frame of them: its rays and skin candidates are those of this frame.
     """
 
     index: int
     recorded: RecordedFrame
     estimate: voodoo.Estimate
     seconds: float
+    front_end: FrontEnd
 
 
 def start_tracker(
@@ -88,6 +93,7 @@ def start_tracker(
     height: float | None = None,
     model: HumanModel = "full",
     config: voodoo.Config | None = None,
+    markers: MarkerMap | None = None,
 ) -> voodoo.Tracker:
     """A tracker that stands in the first pose of the recording.
 
@@ -98,6 +104,7 @@ def start_tracker(
         height: stature of the default human [m]; not together with `body`.
         model: how finely that human is divided, see `voodoo.Body.human`.
         config: None means the defaults.
+        markers: those worn on limbs become sites of the body.
 
     Raises:
         VoodooError: there is no first pose, it does not fix the pose of this body, or both body and height are given.
@@ -114,76 +121,36 @@ def start_tracker(
     if body is None:
         height = height if height is not None else init.height_m
         body = voodoo.Body.human(model=model) if height is None else voodoo.Body.human(height=height, model=model)
+    if markers is not None and markers.limbs:
+        body = body_with_markers(body, markers.worn())
     tracker = voodoo.Tracker(body, config=config if config is not None else voodoo.Config())
     tracker.reset(joints=dict(init.joints), fit_sizes=True)
     return tracker
 
 
-LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
-"""Root frames whose z = 0 is the floor (REP-105)."""
-
-
-def to_frame(
-    recorded: RecordedFrame, *, scan_weight: float = 1.0, root_frame: str = "", depth_only: bool = False
-) -> voodoo.Frame:
-    """The tracker's view of a recorded frame: depth images, clouds and laser scans; colour is not a measurement yet.
-
-    Args:
-        recorded: one instant of a recording.
-        scan_weight: weight of a laser return relative to a depth pixel.
-        root_frame: name of the root frame; in LEVEL_FRAMES the floor is known.
-        depth_only: leave out all but depth images.
-
-    Raises:
-        VoodooError: a measurement the tracker does not accept.
-    """
-    frame = voodoo.Frame(stamp=recorded.stamp)
-    if root_frame in LEVEL_FRAMES:
-        frame.set_ground(normal=(0.0, 0.0, 1.0))
-    for item in recorded.measurements:
-        if isinstance(item, DepthImage):
-            frame.add_depth(
-                item.image,
-                camera=item.camera,
-                metres_per_unit=item.metres_per_unit,
-                world_from_sensor=item.root_from_sensor,
-                source=item.sensor,
-            )
-        elif depth_only:
-            continue
-        elif isinstance(item, PointCloud):
-            frame.add_points(item.points, world_from_sensor=item.root_from_sensor, source=item.sensor)
-        elif isinstance(item, LaserScan):
-            frame.add_points(
-                item.points(), world_from_sensor=item.root_from_sensor, weight=scan_weight, source=item.sensor
-            )
-    return frame
-
-
 def track(
-    recording: Recording, tracker: voodoo.Tracker, *, scan_weight: float = 1.0, depth_only: bool = False
+    recording: Recording, tracker: voodoo.Tracker, *, settings: FrontEndSettings | None = None
 ) -> Iterator[TrackedFrame]:
-    """Step the tracker through a recording.
+    """Step the tracker through a recording, by the front end that every command uses.
 
     Between two yields `tracker` holds the model of the frame yielded last.
 
     Args:
         recording: read while iterating.
         tracker: already reset to the first pose, see start_tracker.
-        scan_weight: see to_frame.
+        settings: what is used and how; None means all there is, see FrontEndSettings.of.
 
     Raises:
         VoodooError: damage in the recording, or a frame that the tracker refuses; names the frame.
     """
-    for index, recorded in enumerate(recording):
+    front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording))
+    for index, recorded in enumerate(paired(recording)):
         began = time.perf_counter()
         try:
-            estimate = tracker.step(
-                to_frame(recorded, scan_weight=scan_weight, root_frame=recording.root_frame, depth_only=depth_only)
-            )
+            estimate = front_end.step(recorded)
         except VoodooError as error:
             raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
-        yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began)
+        yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began, front_end)
 
 
 def _first_problem(error: ValidationError) -> str:

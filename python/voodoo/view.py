@@ -16,15 +16,16 @@ import numpy.typing as npt
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.body import Body
 from voodoo.errors import VoodooError
-from voodoo.recordings import ColorImage, DepthImage, LaserScan, PointCloud, RecordedFrame
+from voodoo.recordings import ColorImage, DepthImage, KeypointImage, LaserScan, MarkerSet, PointCloud, RecordedFrame
 from voodoo.sensors.front_end import FrontEnd
+from voodoo.views import CameraView, limb_outline
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _AROUND = 24
 _ON_BODY_M = 0.12
 _BACKGROUND = (90, 90, 90)
-_MOST_POINTS = 20_000
+_MOST_POINTS = 40_000
 _EPOCH_S = 1e9
 
 
@@ -32,8 +33,9 @@ class Viewer:
     """Writes what happens in a step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
     Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/bands`, `world/points/<source>` (coloured by
-    the limb they lie on), `world/laser/<source>`, `world/rays`, `world/cameras/<source>` (pictures, into which Rerun
-    projects everything that is in the world), `plots/...`; the timeline is `time`.
+    the limb they lie on), `world/laser/<source>`, `world/markers/<source>`, `world/rays`, `world/cameras/<source>`
+    (pictures with the outlines of the projected limbs, skin candidates and keypoints; in depth images the person's
+    silhouette, limb by limb), `plots/...`; the timeline is `time`.
 
     Args:
         save: .rrd file to write; None opens the viewer.
@@ -56,6 +58,7 @@ class Viewer:
         else:
             Path(save).parent.mkdir(parents=True, exist_ok=True)
             self._stream.save(str(save))
+        self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._shapes: dict[str, TaperedEllipticCylinder] = {}
 
@@ -105,6 +108,12 @@ class Viewer:
 
     def _log_body(self, estimate: Estimate, body: Body) -> None:
         rr, colours = self._rr, limb_colours(body)
+        if self._classes != body.limb_names:
+            # Names and colours of the silhouette's values; 0 is the background.
+            self._classes = body.limb_names
+            rows = [(0, "background", (0, 0, 0, 0))]
+            rows += [(index, name, (*colours[name], 255)) for index, name in enumerate(self._classes, start=1)]
+            self._stream.log("world", rr.AnnotationContext(rows), static=True)
         for limb in body.limbs:
             path = f"world/body/limbs/{limb.name}"
             if self._shapes.get(limb.name) != limb.shape:
@@ -132,13 +141,41 @@ class Viewer:
         if isinstance(item, ColorImage):
             path = self._log_camera(item)
             self._stream.log(f"{path}/picture", rr.Image(item.image, color_model="BGR").compress(jpeg_quality=80))
+            self._log_model(path, item, estimate, body)
+        elif isinstance(item, KeypointImage):
+            path = self._log_camera(item)
+            self._log_model(path, item, estimate, body)
+            rows = np.vstack([*item.people, np.empty((0, 3))])
+            rows = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0.0)]
+            rings = np.column_stack([np.full((len(rows), 3), (255, 120, 255)), 60 + 195 * rows[:, 2].clip(0.0, 1.0)])
+            self._stream.log(
+                f"{path}/picture/keypoints", rr.Points2D(rows[:, :2], radii=4.0, colors=rings.astype(np.uint8))
+            )
+        elif isinstance(item, MarkerSet):
+            self._stream.log(
+                f"world/markers/{_entity(item.sensor)}",
+                rr.Points3D(
+                    list(item.positions.values()),
+                    radii=0.015,
+                    colors=(255, 60, 60),
+                    labels=list(item.positions),
+                    show_labels=False,
+                ),
+            )
         elif isinstance(item, DepthImage):
             path = self._log_camera(item)
             self._stream.log(f"{path}/picture", rr.DepthImage(item.image, meter=1.0 / item.metres_per_unit))
             z = item.image.astype(np.float32) * np.float32(item.metres_per_unit)
             valid = np.isfinite(z) & (z > 0.0)
             points = np.column_stack([item.camera.rays()[valid] * z[valid, None], z[valid]])
-            self._log_points(f"world/points/{_entity(item.sensor)}", points, item.root_from_sensor, estimate, body)
+            limbs = self._log_points(
+                f"world/points/{_entity(item.sensor)}", points, item.root_from_sensor, estimate, body
+            )
+            self._log_model(path, item, estimate, body)
+            if limbs is not None:
+                silhouette = np.zeros(item.image.shape, dtype=np.uint8)
+                silhouette[valid] = np.where(limbs == len(body.limbs), 0, limbs + 1)
+                self._stream.log(f"{path}/picture/silhouette", rr.SegmentationImage(silhouette, opacity=0.5))
         elif isinstance(item, PointCloud):
             self._log_points(f"world/points/{_entity(item.sensor)}", item.points, item.root_from_sensor, estimate, body)
         elif isinstance(item, LaserScan):
@@ -148,7 +185,20 @@ class Viewer:
                 f"world/laser/{_entity(item.sensor)}", rr.Points3D(points, radii=0.015, colors=(255, 220, 0))
             )
 
-    def _log_camera(self, item: ColorImage | DepthImage) -> str:
+    def _log_model(
+        self, path: str, item: ColorImage | DepthImage | KeypointImage, estimate: Estimate, body: Body
+    ) -> None:
+        """The outlines of the limbs as the camera sees them."""
+        outlines, colours = [], []
+        for limb in body.limbs:
+            view = CameraView(item.camera, item.root_from_sensor)
+            outline = limb_outline(limb.shape, estimate.world_from_limb[limb.name], view)
+            if outline is not None:
+                outlines.append(np.vstack([outline, outline[:1]]) + 0.5)
+                colours.append(limb_colours(body)[limb.name])
+        self._stream.log(f"{path}/picture/model", self._rr.LineStrips2D(outlines, radii=0.5, colors=colours))
+
+    def _log_camera(self, item: ColorImage | DepthImage | KeypointImage) -> str:
         rr, path, pose = self._rr, f"world/cameras/{_entity(item.sensor)}", item.root_from_sensor
         camera = item.camera
         self._stream.log(path, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
@@ -165,12 +215,14 @@ class Viewer:
 
     def _log_points(
         self, path: str, points: npt.NDArray[Any], pose: FloatArray, estimate: Estimate, body: Body
-    ) -> None:
+    ) -> npt.NDArray[np.intp] | None:
+        """Show points; the limb of each, None where there are so many that only some are shown."""
         step = max(len(points) // _MOST_POINTS, 1)
         world = np.asarray(points[::step], dtype=np.float64) @ pose[:3, :3].T + pose[:3, 3]
         colours = np.array([*limb_colours(body).values(), _BACKGROUND], dtype=np.uint8)
         limbs = nearest_limb(world, estimate, body)
         self._stream.log(path, self._rr.Points3D(world, radii=0.006, colors=colours[limbs]))
+        return limbs if step == 1 else None
 
     def _log_front_end(self, front_end: FrontEnd, estimate: Estimate) -> None:
         strips, colours, labels = [], [], []

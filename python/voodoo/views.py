@@ -37,7 +37,7 @@ class CameraView:
 
     camera: Camera
     root_from_sensor: FloatArray
-    scale: int = 1
+    scale: float = 1
 
     def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See View; depth is along the optical axis."""

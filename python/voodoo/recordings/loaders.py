@@ -10,6 +10,7 @@ from typing import Any
 
 from voodoo.errors import RecordingError
 from voodoo.recordings.folder import FolderRecording
+from voodoo.recordings.marker_files import MarkerRecording
 from voodoo.recordings.pose2sim import Pose2SimRecording
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.ros import RosRecording
@@ -31,6 +32,7 @@ LOADERS: dict[str, Loader] = {
     "utd-mhad": Loader(UtdMhadRecording, "a *_depth.mat of UTD-MHAD"),
     "folder": Loader(FolderRecording, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
     "pose2sim": Loader(Pose2SimRecording, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
+    "markers": Loader(MarkerRecording, "a .trc or .c3d file of markers"),
 }
 
 
@@ -75,6 +77,8 @@ def guess_loader(path: Path) -> str:
     if path.is_file():
         if path.name.endswith("_depth.mat"):
             return "utd-mhad"
+        if path.suffix.lower() in (".trc", ".c3d"):
+            return "markers"
         names = zip_members(path) if path.suffix == ".zip" else [path.name]
         if any(name.endswith(".bag") for name in names):
             return "ros1"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -148,7 +148,28 @@ class KeypointImage:
         return f"KeypointImage({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.people)} people, {self.layout})"
 
 
-Measurement: TypeAlias = DepthImage | PointCloud | LaserScan | ColorImage | KeypointImage
+@dataclass(frozen=True, eq=False, repr=False)
+class MarkerSet:
+    """Positions of named sites from markers or magnetic trackers.
+
+    Args:
+        sensor: name of the system or file.
+        stamp: time of measurement [s].
+        positions: site name -> (3,) [m] in the recording's root frame; missing ones are left out.
+        sigma: standard deviation of each [m]; None: not known.
+    """
+
+    sensor: str
+    stamp: float
+    positions: Mapping[str, FloatArray]
+    sigma: float | None = None
+
+    def __repr__(self) -> str:
+        """One line with the number of sites."""
+        return f"MarkerSet({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.positions)} sites)"
+
+
+Measurement: TypeAlias = DepthImage | PointCloud | LaserScan | ColorImage | KeypointImage | MarkerSet
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,15 +1,16 @@
-"""From recorded measurements to the tracker's Frame: prediction, gates, agreement of rays, weights from standard
-deviations."""
+"""From recorded measurements to the tracker's Frame, the one way there is: prediction, gates, agreement of rays, weights
+from standard deviations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from voodoo._core import Estimate, Frame
+import voodoo
 from voodoo.errors import MeasurementError
 from voodoo.keypoints import KeypointReport, KeypointSensor, nearest_person
 from voodoo.recordings import (
@@ -17,6 +18,7 @@ from voodoo.recordings import (
     DepthImage,
     KeypointImage,
     LaserScan,
+    MarkerSet,
     Measurement,
     PointCloud,
     RecordedFrame,
@@ -27,7 +29,6 @@ from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import (
     PLANAR_LASER,
     POINTS_SHARING,
-    TIME_OF_FLIGHT,
     PixelNoise,
     RangeNoise,
     SensorModel,
@@ -35,10 +36,11 @@ from voodoo.sensors.model import (
 from voodoo.sensors.pixels import FloatArray, in_sensor
 from voodoo.sensors.rays import SiteRay, add_rays, agreed
 from voodoo.sensors.skin import SkinSettings, SkinTracker
-from voodoo.tracker import Tracker
 
-INPUTS = ("depth", "points", "scan", "keypoints", "skin")
+INPUTS = ("depth", "points", "scan", "keypoints", "skin", "markers")
 """Kinds of measurements a front end can use."""
+LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
+"""Root frames whose z = 0 is the floor (REP-105)."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +50,16 @@ class FrontEndSettings:
     Args:
         use: kinds from INPUTS; measurements of other kinds are left out.
         model: standard deviation to weight.
-        depth_noise: of depth images and point clouds. The weight is that at the predicted range of the body; it is
-            relative, so a point of the body at that range weighs `(reference_sigma / sigma)^2 / sharing`.
-        scan_noise: of laser scans.
+        depth_noise: of depth images and point clouds; the weight is that at the predicted range of the body. None:
+            every point weighs 1, as in the papers (a time-of-flight point at 3 m).
+        scan_noise: of laser scans; None: every return weighs 1.
         sharing: neighbouring depth pixels that share one error.
         scan_sharing: the same for a scan, whose beams lie farther apart.
         keypoint_noise: of 2-D keypoints.
         min_confidence: keypoints believed less are not used.
         gate_radius, gate_growth, gate_widest: see SiteGate.
         agreement: scale [m] of `agreed`; 0 switches it off.
+        marker_sigma: standard deviation [m] of a marker that is given without one.
         depth_filter: what is dropped from depth images; None takes them as they are.
         skin: settings of the skin-colour cue.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
@@ -67,8 +70,8 @@ class FrontEndSettings:
 
     use: tuple[str, ...] = INPUTS
     model: SensorModel = field(default_factory=SensorModel)
-    depth_noise: RangeNoise = TIME_OF_FLIGHT
-    scan_noise: RangeNoise = PLANAR_LASER
+    depth_noise: RangeNoise | None = None
+    scan_noise: RangeNoise | None = PLANAR_LASER
     sharing: float = POINTS_SHARING
     scan_sharing: float = 4.0
     keypoint_noise: PixelNoise = field(default_factory=PixelNoise)
@@ -77,7 +80,8 @@ class FrontEndSettings:
     gate_growth: float = 0.5
     gate_widest: float = 0.40
     agreement: float = 0.08
-    depth_filter: DepthFilter | None = field(default_factory=DepthFilter)
+    marker_sigma: float = 0.02
+    depth_filter: DepthFilter | None = None
     skin: SkinSettings = field(default_factory=SkinSettings)
     ground_z: float | None = None
 
@@ -86,6 +90,15 @@ class FrontEndSettings:
         unknown = sorted(set(self.use) - set(INPUTS))
         if unknown or not self.use:
             raise MeasurementError(f"use: expected some of {', '.join(INPUTS)}, found {', '.join(unknown) or 'none'}")
+
+    @classmethod
+    def of(cls, recording: Recording, *, use: Sequence[str] = INPUTS) -> FrontEndSettings:
+        """The defaults for a recording: the floor is known where its root frame is one of LEVEL_FRAMES.
+
+        Raises:
+            MeasurementError: an unknown kind.
+        """
+        return cls(use=tuple(use), ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
 
 
 class FrontEnd:
@@ -96,19 +109,21 @@ class FrontEnd:
         settings: see FrontEndSettings.
     """
 
-    def __init__(self, tracker: Tracker, *, settings: FrontEndSettings | None = None) -> None:
+    def __init__(self, tracker: voodoo.Tracker, *, settings: FrontEndSettings | None = None) -> None:
         """Take up the tracker's current estimate as the first prediction."""
         self.tracker = tracker
         self.settings = settings or FrontEndSettings()
         self.reports: dict[str, KeypointReport] = {}
         self.skin: dict[str, SkinTracker] = {}
         self.rays: list[SiteRay] = []
+        self.frozen: tuple[str, ...] = ()
+        self._contents: dict[str, npt.NDArray[Any]] = {}
         self._predictor = SitePredictor()
         chosen = self.settings
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
         self._predictor.update(float("nan"), tracker.estimate.joints)
 
-    def step(self, recorded: RecordedFrame) -> Estimate:
+    def step(self, recorded: RecordedFrame) -> voodoo.Estimate:
         """Make the frame, step the tracker, and learn from the estimate.
 
         Raises:
@@ -122,18 +137,24 @@ class FrontEnd:
                 self.skin[item.sensor].learn(item.image, item.camera, item.root_from_sensor, estimate)
         return estimate
 
-    def frame(self, recorded: RecordedFrame) -> Frame:
+    def frame(self, recorded: RecordedFrame) -> voodoo.Frame:
         """The tracker's frame, without stepping."""
-        frame = Frame(stamp=recorded.stamp)
+        measurements = self._alive(recorded.measurements)
+        frame = voodoo.Frame(stamp=recorded.stamp)
         if self.settings.ground_z is not None:
             frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
         predicted = self._predictor.predict(recorded.stamp)
         self.rays = []
-        depth = next((item for item in recorded.measurements if isinstance(item, DepthImage)), None)
-        for item in recorded.measurements:
+        depths = [item for item in measurements if isinstance(item, DepthImage)]
+        if "depth" not in self.settings.use:
+            depths = []
+        for item in measurements:
             if isinstance(item, ColorImage):
                 if "skin" in self.settings.use:
-                    self._add_skin(item, predicted, depth if "depth" in self.settings.use else None)
+                    self._add_skin(item, predicted, depths[0] if depths else None)
+            elif isinstance(item, KeypointImage):
+                if "keypoints" in self.settings.use:
+                    self._add_keypoints(frame, item, predicted, depths)
             else:
                 self._add(frame, item, predicted)
         if self.settings.agreement > 0.0:
@@ -141,7 +162,28 @@ class FrontEnd:
         add_rays(frame, self.rays, model=self.settings.model)
         return frame
 
-    def _add(self, frame: Frame, item: Measurement, predicted: Mapping[str, FloatArray]) -> None:
+    def _alive(self, measurements: Sequence[Measurement]) -> list[Measurement]:
+        """Those measurements whose sensor is not frozen; `frozen` names the others.
+
+        A sensor is frozen when it repeats its last measurement bit by bit while another one measures something new:
+        real sensors have noise. A frozen depth camera would else say with all its points that nobody moves.
+        """
+        repeats, changes = [], False
+        for item in measurements:
+            content = _content(item, self.settings.use)
+            if content is None:
+                continue
+            before = self._contents.get(item.sensor)
+            self._contents[item.sensor] = content
+            if before is not None and np.array_equal(before, content):
+                repeats.append(item)
+            else:
+                changes = changes or before is not None
+        stuck = repeats if changes else []
+        self.frozen = tuple(item.sensor for item in stuck)
+        return [item for item in measurements if not any(item is other for other in stuck)]
+
+    def _add(self, frame: voodoo.Frame, item: Measurement, predicted: Mapping[str, FloatArray]) -> None:
         use = self.settings.use
         if isinstance(item, DepthImage) and "depth" in use:
             image = item.image
@@ -159,11 +201,14 @@ class FrontEnd:
             weight = self._points_weight(item, predicted)
             frame.add_points(item.points, world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
         elif isinstance(item, LaserScan) and "scan" in use:
-            sigma = self.settings.scan_noise.sigma(self._range(item, predicted))
-            weight = self.settings.model.weight(sigma, sharing=self.settings.scan_sharing)
+            weight = self._weight(self.settings.scan_noise, self.settings.scan_sharing, item, predicted)
             frame.add_points(item.points(), world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
-        elif isinstance(item, KeypointImage) and "keypoints" in use:
-            self._add_keypoints(item, predicted, frame.stamp)
+        elif isinstance(item, MarkerSet) and "markers" in use:
+            sigma = self.settings.marker_sigma if item.sigma is None else item.sigma
+            weight = self.settings.model.weight(sigma)
+            for site, position in item.positions.items():
+                if site in predicted:
+                    frame.add_position(site, position, weight=weight, source=item.sensor)
 
     def _add_skin(self, item: ColorImage, predicted: Mapping[str, FloatArray], depth: DepthImage | None) -> None:
         skin = self.skin.setdefault(item.sensor, SkinTracker(self.settings.skin))
@@ -193,7 +238,13 @@ class FrontEnd:
         )
         self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
 
-    def _add_keypoints(self, item: KeypointImage, predicted: Mapping[str, FloatArray], stamp: float) -> None:
+    def _add_keypoints(
+        self,
+        frame: voodoo.Frame,
+        item: KeypointImage,
+        predicted: Mapping[str, FloatArray],
+        depths: Sequence[DepthImage],
+    ) -> None:
         place: dict[str, Any] = {
             "layout": item.layout,
             "camera": item.camera,
@@ -210,17 +261,46 @@ class FrontEnd:
             model=self.settings.model,
             min_confidence=self.settings.min_confidence,
         )
-        report, rays, _ = sensor.observe(person, stamp=stamp, predicted=predicted, gate=self._gate)
+        registered = next((depth for depth in depths if _same_camera(depth, item)), None)
+        with_depth: dict[str, Any] = {}
+        if registered is not None:
+            with_depth = {"depth": registered.image, "metres_per_unit": registered.metres_per_unit}
+        report, rays, points = sensor.observe(
+            person, stamp=frame.stamp, predicted=predicted, gate=self._gate, **with_depth
+        )
         self.reports[item.sensor] = report
         self.rays += rays
-
-    def _range(self, item: DepthImage | PointCloud | LaserScan, predicted: Mapping[str, FloatArray]) -> float:
-        body = np.mean(list(predicted.values()), axis=0)
-        return max(float(np.linalg.norm(in_sensor(item.root_from_sensor, body[None])[0])), 0.1)
+        for site, (position, sigma) in points.items():
+            frame.add_position(site, position, weight=self.settings.model.weight(sigma), source=item.sensor)
 
     def _points_weight(self, item: DepthImage | PointCloud, predicted: Mapping[str, FloatArray]) -> float:
-        sigma = self.settings.depth_noise.sigma(self._range(item, predicted))
-        return self.settings.model.weight(sigma, sharing=self.settings.sharing)
+        return self._weight(self.settings.depth_noise, self.settings.sharing, item, predicted)
+
+    def _weight(
+        self,
+        noise: RangeNoise | None,
+        sharing: float,
+        item: DepthImage | PointCloud | LaserScan,
+        predicted: Mapping[str, FloatArray],
+    ) -> float:
+        if noise is None:
+            return 1.0
+        body = np.mean(list(predicted.values()), axis=0)
+        away = max(float(np.linalg.norm(in_sensor(item.root_from_sensor, body[None])[0])), 0.1)
+        return self.settings.model.weight(noise.sigma(away), sharing=sharing)
+
+
+def _content(item: Measurement, use: Sequence[str]) -> npt.NDArray[Any] | None:
+    """What a range sensor of a kind in use measured."""
+    if isinstance(item, DepthImage) and "depth" in use:
+        return item.image
+    if isinstance(item, PointCloud) and "points" in use:
+        return item.points
+    return item.ranges if isinstance(item, LaserScan) and "scan" in use else None
+
+
+def _same_camera(depth: DepthImage, item: KeypointImage) -> bool:
+    return depth.camera == item.camera and np.allclose(depth.root_from_sensor, item.root_from_sensor, atol=1e-6)
 
 
 def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFrame]:
@@ -235,9 +315,15 @@ def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFra
     held: RecordedFrame | None = None
     for recorded in recording:
         if held is not None:
-            early = tuple(item for item in recorded.measurements if item.stamp - held.stamp <= wait)
+            # A fast sensor's next measurement, and the one a frame was made for, stay where they are.
+            has = {item.sensor for item in held.measurements}
+            early = tuple(
+                item
+                for item in recorded.measurements[:-1]
+                if item.stamp - held.stamp <= wait and item.sensor not in has
+            )
             yield RecordedFrame(held.stamp, held.measurements + early)
-            late = tuple(item for item in recorded.measurements if item.stamp - held.stamp > wait)
+            late = tuple(item for item in recorded.measurements if not any(item is other for other in early))
             recorded = RecordedFrame(recorded.stamp, late)
         held = recorded
     if held is not None:

@@ -117,6 +117,11 @@ class SkinTracker:
         """True when enough pictures were learnt from."""
         return self._learnt >= self.settings.settled_frames
 
+    @property
+    def mask(self) -> Mask | None:
+        """(H, W): skin in the last picture, without what was ruled out; None before the first picture."""
+        return self._skin
+
     def observe(
         self,
         image: ByteImage,

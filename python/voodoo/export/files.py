@@ -1,0 +1,62 @@
+"""One call for every format: the suffix says which."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from voodoo.body import Body
+from voodoo.errors import VoodooError
+from voodoo.export.bvh import write_bvh
+from voodoo.export.ros2 import write_bag
+from voodoo.export.trc import write_trc
+from voodoo.results import Track
+
+FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
+"""Suffixes; a path without one is a ROS 2 bag folder."""
+
+
+def check_target(path: Path) -> None:
+    """Refuse a path that cannot be written to, before the work.
+
+    Raises:
+        VoodooError: another suffix, or a bag folder that exists.
+    """
+    if path.suffix and path.suffix not in FORMATS:
+        raise VoodooError(
+            f"{path}: expected a name that ends in {', '.join(FORMATS)}, or a new folder for a ROS 2 bag, found "
+            f"{path.suffix!r}"
+        )
+    if not path.suffix and path.exists():
+        raise VoodooError(f"{path}: expected a new folder for a ROS 2 bag, found one that exists")
+
+
+def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
+    """Write a track: .csv, .npz, .bvh, .trc, .mcap, or a ROS 2 bag folder.
+
+    Args:
+        track: with limb poses.
+        path: see FORMATS.
+        body: in the sizes it was tracked with.
+        root_frame: frame of the track, for bags.
+
+    Raises:
+        VoodooError: another suffix, or what the format needs is missing.
+        OSError: the file cannot be written.
+    """
+    check_target(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix == ".bvh":
+        write_bvh(path, track, body)
+    elif path.suffix == ".trc":
+        write_trc(path, track)
+    elif path.suffix == ".mcap":
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            bag = Path(folder) / path.stem
+            write_bag(bag, track, body, root_frame=root_frame)
+            shutil.move(next(bag.glob("*.mcap")), path)
+    elif not path.suffix:
+        write_bag(path, track, body, root_frame=root_frame)
+    else:
+        track.save(path)

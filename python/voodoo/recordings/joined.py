@@ -1,0 +1,155 @@
+"""More inputs beside a recording: keypoints of its own cameras, and other recordings of the same scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from voodoo.errors import RecordingError
+from voodoo.keypoints import layout_of, read_openpose_json
+from voodoo.recordings.measurements import ColorImage, DepthImage, KeypointImage, Measurement, RecordedFrame
+from voodoo.recordings.recording import Recording, RecordingInfo
+
+
+class Joined(Recording):
+    """A recording whose frames also hold what other recordings measured since the frame before.
+
+    All must be of the same scene, in the same root frame and by the same clock. Start, reference and the times of the
+    frames are those of the first one.
+
+    Args:
+        first: gives the frames.
+        others: what is added; their own start and reference are not used.
+        offset: [s] added to the stamps of the others.
+
+    Raises:
+        RecordingError: one of the others measured nothing during the first, which tells of another clock.
+    """
+
+    def __init__(self, first: Recording, others: Sequence[Recording], *, offset: float = 0.0) -> None:
+        """Check that they overlap in time."""
+        self.path, self.name, self.root_frame = first.path, first.name, first.root_frame
+        self.start, self.reference = first.start, first.reference
+        self._first, self._others, self._offset = first, tuple(others), offset
+        about = first.info()
+        low, high = about.start_stamp, about.start_stamp + about.duration
+        for other in others:
+            this = other.info()
+            begin = this.start_stamp + offset
+            if begin > high or begin + this.duration < low:
+                raise RecordingError(
+                    f"{other.path}: expected stamps between {low:.3f} and {high:.3f} s as in {first.path}, found "
+                    f"{begin:.3f} to {begin + this.duration:.3f} s; is an offset of the clock missing (--offset)?"
+                )
+
+    def __len__(self) -> int:
+        """Number of frames of the first recording."""
+        return len(self._first)
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """The frames of the first recording with the measurements of all."""
+        streams = [_Ahead(other, self._offset) for other in self._others]
+        for recorded in self._first:
+            added = tuple(item for stream in streams for item in stream.until(recorded.stamp))
+            # The frame's own measurement stays the last one.
+            yield RecordedFrame(recorded.stamp, (*recorded.measurements[:-1], *added, *recorded.measurements[-1:]))
+
+    def info(self) -> RecordingInfo:
+        """That of the first, with the sensors of all."""
+        about = self._first.info()
+        sensors = tuple(sensor for other in self._others for sensor in other.info().sensors)
+        joined = ", ".join(str(other.path) for other in self._others)
+        return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, f"joined with {joined}"))
+
+
+class _Ahead:
+    """Measurements of a recording, handed out as time goes on."""
+
+    def __init__(self, recording: Recording, offset: float) -> None:
+        self._frames = iter(recording)
+        self._offset = offset
+        self._held: RecordedFrame | None = None
+
+    def until(self, stamp: float) -> tuple[Measurement, ...]:
+        """What was measured since the last call, up to `stamp`: the last of each sensor."""
+        found: tuple[Measurement, ...] = ()
+        while True:
+            held = self._held if self._held is not None else next(self._frames, None)
+            if held is None or held.stamp + self._offset > stamp + 1e-6:
+                self._held = held
+                return found
+            self._held = None
+            moved = tuple(replace(item, stamp=item.stamp + self._offset) for item in held.measurements)
+            latest = {item.sensor for item in moved}
+            found = tuple(item for item in found if item.sensor not in latest) + moved
+
+
+class WithKeypoints(Recording):
+    """A recording whose pictures come with the keypoints that a network found in them.
+
+    Args:
+        recording: with colour or depth images.
+        folders: sensor -> folder of OpenPose JSON files, one for each of its images, sorted by name.
+        layout: of the keypoints, see voodoo.keypoints.LAYOUTS.
+
+    Raises:
+        RecordingError: an unknown sensor, or another number of files than images.
+        MeasurementError: an unknown layout.
+    """
+
+    def __init__(self, recording: Recording, folders: Mapping[str, Path], *, layout: str) -> None:
+        """List the files."""
+        layout_of(layout)
+        self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
+        self.start, self.reference = recording.start, recording.reference
+        self._recording, self._layout = recording, layout
+        self._files: dict[str, list[Path]] = {}
+        sensors = {item.name: item for item in recording.info().sensors if item.kind in ("color", "depth")}
+        for name, folder in folders.items():
+            if name not in sensors:
+                raise RecordingError(f"keypoints: expected one of {', '.join(sensors) or 'no cameras'}, found {name!r}")
+            files = sorted(folder.glob("*.json"))
+            if len(files) != sensors[name].messages:
+                raise RecordingError(
+                    f"{folder}: expected {sensors[name].messages} .json files, one for each image of {name}, found "
+                    f"{len(files)}"
+                )
+            self._files[name] = files
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self._recording)
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """The frames, with a KeypointImage before each image that has one."""
+        count = dict.fromkeys(self._files, 0)
+        for recorded in self._recording:
+            items: list[Measurement] = []
+            for item in recorded.measurements:
+                if isinstance(item, (ColorImage, DepthImage)) and count.get(item.sensor, -1) >= 0:
+                    file = self._files[item.sensor][count[item.sensor]]
+                    count[item.sensor] += 1
+                    items.append(self._keypoints(item, file))
+                items.append(item)
+            yield RecordedFrame(recorded.stamp, tuple(items))
+
+    def _keypoints(self, item: ColorImage | DepthImage, file: Path) -> KeypointImage:
+        return KeypointImage(
+            sensor=f"{item.sensor}/keypoints",
+            stamp=item.stamp,
+            people=tuple(read_openpose_json(file, layout=self._layout)),
+            layout=self._layout,
+            camera=item.camera,
+            root_from_sensor=item.root_from_sensor,
+        )
+
+    def info(self) -> RecordingInfo:
+        """That of the recording, with the keypoints."""
+        about = self._recording.info()
+        sensors = tuple(
+            replace(sensor, name=f"{sensor.name}/keypoints", kind="keypoints", detail=f"{self._layout} keypoints")
+            for sensor in about.sensors
+            if sensor.name in self._files
+        )
+        return replace(about, sensors=about.sensors + sensors)

@@ -1,0 +1,138 @@
+"""Marker files (.trc, .c3d) as recordings, with a map that says which site each marker stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+
+from voodoo.body import Body
+from voodoo.errors import RecordingError
+from voodoo.markers import Z_UP_FROM_Y_UP, read_markers
+from voodoo.recordings.measurements import FloatArray, MarkerSet, RecordedFrame
+from voodoo.recordings.pose2sim import SITES
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start, mean_rate
+from voodoo.toml_text import parse_toml, read_text
+
+FRAME = "world"
+
+
+class OnLimb(BaseModel):
+    """Where a marker is worn.
+
+    Args:
+        limb: name of the limb.
+        position: (x, y, z) [m] in the limb's frame.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    limb: str
+    position: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+class MarkerMap(BaseModel):
+    """What the markers of a file mean.
+
+    Args:
+        sites: marker name -> site name. Markers named like a site of the default human need no entry, nor do
+            Pose2Sim's.
+        limbs: marker name -> where it is worn; it becomes a site of its own.
+        y_up: the file's axes are OpenSim's (Y up) and are turned to z up; False keeps them.
+        sigma_m: standard deviation of a marker's position [m].
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sites: dict[str, str] = Field(default_factory=dict)
+    limbs: dict[str, OnLimb] = Field(default_factory=dict)
+    y_up: bool = True
+    sigma_m: Annotated[FiniteFloat, Field(gt=0.0)] = 0.02
+
+    @classmethod
+    def load(cls, path: Path) -> MarkerMap:
+        """Read it from TOML.
+
+        Raises:
+            RecordingError: not readable, or not of that form; names file and key.
+        """
+        tables = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
+        try:
+            return cls.model_validate(tables)
+        except ValidationError as error:
+            problem = error.errors(include_url=False)[0]
+            key = ".".join(str(part) for part in problem["loc"])
+            raise RecordingError(f"{path}: {key}: {problem['msg']}, found {problem['input']!r:.80}") from error
+
+    def worn(self) -> dict[str, tuple[str, tuple[float, float, float]]]:
+        """The markers on limbs as voodoo.markers.body_with_markers takes them."""
+        return {name: (place.limb, place.position) for name, place in self.limbs.items()}
+
+
+class MarkerRecording(Recording):
+    """A .trc or .c3d file: one frame for each instant, the first instant as start.
+
+    Args:
+        path: the file.
+        markers: what its markers mean; None: they have names of the default human's sites, or Pose2Sim's. Others are
+            not used.
+
+    Raises:
+        RecordingError: the file is damaged.
+    """
+
+    def __init__(self, path: Path, markers: MarkerMap | None = None) -> None:
+        """Read the file."""
+        self.path, self.name, self.root_frame = path, path.stem, FRAME
+        self.map = markers or MarkerMap()
+        content = read_markers(path, world_from_file=Z_UP_FROM_Y_UP if self.map.y_up else None)
+        names = (
+            {name: name for name in Body.human(model="full").site_names}
+            | SITES
+            | self.map.sites
+            | {name: name for name in self.map.limbs}
+        )
+        sites, self._positions = content.of(names)
+        self._sites, self._stamps = sites, content.stamps
+        unknown = sorted((set(self.map.sites) | set(self.map.limbs)) - set(content.names))
+        if unknown:
+            raise RecordingError(f"{path}: expected the markers {', '.join(unknown)}, found {', '.join(content.names)}")
+        if len(set(sites)) != len(sites):
+            raise RecordingError(f"{path}: expected one marker for each site, found {', '.join(sorted(sites))}")
+        first = {name: at for name, at in self._at(0).items() if name not in self.map.limbs}
+        self.start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
+        self.reference = None
+
+    def _at(self, index: int) -> dict[str, FloatArray]:
+        rows = zip(self._sites, self._positions[index], strict=True)
+        return {site: position for site, position in rows if np.isfinite(position).all()}
+
+    def __len__(self) -> int:
+        """Number of instants."""
+        return len(self._stamps)
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """The markers, instant by instant."""
+        for index, stamp in enumerate(self._stamps):
+            item = MarkerSet(self.path.name, float(stamp), self._at(index), self.map.sigma_m)
+            yield RecordedFrame(float(stamp), (item,))
+
+    def info(self) -> RecordingInfo:
+        """Summarize."""
+        duration = float(self._stamps[-1] - self._stamps[0])
+        rate = mean_rate(len(self), duration)
+        detail = f"{len(self._sites)} markers"
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader="markers",
+            frames=len(self),
+            start_stamp=float(self._stamps[0]),
+            duration=duration,
+            rate_hz=rate,
+            root_frame=FRAME,
+            sensors=(SensorInfo(self.path.name, "markers", FRAME, len(self), rate, detail),),
+        )
