@@ -14,8 +14,9 @@ use crate::terms::{Limits, Prior, Sites, Term};
 const LIMIT_SIGMA: f64 = 0.05;
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
-/// Share of the sites' information that leads: the limbs' own points have their say afterwards.
-const LED: f64 = 0.1;
+/// Information of the heaviest site in surface points of weight one. Only the proportions of weights matter in this solver,
+/// and the limbs' own points have their say afterwards.
+const LED: f64 = 2.0;
 /// Scale of the kernel, metres: sites that are led come from far.
 const SCALE: f64 = 0.5;
 
@@ -47,7 +48,8 @@ impl Guide {
             .extend(body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * pace));
         let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * pace);
         self.normal.clear(poses.len());
-        let information = LED / (config.point_sigma * config.point_sigma);
+        let heaviest = correspondences.sites.iter().fold(f64::MIN_POSITIVE, |most, pair| most.max(pair.weight));
+        let information = LED / (heaviest * config.point_sigma * config.point_sigma);
         let terms: [&dyn Term; 3] = [
             &Sites { correspondences, information, scale: SCALE },
             &Prior { predicted: &self.start, root, joints: &self.joint_sigmas },
