@@ -23,7 +23,7 @@ def test_images_halve_the_error_of_the_inner_joints(voodoo_data, name, halved):
     plain, one, two = (means(sequence.solve(views), sequence.truth) for views in (0, 1, 2))
     for index, joint in enumerate(("elbow", "knee")):
         assert max(one[index], two[index]) < 0.025
-        # An elbow of a walking person is within a pixel and a half without images, too.
+        # An elbow of a walking person is within about a pixel without images, too.
         assert max(one[index], two[index]) < (0.5 if joint in halved else 0.85) * plain[index]
     assert one.mean() < two.mean() + 0.005  # one view is nearly as good as two
 
