@@ -265,7 +265,7 @@ config! {
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
     outline: bool = true, "";
     /// Limbs that are not joined push each other apart where they overlap (whole-body solvers).
-    penetration: bool = true, "";
+    penetration: bool = false, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// After a reset that fits sizes, the frames that follow refine the limbs' lengths (whole-body solvers).

@@ -13,7 +13,7 @@ const SLIDE: f64 = 0.07;
 const LIMIT_SIGMA: f64 = 0.05;
 /// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter.
 const OVERLAP_SIGMA: f64 = 0.03;
-const FREE_SHARE: f64 = 0.8;
+const FREE_SHARE: f64 = 0.3;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
