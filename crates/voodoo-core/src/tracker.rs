@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::associate::Assignment;
 use crate::background::Backgrounds;
-use crate::body::Body;
+use crate::body::{Body, Pair};
 use crate::calibrate::{GirthFit, girth_step};
 use crate::candidates::{Candidates, body_box, image_window, shifted};
 use crate::config::Config;
@@ -18,7 +18,7 @@ use crate::outline::{edges, match_edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
-use crate::solver::{Gate, Pair, Problem, Solver, pairs, solver};
+use crate::solver::{Gate, Problem, Solver, solver};
 use crate::view::{Views, find_cut_out};
 
 /// Gauss-Newton steps of the girth fit.
@@ -356,7 +356,7 @@ impl Tracker {
 
     /// Starts to refine the limbs' lengths from those they have.
     fn follow_lengths(&mut self) {
-        self.pairs = pairs(&self.body);
+        self.pairs = self.body.pairs();
         self.stretched = vec![1.0; self.pairs.len()];
     }
 

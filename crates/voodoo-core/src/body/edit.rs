@@ -5,6 +5,9 @@ use crate::error::BodyError;
 use crate::geometry::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
+/// Limbs that are of one length: the two of a pair, or one of the trunk.
+pub type Pair = Vec<usize>;
+
 impl Body {
     /// The body with all lengths multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Self, BodyError> {
@@ -64,6 +67,30 @@ impl Body {
         if let Ok(shape) = TaperedEllipticCylinder::new(length, shape.a0(), shape.b0(), a1, b1) {
             self.limbs[limb].shape = shape;
         }
+    }
+
+    /// Limbs that carry others, left and right together: they have one length.
+    pub fn pairs(&self) -> Vec<Pair> {
+        let stem = |index: usize| self.limbs[index].name.trim_start_matches("l_").trim_start_matches("r_");
+        let mut pairs: Vec<Pair> = Vec::new();
+        for index in (0..self.limbs.len()).filter(|index| self.children(*index).next().is_some()) {
+            match pairs.iter_mut().find(|pair| stem(pair[0]) == stem(index)) {
+                Some(pair) => pair.push(index),
+                None => pairs.push(vec![index]),
+            }
+        }
+        pairs
+    }
+
+    /// Mean distance of the joints a limb carries from its own along its axis, metres.
+    pub(super) fn bone(&self, limb: usize) -> f64 {
+        let own = self.limbs[limb].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (_, joint) in self.children(limb).filter_map(|child| self.limbs[child].parent.as_ref()) {
+            sum += (joint.parent_from_joint.translation.z - own).abs();
+            count += 1.0;
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
     }
 
     /// Makes a limb longer by a factor, with all that is fixed to it. A change that makes no solid is not made.

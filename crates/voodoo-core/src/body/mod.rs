@@ -5,6 +5,7 @@ mod fit;
 mod human;
 mod joint;
 
+pub use edit::Pair;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 
@@ -83,6 +84,12 @@ impl Body {
         let joins =
             |child: usize, parent: usize| self.limbs[child].parent.as_ref().is_some_and(|(index, _)| *index == parent);
         joins(first, second) || joins(second, first)
+    }
+
+    /// The limbs that hang on a limb.
+    pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
+        let hangs = move |other: &usize| matches!(self.limbs[*other].parent, Some((parent, _)) if parent == limb);
+        (0..self.limbs.len()).filter(hangs)
     }
 
     /// World poses of all limbs with every joint closed and at rest.

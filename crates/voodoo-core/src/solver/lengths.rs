@@ -4,12 +4,9 @@ use nalgebra::Vector6;
 
 use super::ChainSolver;
 use super::cholesky::solve_in_place;
-use crate::body::Body;
+use crate::body::{Body, Pair};
 use crate::geometry::{Pose, Vec3};
 use crate::normal::Normal;
-
-/// Limbs that are of one length: the two of a pair, or one of the trunk.
-pub type Pair = Vec<usize>;
 
 /// Working memory.
 #[derive(Debug, Default)]
@@ -20,22 +17,6 @@ pub struct Lengths {
     column: Vec<f64>,
     reduced: Vec<f64>,
     gradient: Vec<f64>,
-}
-
-/// Limbs that carry others, left and right together.
-pub fn pairs(body: &Body) -> Vec<Pair> {
-    let limbs = body.limbs();
-    let carries =
-        |index: usize| limbs.iter().any(|limb| limb.parent.as_ref().is_some_and(|(parent, _)| *parent == index));
-    let stem = |index: usize| limbs[index].name.trim_start_matches("l_").trim_start_matches("r_");
-    let mut pairs: Vec<Pair> = Vec::new();
-    for index in (0..limbs.len()).filter(|index| carries(*index)) {
-        match pairs.iter_mut().find(|pair| stem(pair[0]) == stem(index)) {
-            Some(pair) => pair.push(index),
-            None => pairs.push(vec![index]),
-        }
-    }
-    pairs
 }
 
 impl ChainSolver {

@@ -11,12 +11,11 @@ mod whole_body;
 pub use chain::ChainSolver;
 pub(crate) use cholesky::solve_in_place;
 pub use guide::Guide;
-pub use lengths::{Pair, pairs};
 pub use limbwise::Limbwise;
 pub use tree::TreeSolver;
 pub use whole_body::WholeBody;
 
-use crate::body::Body;
+use crate::body::{Body, Pair};
 use crate::config::{Config, SolverKind};
 use crate::correspondence::Correspondences;
 use crate::geometry::Pose;

@@ -1,7 +1,8 @@
 //! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Pair, Problem, Solver, TreeSolver};
+use super::{ChainSolver, Gate, Problem, Solver, TreeSolver};
+use crate::body::Pair;
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;

@@ -16,6 +16,8 @@ const SUSPICIOUS: f64 = 25.0;
 /// A chain is idle when the patches that it alone explains are a smaller share of those it shows, counted as this many at
 /// least, for so many frames.
 const IDLE: f64 = 0.3;
+/// It is refuted when cameras see past such a share of it.
+const REFUTED: f64 = 0.2;
 const LEAST: f64 = 20.0;
 const PATIENCE: usize = 3;
 /// A hypothesis must explain so many patches more than the current pose.
@@ -28,6 +30,10 @@ const MOTION_STRAIN: f64 = 0.6;
 /// Places along a limb that are looked at, and how deep (metres) one lies in another limb when it is inside.
 const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const INSIDE: f64 = 0.01;
+/// Places where the end of a chain is tried, size of what stands for one (metres), and patches of it that may be stray.
+const TARGETS: usize = 5;
+const HEAP: f64 = 0.08;
+const STRAY: f64 = 3.0;
 /// Points looked at when hypotheses are compared, at most.
 const SAMPLE: usize = 400;
 
@@ -40,6 +46,9 @@ pub(super) struct Hypotheses {
     /// Points the chain under test may explain.
     near: Points,
     near_weight: Vec<f64>,
+    /// Points it is matched to now.
+    own: Points,
+    own_weight: Vec<f64>,
     best: Vec<f32>,
     others: Vec<f32>,
     surface: SurfaceBatch,
@@ -109,7 +118,6 @@ impl Tracker {
                 work.near_weight.push(work.open_weight[index]);
             }
         }
-        let open_count = work.near.len();
         let open: f64 = work.near_weight.iter().sum();
         let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let look = |poses: &[Pose]| {
@@ -121,32 +129,7 @@ impl Tracker {
             self.idle[index] = 0;
             return 0;
         }
-        // The points the chain explains now must stay explained.
-        for limb in chain.limbs() {
-            let matches = &self.correspondences.limbs[limb];
-            for (index, weight) in matches.weight.iter().enumerate() {
-                if *weight > 0.0 {
-                    let point = matches.measured.get(index);
-                    work.near.push(point.to_array().map(|value| value as f32));
-                    work.near_weight.push(f64::from(*weight));
-                }
-            }
-        }
-        let targets = targets(&work.near, open_count, root);
-        // What the other limbs explain anyway is no merit of this one.
-        work.others.clear();
-        work.others.resize(work.near.len(), f32::INFINITY);
-        for limb in (0..self.poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
-            self.body.limbs()[limb].shape.closest_points(&self.poses[limb], &work.near, &mut work.surface);
-            for (least, distance) in work.others.iter_mut().zip(&work.surface.signed_distance) {
-                *least = least.min(distance.abs());
-            }
-        }
-        // An arm that explains little beside what the other limbs explain may be anywhere; one that does stays.
-        let own = work.others[open_count..].iter().zip(&work.near_weight[open_count..]);
-        let alone: f64 = own.filter(|(other, _)| f64::from(**other) > EXPLAINED).map(|(_, weight)| weight).sum();
-        let now = look(&self.poses);
-        if alone > IDLE * (now.facing - now.hidden).max(LEAST) {
+        if self.suspect(chain, views, work) == [false; 2] {
             self.idle[index] = 0;
             return 0;
         }
@@ -154,6 +137,14 @@ impl Tracker {
         if self.idle[index] < PATIENCE {
             return 0;
         }
+        let targets = targets(&work.near, &work.near_weight, root, &mut work.best);
+        // The points the chain explains now must stay explained.
+        for index in 0..work.own.len() {
+            work.near.push(work.own.get(index).to_array().map(|value| value as f32));
+        }
+        work.near_weight.extend(&work.own_weight);
+        // What the other limbs explain anyway is no merit of this one.
+        self.distances_to_others(chain, &work.near, &mut work.others, &mut work.surface);
         thin(&mut work.near, &mut work.near_weight, &mut work.others, SAMPLE);
         let others = std::mem::take(&mut work.others);
         let score =
@@ -198,11 +189,59 @@ impl Tracker {
         if !found {
             return 0;
         }
-        self.refine(frame, pace, work)
+        self.refine(index, frame, pace, work)
+    }
+
+    /// Whether the frame speaks against a chain where it is: against all of it, and against what lies beyond its hinge.
+    fn suspect(&self, chain: &TwoBone, views: Views, work: &mut Hypotheses) -> [bool; 2] {
+        let Hypotheses { own, own_weight, others, surface, .. } = work;
+        own.clear();
+        own_weight.clear();
+        let mut upper = 0;
+        for limb in chain.limbs() {
+            let matches = &self.correspondences.limbs[limb];
+            for (index, weight) in matches.weight.iter().enumerate() {
+                if *weight > 0.0 {
+                    own.push(matches.measured.get(index).to_array().map(|value| value as f32));
+                    own_weight.push(f64::from(*weight));
+                }
+            }
+            if limb == chain.upper {
+                upper = own.len();
+            }
+        }
+        self.distances_to_others(chain, own, others, surface);
+        let alone = |from: usize| -> f64 {
+            let weighted = others[from..].iter().zip(&own_weight[from..]);
+            weighted.filter(|(other, _)| f64::from(**other) > EXPLAINED).map(|(_, weight)| *weight).sum()
+        };
+        let mut seen = Visibility::default();
+        let mut against = |limb: usize, alone: f64| {
+            seen += look(views, &self.body.limbs()[limb], &self.poses[limb]);
+            alone <= IDLE * (seen.facing - seen.hidden).max(LEAST)
+                || seen.contradicted > (REFUTED * seen.facing).max(LEAST)
+        };
+        chain.ends.iter().for_each(|end| {
+            against(*end, 0.0);
+        });
+        let lower = against(chain.lower, alone(upper));
+        [against(chain.upper, alone(0)), lower]
+    }
+
+    /// Distance of points to the nearest limb that does not belong to a chain.
+    fn distances_to_others(&self, chain: &TwoBone, points: &Points, others: &mut Vec<f32>, surface: &mut SurfaceBatch) {
+        others.clear();
+        others.resize(points.len(), f32::INFINITY);
+        for limb in (0..self.poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
+            self.body.limbs()[limb].shape.closest_points(&self.poses[limb], points, surface);
+            for (least, distance) in others.iter_mut().zip(&surface.signed_distance) {
+                *least = least.min(distance.abs());
+            }
+        }
     }
 
     /// Refines the kept hypothesis with the whole body and takes it when it explains the frame better as a whole.
-    fn refine(&mut self, frame: &Frame, pace: f64, work: &mut Hypotheses) -> usize {
+    fn refine(&mut self, index: usize, frame: &Frame, pace: f64, work: &mut Hypotheses) -> usize {
         let before = self.overall_score(frame);
         work.trial.clone_from(&self.poses);
         self.poses.clone_from(&work.kept);
@@ -215,7 +254,11 @@ impl Tracker {
         }
         self.match_all(frame, last);
         if self.overall_score(frame) < before - GAIN {
-            return REFINE;
+            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            // What is as suspect as before is not worth a jump.
+            if !self.suspect(&self.chains[index], views, work)[0] {
+                return REFINE;
+            }
         }
         self.poses.clone_from(&work.trial);
         self.predicted.clone_from(&work.kept_predicted);
@@ -224,11 +267,11 @@ impl Tracker {
     }
 
     fn overall_score(&self, frame: &Frame) -> f64 {
-        let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
         let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let limbs = self.body.limbs().iter().zip(&self.poses);
         let seen: f64 = limbs.map(|(limb, pose)| look(views, limb, pose).cost()).sum();
         let strain: f64 = self.chains.iter().map(|chain| self.strain(chain, &self.poses)).sum();
+        let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
         unexplained(&self.correspondences, total) + seen + strain
     }
 
@@ -284,20 +327,31 @@ fn carry(chain: &TwoBone, body: &crate::body::Body, then: &[Pose], now: &mut [Po
     }
 }
 
-/// Where the end of the chain may be: the farthest open point from its root, the middle of the far half, the middle of all.
-fn targets(points: &Points, count: usize, root: Vec3) -> [Option<Vec3>; 3] {
-    let distance = |index: usize| (points.get(index) - root).length();
-    let Some(farthest) = (0..count).max_by(|a, b| distance(*a).total_cmp(&distance(*b))) else { return [None; 3] };
-    let most = distance(farthest);
-    let mean = |least: f64| {
-        let (mut sum, mut number) = (Vec3::ZERO, 0.0);
-        for index in (0..count).filter(|index| distance(*index) >= least) {
-            sum += points.get(index);
-            number += 1.0;
+/// Where the end of the chain may be: middles of heaps of open points, each as far as can be from the root and the others.
+fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; TARGETS] {
+    apart.clear();
+    apart.extend((0..points.len()).map(|index| (points.get(index) - root).length() as f32));
+    let mut targets = [None; TARGETS];
+    for target in &mut targets {
+        let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
+        let place = points.get(next);
+        if f64::from(apart[next]) < HEAP {
+            break;
         }
-        (number > 0.0).then(|| sum / number)
-    };
-    [mean(0.93 * most), mean(0.7 * most), mean(0.0)]
+        let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+        for (index, apart) in apart.iter_mut().enumerate() {
+            let point = points.get(index);
+            let distance = (point - place).length();
+            *apart = apart.min(distance as f32);
+            if distance < HEAP {
+                sum += weights[index] * point;
+                total += weights[index];
+            }
+        }
+        // A few stray points are no hand.
+        *target = (total > STRAY).then(|| sum / total);
+    }
+    targets
 }
 
 /// Keeps about `most` of the points, evenly, and their total weight.
