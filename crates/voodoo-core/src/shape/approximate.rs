@@ -14,7 +14,7 @@ impl TaperedEllipticCylinder {
         let tiny = 1e-9;
         let (inv_a, inv_b) = (1.0 / a.max(tiny), 1.0 / b.max(tiny));
         let (u, v) = (q.x * inv_a, q.y * inv_b);
-        let rho = u.hypot(v);
+        let rho = (u * u + v * v).sqrt();
         let above = (-q.z).max(q.z - self.length);
         // ρ ∇ρ = (x/a², y/b², -(u² a'/a + v² b'/b)); beyond a cap the slice no longer depends on z.
         let climb = if above > 0.0 {
@@ -26,6 +26,11 @@ impl TaperedEllipticCylinder {
         let gradient = Vec3::new(u * inv_a, v * inv_b, climb).length();
         // The level function has a cusp on the axis, where the distance is the lesser semi-axis.
         let side = if gradient > 0.0 { ((rho - 1.0) * rho / gradient).max(-a.min(b)) } else { -a.min(b) };
-        if above <= 0.0 { side.max(above) } else { side.max(0.0).hypot(above) }
+        if above <= 0.0 {
+            side.max(above)
+        } else {
+            let side = side.max(0.0);
+            (side * side + above * above).sqrt()
+        }
     }
 }

@@ -105,7 +105,7 @@ impl TaperedEllipticCylinder {
         if self.aspect_change() < 1e-12 && self.is_blunt() {
             return guessed;
         }
-        let mut best = self.scan(Angle { c: 1.0, s: 1.0 }, q);
+        let mut best = self.scan(None, q);
         if guessed.squared < best.squared {
             best = guessed;
         }
@@ -114,7 +114,7 @@ impl TaperedEllipticCylinder {
             if ratio < 0.5 {
                 // Equal steps of the normal's direction instead of θ: dense at the tips of a flat ellipse.
                 let floor = SHARPEST * a.max(b);
-                let foot = self.scan(Angle { c: a.max(floor), s: b.max(floor) }, q);
+                let foot = self.scan(Some(Angle { c: a.max(floor), s: b.max(floor) }), q);
                 if foot.squared < best.squared {
                     best = foot;
                 }
@@ -123,11 +123,15 @@ impl TaperedEllipticCylinder {
         best
     }
 
-    /// The best local minimum found from the angles `(stretch.c cos φ, stretch.s sin φ)`, φ in equal steps.
-    fn scan(&self, stretch: Angle, q: Vec3) -> Foot {
+    /// The best local minimum found from the angles φ, or `(stretch.c cos φ, stretch.s sin φ)`, φ in equal steps.
+    fn scan(&self, stretch: Option<Angle>, q: Vec3) -> Foot {
         let feet: [Foot; SCAN + 1] = std::array::from_fn(|k| {
-            let (c, s) = (COSINES[k] * stretch.c, COSINES[SCAN - k] * stretch.s);
-            self.foot(Angle::of(c, s).unwrap_or(Angle::ZERO), q)
+            let (c, s) = (COSINES[k], COSINES[SCAN - k]);
+            let angle = match stretch {
+                Some(stretch) => Angle::of(c * stretch.c, s * stretch.s).unwrap_or(Angle::ZERO),
+                None => Angle { c, s },
+            };
+            self.foot(angle, q)
         });
         let mut best = feet[0];
         for k in 0..=SCAN {
