@@ -2,7 +2,7 @@
 
 use super::kernel::{BLOCK, Block, Constants, Surface, closest};
 use super::{SurfacePoint, TaperedEllipticCylinder};
-use crate::geometry::{Points, Pose};
+use crate::geometry::{Points, Pose, Vec3};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted to find the right basin.
@@ -77,7 +77,7 @@ impl TaperedEllipticCylinder {
         out.resize(xs.len());
         if self.aspect_change() > ONE_BASIN || !self.is_blunt() {
             for i in 0..xs.len() {
-                self.closest_exactly(world_from_limb, [xs[i], ys[i], zs[i]], i, out);
+                self.closest_exactly(world_from_limb, [xs[i], ys[i], zs[i]], Self::closest_point, i, out);
             }
             return;
         }
@@ -107,16 +107,23 @@ impl TaperedEllipticCylinder {
             for i in 0..count {
                 if found.doubtful[i] != 0 {
                     let query = [block.x[i], block.y[i], block.z[i]];
-                    self.closest_exactly(world_from_limb, query, start + i, out);
+                    self.closest_exactly(world_from_limb, query, Self::closest_point_in_one_basin, start + i, out);
                 }
             }
         }
     }
 
     #[cold]
-    fn closest_exactly(&self, world_from_limb: &Pose, query: [f32; 3], index: usize, out: &mut SurfaceBatch) {
-        let world = crate::geometry::Vec3::from_array(query.map(f64::from));
-        let found = self.closest_point(world_from_limb.inverse_transform_point(world));
+    fn closest_exactly(
+        &self,
+        world_from_limb: &Pose,
+        query: [f32; 3],
+        closest: fn(&Self, Vec3) -> SurfacePoint,
+        index: usize,
+        out: &mut SurfaceBatch,
+    ) {
+        let world = Vec3::from_array(query.map(f64::from));
+        let found = closest(self, world_from_limb.inverse_transform_point(world));
         out.set(index, &found, world_from_limb);
     }
 }
@@ -152,7 +159,6 @@ fn closest_avx2(constants: &Constants, queries: &Block, out: &mut Surface) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
 
     /// Points on a grid around the side, from 2 cm inside to 4 cm outside.
     fn shell(shape: &TaperedEllipticCylinder) -> Vec<Block> {

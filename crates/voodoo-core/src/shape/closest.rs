@@ -29,6 +29,13 @@ const COSINES: [f64; SCAN + 1] = [
 /// Least ratio of the semi-axes for which the scan is stretched towards the sharp tips of an ellipse.
 const SHARPEST: f64 = 1e-3;
 
+/// Least ratio of `g''/2` to `|P_θ|²` of a minimum that is taken for the only one; it falls to 0 at the medial axis.
+pub(super) const DISTINCT: f64 = 0.3;
+
+fn folded(q: Vec3) -> Vec3 {
+    Vec3::new(q.x.abs(), q.y.abs(), q.z)
+}
+
 impl TaperedEllipticCylinder {
     /// The closest point of the closed surface to `q`, limb frame, metres.
     ///
@@ -42,7 +49,21 @@ impl TaperedEllipticCylinder {
         if !q.is_finite() {
             return SurfacePoint { point: Vec3::NAN, normal: Vec3::Z, signed_distance: f64::NAN, region: Region::Side };
         }
-        let side = self.closest_on_side(Vec3::new(q.x.abs(), q.y.abs(), q.z));
+        self.nearest_face(q, self.closest_on_side(folded(q)))
+    }
+
+    /// [`Self::closest_point`] for shapes whose end ellipses differ little: where the minimum found first is a distinct one,
+    /// the side has no other basin, and none is looked for.
+    pub(super) fn closest_point_in_one_basin(&self, q: Vec3) -> SurfacePoint {
+        let folded_query = folded(q);
+        let guessed = self.refine(Angle::ZERO, self.guess(folded_query), Angle::RIGHT, folded_query);
+        let (a, b) = self.semi_axes(guessed.t * self.length);
+        let tangent = (a * guessed.angle.s).powi(2) + (b * guessed.angle.c).powi(2);
+        if guessed.bend >= DISTINCT * tangent { self.nearest_face(q, guessed) } else { self.closest_point(q) }
+    }
+
+    /// The closest point when that of the side is known: a cap may be nearer.
+    fn nearest_face(&self, q: Vec3, side: Foot) -> SurfacePoint {
         let mut squared = side.squared;
         let mut cap = None;
         for (z, a, b, region, normal) in [

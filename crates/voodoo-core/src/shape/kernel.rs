@@ -1,5 +1,6 @@
 //! The arithmetic of the batch: one point as straight-line f32 code, which the compiler turns into one SIMD lane.
 
+use super::closest::DISTINCT;
 use super::{RIM_NORMAL_DISTANCE, Region, TaperedEllipticCylinder};
 use crate::geometry::{Mat3, Pose, Vec3};
 
@@ -7,9 +8,8 @@ use crate::geometry::{Mat3, Pose, Vec3};
 pub(super) const BLOCK: usize = 32;
 /// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, metres, that passes.
 const CONVERGED: f32 = 3e-8;
-/// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned; it falls to 0 at the medial axis, and the error of the
-/// foot is that of the query divided by it.
-const CONDITIONED: f32 = 0.3;
+/// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned: the error of the foot is that of the query divided by it.
+const CONDITIONED: f32 = DISTINCT as f32;
 
 /// One block of points, structure of arrays.
 #[derive(Clone, Copy)]
