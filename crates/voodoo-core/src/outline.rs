@@ -2,7 +2,7 @@
 
 use crate::body::{Body, Limb};
 use crate::correspondence::EdgePair;
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{Points, Pose, Vec3};
 use crate::view::{Pixel, View};
 
 /// Places along a limb that are looked at; the ends belong to the neighbours as well.
@@ -15,6 +15,9 @@ const ASLANT: f64 = 0.5;
 const EDGE_REACH: f64 = 0.08;
 /// The same beyond a free limb's tip.
 const TIP_REACH: f64 = 0.20;
+/// Edges are approached in strides of about this length, metres, of so many half pixels at most.
+const STRIDE: f64 = 0.008;
+const MOST_STEPS: f64 = 4.0;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,26 +31,19 @@ pub struct Edge {
     pub foot: Vec3,
     /// Distance of the seen edge, likewise, metres.
     pub seen: f64,
+    /// The last place seen on the body, working frame.
+    pub place: Vec3,
 }
 
-/// Looks for the edges on both sides of a limb, and at its tip when it ends free. `owns` tells whether a point (working
-/// frame) is nearer to this limb than to all others: an edge of another limb is none of this one.
-pub fn edges(
-    view: &View,
-    limb: &Limb,
-    working_from_limb: &Pose,
-    mut owns: impl FnMut(Vec3) -> bool,
-    mut found: impl FnMut(Edge),
-) {
+/// Looks for the edges on both sides of a limb, and at its tip when it ends free.
+pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
         let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
         let walk = Walk { start, along, rim, thickness, reach };
-        if let Some((seen, place)) = walk.edge(view)
-            && (seen <= rim || owns(view.working_from_camera * place))
-        {
-            found(Edge { side, rim, foot, seen });
+        if let Some((seen, place)) = walk.edge(view) {
+            found(Edge { side, rim, foot, seen, place: view.working_from_camera * place });
         }
     };
     for t in STATIONS {
@@ -93,32 +89,89 @@ impl Walk {
         let deep = self.thickness + DEPTH_REACH;
         let mut last = None;
         let mut r = 0.0;
+        // Long strides as far as the first look past the body, then back, and on in small steps.
+        let mut stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
+        let mut from = 0.0;
         while r <= self.rim + self.reach {
             let place = self.start + self.along * r;
             match view.at(place) {
                 Pixel::Unknown => return None,
                 Pixel::Something(z) if z < place.z - deep => return None,
-                Pixel::Something(z) if z <= place.z + deep => last = Some(place * (z / place.z)),
-                // The edge lies between the two last looks.
-                Pixel::Something(_) | Pixel::Scene(_) => return last.map(|last| (r - 0.25 * step, last)),
+                Pixel::Something(z) if z <= place.z + deep => {
+                    last = Some(place * (z / place.z));
+                    from = r;
+                }
+                Pixel::Something(_) | Pixel::Scene(_) => {
+                    let last = last?;
+                    if stride <= step || r - from <= step {
+                        // The edge lies between the two last looks.
+                        return Some((r - 0.25 * step, last));
+                    }
+                    (r, stride) = (from, step);
+                }
             }
             // What lies well inside the limb is no edge: one look on the way out will do.
-            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + step };
+            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + stride };
         }
         None
     }
 }
 
+/// Working memory: the places of edges, and the limb that is nearest to each.
+#[derive(Debug, Default)]
+pub struct Owners {
+    places: Points,
+    distance: Vec<f32>,
+    least: Vec<f32>,
+    closest: Vec<usize>,
+}
+
+impl Owners {
+    fn find(&mut self, body: &Body, poses: &[Pose]) {
+        let count = self.places.len();
+        self.least.clear();
+        self.least.resize(count, f32::INFINITY);
+        self.closest.clear();
+        self.closest.resize(count, 0);
+        for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
+            limb.shape.approximate_distances(pose, &self.places, &mut self.distance);
+            for ((least, closest), distance) in self.least.iter_mut().zip(&mut self.closest).zip(&self.distance) {
+                if distance < least {
+                    (*least, *closest) = (*distance, index);
+                }
+            }
+        }
+    }
+}
+
 /// Edges of all limbs in all depth images as pairs, into `pairs`.
-pub fn match_edges<'a>(body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>, pairs: &mut Vec<EdgePair>) {
+pub fn match_edges<'a>(
+    body: &Body,
+    poses: &[Pose],
+    views: impl Iterator<Item = View<'a>>,
+    owners: &mut Owners,
+    pairs: &mut Vec<EdgePair>,
+) {
     pairs.clear();
+    owners.places.clear();
     for view in views {
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
-            let owns = |point| body.closest_limb(poses, point) == index;
-            edges(&view, limb, pose, owns, |edge| {
-                let (x, normal) = (*pose * edge.foot, pose.rotation * edge.side);
-                pairs.push(EdgePair { limb: index, x, normal, distance: edge.seen - edge.rim });
+            edges(&view, limb, pose, |edge| {
+                owners.places.push(edge.place.to_array().map(|value| value as f32));
+                pairs.push(EdgePair {
+                    limb: index,
+                    x: *pose * edge.foot,
+                    normal: pose.rotation * edge.side,
+                    distance: edge.seen - edge.rim,
+                });
             });
         }
     }
+    owners.find(body, poses);
+    let mut closest = owners.closest.iter();
+    pairs.retain(|pair| {
+        let closest = closest.next();
+        // Beyond the rim, the edge may be another limb's.
+        pair.distance <= 0.0 || closest == Some(&pair.limb)
+    });
 }

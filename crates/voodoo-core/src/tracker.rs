@@ -14,7 +14,7 @@ use crate::estimate::{Estimate, LimbStatus, Status};
 use crate::facing::face_cameras;
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
-use crate::outline::{edges, match_edges};
+use crate::outline::{Owners, edges, match_edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
@@ -60,6 +60,7 @@ pub struct Tracker {
     candidates: Candidates,
     assignment: Assignment,
     correspondences: Correspondences,
+    owners: Owners,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
@@ -101,6 +102,7 @@ impl Tracker {
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
+            owners: Owners::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
             pairs: Vec::new(),
@@ -266,7 +268,7 @@ impl Tracker {
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
         if self.config.outline && step >= OUTLINE_FROM {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
-            match_edges(&self.body, &self.poses, views.iter(), &mut self.correspondences.edges);
+            match_edges(&self.body, &self.poses, views.iter(), &mut self.owners, &mut self.correspondences.edges);
         } else {
             self.correspondences.edges.clear();
         }
@@ -337,8 +339,12 @@ impl Tracker {
                 let views =
                     Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
                 for view in views.iter() {
-                    let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
-                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
+                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], |edge| {
+                        // Beyond the rim, the edge may be another limb's.
+                        if edge.seen <= edge.rim || self.body.closest_limb(&self.poses, edge.place) == limb {
+                            seen.push(edge);
+                        }
+                    });
                 }
                 if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
                     self.body.change_tip(limb, (tip.seen / tip.rim).clamp(0.8, 1.25));

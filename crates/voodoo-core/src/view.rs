@@ -67,8 +67,9 @@ impl View<'_> {
         if point.z < 0.05 || image.rays.is_some() {
             return Pixel::Unknown;
         }
-        let column = (fx * point.x / point.z + cx).round();
-        let row = (fy * point.y / point.z + cy).round();
+        let near = 1.0 / point.z;
+        // Half a pixel on, so that cutting off rounds.
+        let (column, row) = (fx * point.x * near + (cx + 0.5), fy * point.y * near + (cy + 0.5));
         if !(column >= 0.0 && row >= 0.0 && column < image.width as f64 && row < image.height as f64) {
             return Pixel::Unknown;
         }
