@@ -292,7 +292,9 @@ impl Tracker {
         self.match_all(frame, step);
         let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
         // 6 Elastic bands on both limbs.
-        self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
+        if self.solver.reads_bands() {
+            self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
+        }
         // 7 Fit the model.
         let Self { body, correspondences, predicted, config, solver, poses, .. } = self;
         solver.solve(&Problem { body, correspondences, predicted, step, pace, config }, poses);

@@ -89,18 +89,18 @@ impl TaperedEllipticCylinder {
             let count = BLOCK.min(xs.len() - start);
             let span = start..start + count;
             // The tail is padded with what the block held before, so every point meets the same instructions.
-            block.x[..count].copy_from_slice(&xs[span.clone()]);
-            block.y[..count].copy_from_slice(&ys[span.clone()]);
-            block.z[..count].copy_from_slice(&zs[span.clone()]);
+            load(&mut block.x, &xs[span.clone()]);
+            load(&mut block.y, &ys[span.clone()]);
+            load(&mut block.z, &zs[span.clone()]);
             run(&constants, &block, &mut found);
-            out.points.x[span.clone()].copy_from_slice(&found.points.x[..count]);
-            out.points.y[span.clone()].copy_from_slice(&found.points.y[..count]);
-            out.points.z[span.clone()].copy_from_slice(&found.points.z[..count]);
-            out.normals.x[span.clone()].copy_from_slice(&found.normals.x[..count]);
-            out.normals.y[span.clone()].copy_from_slice(&found.normals.y[..count]);
-            out.normals.z[span.clone()].copy_from_slice(&found.normals.z[..count]);
-            out.signed_distance[span.clone()].copy_from_slice(&found.signed_distance[..count]);
-            out.region[span].copy_from_slice(&found.region[..count]);
+            store(&mut out.points.x[span.clone()], &found.points.x);
+            store(&mut out.points.y[span.clone()], &found.points.y);
+            store(&mut out.points.z[span.clone()], &found.points.z);
+            store(&mut out.normals.x[span.clone()], &found.normals.x);
+            store(&mut out.normals.y[span.clone()], &found.normals.y);
+            store(&mut out.normals.z[span.clone()], &found.normals.z);
+            store(&mut out.signed_distance[span.clone()], &found.signed_distance);
+            store(&mut out.region[span], &found.region);
             if found.doubtful.iter().fold(0, |any, doubt| any | doubt) == 0 {
                 continue;
             }
@@ -125,6 +125,23 @@ impl TaperedEllipticCylinder {
         let world = Vec3::from_array(query.map(f64::from));
         let found = closest(self, world_from_limb.inverse_transform_point(world));
         out.set(index, &found, world_from_limb);
+    }
+}
+
+/// Copies a block, mostly a whole one: its size is then known to the compiler.
+#[inline(always)]
+fn load(to: &mut [f32; BLOCK], from: &[f32]) {
+    match from.first_chunk() {
+        Some(from) => *to = *from,
+        None => to[..from.len()].copy_from_slice(from),
+    }
+}
+
+#[inline(always)]
+fn store<T: Copy>(to: &mut [T], from: &[T; BLOCK]) {
+    match to.first_chunk_mut() {
+        Some(to) => *to = *from,
+        None => to.copy_from_slice(&from[..to.len()]),
     }
 }
 

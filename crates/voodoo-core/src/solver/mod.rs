@@ -64,6 +64,11 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// Whether it reads the elastic bands among the correspondences.
+    fn reads_bands(&self) -> bool {
+        false
+    }
+
     /// Which points may be matched in a step of a frame.
     fn gate(&self, config: &Config, step: usize) -> Gate;
 
