@@ -56,9 +56,9 @@ pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl
         if sight.with_z(0.0).length() < ASLANT * sight.length() {
             continue;
         }
-        let thickness = (a * ahead.x).hypot(b * ahead.y);
+        let thickness = length(a * ahead.x, b * ahead.y);
         for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
-            let rim = (a * side.x).hypot(b * side.y);
+            let rim = length(a * side.x, b * side.y);
             let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
             look(axis, side, rim, thickness, foot, EDGE_REACH);
         }
@@ -69,6 +69,10 @@ pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl
         let thickness = shape.a1().max(shape.b1());
         look(Vec3::ZERO, Vec3::Z, shape.length(), thickness, tip, TIP_REACH);
     }
+}
+
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// A way across an image: from a point along a direction (camera frame), metres.
@@ -117,17 +121,54 @@ impl Walk {
     }
 }
 
-/// Working memory: the places of edges, and the limb that is nearest to each.
+/// The edges of all limbs in all depth images of a frame, and working memory.
 #[derive(Debug, Default)]
-pub struct Owners {
+pub struct Outline {
+    edges: Vec<Found>,
     places: Points,
     distance: Vec<f32>,
     least: Vec<f32>,
     closest: Vec<usize>,
 }
 
-impl Owners {
-    fn find(&mut self, body: &Body, poses: &[Pose]) {
+/// The edge of a limb, and where it stands in the working frame.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    limb: usize,
+    edge: Edge,
+    target: Vec3,
+}
+
+impl Outline {
+    /// Forgets all edges.
+    pub fn clear(&mut self) {
+        self.edges.clear();
+    }
+
+    /// Looks for the edges at `poses`.
+    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>) {
+        self.edges.clear();
+        self.places.clear();
+        for view in views {
+            for (limb, (part, pose)) in body.limbs().iter().zip(poses).enumerate() {
+                edges(&view, part, pose, |edge| {
+                    self.places.push(edge.place.to_array().map(|value| value as f32));
+                    let target = *pose * (edge.foot + edge.side * (edge.seen - edge.rim));
+                    self.edges.push(Found { limb, edge, target });
+                });
+            }
+        }
+        self.find_closest(body, poses);
+        let mut closest = self.closest.iter();
+        self.edges.retain(|found| {
+            let closest = closest.next();
+            // Beyond the rim, the edge may be another limb's.
+            found.edge.seen <= found.edge.rim || closest == Some(&found.limb)
+        });
+    }
+
+    /// The limb that is nearest to each place.
+    fn find_closest(&mut self, body: &Body, poses: &[Pose]) {
         let count = self.places.len();
         self.least.clear();
         self.least.resize(count, f32::INFINITY);
@@ -142,36 +183,13 @@ impl Owners {
             }
         }
     }
-}
 
-/// Edges of all limbs in all depth images as pairs, into `pairs`.
-pub fn match_edges<'a>(
-    body: &Body,
-    poses: &[Pose],
-    views: impl Iterator<Item = View<'a>>,
-    owners: &mut Owners,
-    pairs: &mut Vec<EdgePair>,
-) {
-    pairs.clear();
-    owners.places.clear();
-    for view in views {
-        for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
-            edges(&view, limb, pose, |edge| {
-                owners.places.push(edge.place.to_array().map(|value| value as f32));
-                pairs.push(EdgePair {
-                    limb: index,
-                    x: *pose * edge.foot,
-                    normal: pose.rotation * edge.side,
-                    distance: edge.seen - edge.rim,
-                });
-            });
-        }
+    /// The rims at `poses` and the edges that were found, as pairs.
+    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<EdgePair>) {
+        pairs.clear();
+        pairs.extend(self.edges.iter().map(|Found { limb, edge, target }| {
+            let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
+            EdgePair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
+        }));
     }
-    owners.find(body, poses);
-    let mut closest = owners.closest.iter();
-    pairs.retain(|pair| {
-        let closest = closest.next();
-        // Beyond the rim, the edge may be another limb's.
-        pair.distance <= 0.0 || closest == Some(&pair.limb)
-    });
 }

@@ -14,7 +14,7 @@ use crate::estimate::{Estimate, LimbStatus, Status};
 use crate::facing::face_cameras;
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
-use crate::outline::{Owners, edges, match_edges};
+use crate::outline::{Outline, edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
@@ -60,7 +60,7 @@ pub struct Tracker {
     candidates: Candidates,
     assignment: Assignment,
     correspondences: Correspondences,
-    owners: Owners,
+    outline: Outline,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
@@ -102,7 +102,7 @@ impl Tracker {
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
-            owners: Owners::default(),
+            outline: Outline::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
             pairs: Vec::new(),
@@ -205,7 +205,12 @@ impl Tracker {
         let mut steps = 0;
         let mut previous = f64::INFINITY;
         while steps < self.config.max_steps {
-            let distance = self.match_and_solve(frame, pace, steps);
+            if self.solver.renews(steps) {
+                self.match_all(frame, steps);
+            } else {
+                self.match_again(frame, steps);
+            }
+            let distance = self.solve(pace, steps);
             steps += 1;
             if (previous - distance).abs() < self.config.min_change {
                 break;
@@ -261,17 +266,26 @@ impl Tracker {
 
     /// Steps 2-5 at the current poses: everything measured becomes a correspondence.
     fn match_all(&mut self, frame: &Frame, step: usize) {
-        // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
+        // 2 Assign points to limbs.
+        let gate = self.solver.gate(&self.config, step);
+        self.assign(&gate);
+        if self.config.outline && step >= OUTLINE_FROM {
+            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            self.outline.find(&self.body, &self.poses, views.iter());
+        } else {
+            self.outline.clear();
+        }
+        self.match_again(frame, step);
+    }
+
+    /// Steps 3-5: points stay with their limbs, rims with their edges.
+    fn match_again(&mut self, frame: &Frame, step: usize) {
+        // 3 Reduce the number of points, 4 find closest points.
         let gate = self.solver.gate(&self.config, step);
         self.match_points(&gate, self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
-        if self.config.outline && step >= OUTLINE_FROM {
-            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
-            match_edges(&self.body, &self.poses, views.iter(), &mut self.owners, &mut self.correspondences.edges);
-        } else {
-            self.correspondences.edges.clear();
-        }
+        self.outline.pairs(&self.poses, &mut self.correspondences.edges);
     }
 
     /// Lets the solver follow the named sites before the points are assigned.
@@ -290,6 +304,11 @@ impl Tracker {
     /// One ICP step (2-7); returns the mean squared distance it started from.
     fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) -> f64 {
         self.match_all(frame, step);
+        self.solve(pace, step)
+    }
+
+    /// Moves the body to what was matched; returns the mean squared distance before.
+    fn solve(&mut self, pace: f64, step: usize) -> f64 {
         let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
         // 6 Elastic bands on both limbs.
         if self.solver.reads_bands() {
@@ -333,6 +352,7 @@ impl Tracker {
         let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
             // The pose is known: what is closest is what was seen.
+            self.assign(&gate);
             self.match_points(&gate, false);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
@@ -412,9 +432,13 @@ impl Tracker {
         });
     }
 
+    fn assign(&mut self, gate: &Gate) {
+        let Self { body, poses, candidates, assignment, config, .. } = self;
+        assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
+    }
+
     fn match_points(&mut self, gate: &Gate, facing: bool) {
         let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
-        assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let assignment = &*assignment;
         let work = |(index, matches): (usize, &mut LimbMatches)| {
