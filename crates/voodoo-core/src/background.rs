@@ -89,17 +89,14 @@ impl Backgrounds {
         self.images.clear();
     }
 
-    /// Starts from a frame whose body pose is known: every pixel for which `is_body(image, pixel, depth)` is false is scene.
-    pub fn start(&mut self, frame: &Frame, mut is_body: impl FnMut(&DepthImage, usize, f32) -> bool) {
+    /// Starts from a frame whose body pose is known: `forget_body` sets those of all depths to 0 that may be the body's, the
+    /// others are scene.
+    pub fn start(&mut self, frame: &Frame, mut forget_body: impl FnMut(&DepthImage, &mut [f32])) {
         self.images.clear();
         for image in frame.images {
-            let mut depth = vec![0.0; image.pixels.len()];
-            for (index, learnt) in depth.iter_mut().enumerate() {
-                let z = image.pixels.get(index) * image.metres_per_unit as f32;
-                if z > 0.0 && z.is_finite() && !is_body(image, index, z) {
-                    *learnt = z;
-                }
-            }
+            let depths = (0..image.pixels.len()).map(|index| image.pixels.get(index) * image.metres_per_unit as f32);
+            let mut depth: Vec<f32> = depths.map(|z| if z > 0.0 && z.is_finite() { z } else { 0.0 }).collect();
+            forget_body(image, &mut depth);
             self.images.push(Background {
                 world_from_sensor: Some(image.world_from_sensor),
                 width: image.width,

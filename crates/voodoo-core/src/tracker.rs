@@ -416,19 +416,26 @@ impl Tracker {
             backgrounds.update(frame, window);
             return;
         }
-        let mut query = Points::default();
-        let mut surface = SurfaceBatch::default();
-        backgrounds.start(frame, |image, index, z| {
-            let point = shifted(&image.world_from_sensor, *origin) * image.back_project(index, z);
-            if !bounds.contains_local_point(point) {
-                return false;
+        let (mut queries, mut pixels, mut surface) = (Points::default(), Vec::new(), SurfaceBatch::default());
+        backgrounds.start(frame, |image, depth| {
+            let working_from_sensor = shifted(&image.world_from_sensor, *origin);
+            queries.clear();
+            pixels.clear();
+            for (index, z) in depth.iter().enumerate().filter(|(_, z)| **z > 0.0) {
+                let point = working_from_sensor * image.back_project(index, *z);
+                if bounds.contains_local_point(point) {
+                    queries.push(point.to_array().map(|value| value as f32));
+                    pixels.push(index);
+                }
             }
-            query.clear();
-            query.push(point.to_array().map(|value| value as f32));
-            body.limbs().iter().zip(poses.iter()).any(|(limb, pose)| {
-                limb.shape.closest_points(pose, &query, &mut surface);
-                surface.signed_distance[0] < BODY_REACH
-            })
+            for (limb, pose) in body.limbs().iter().zip(poses.iter()) {
+                limb.shape.closest_points(pose, &queries, &mut surface);
+                for (pixel, distance) in pixels.iter().zip(&surface.signed_distance) {
+                    if *distance < BODY_REACH {
+                        depth[*pixel] = 0.0;
+                    }
+                }
+            }
         });
     }
 

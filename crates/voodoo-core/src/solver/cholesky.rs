@@ -8,14 +8,27 @@ use crate::simd::widest;
 /// `h = L^T L`, from the last unknown to the first: in a tree whose parents come first nothing fills in (Featherstone, "Rigid
 /// Body Dynamics Algorithms", 2008, section 6.5), so that rows of unknowns on other branches stay zero and are passed over.
 pub fn solve_in_place(h: &mut [f64], b: &mut [f64], n: usize) -> bool {
+    factor(h, n) && substitute(h, b, n)
+}
+
+/// The first half of [`solve_in_place`], for several right-hand sides: `h` becomes `L`.
+pub fn factor(h: &mut [f64], n: usize) -> bool {
     widest(
         #[inline(always)]
-        || factor(h, n) && substitute(h, b, n),
+        || factor_lanes(h, n),
+    )
+}
+
+/// The second half, once for every right-hand side: `l` is what [`factor`] left.
+pub fn substitute(l: &[f64], b: &mut [f64], n: usize) -> bool {
+    widest(
+        #[inline(always)]
+        || substitute_lanes(l, b, n),
     )
 }
 
 #[inline(always)]
-fn factor(h: &mut [f64], n: usize) -> bool {
+fn factor_lanes(h: &mut [f64], n: usize) -> bool {
     for k in (0..n).rev() {
         let (before, rest) = h.split_at_mut(k * n);
         let row = &mut rest[..=k];
@@ -40,7 +53,7 @@ fn factor(h: &mut [f64], n: usize) -> bool {
 }
 
 #[inline(always)]
-fn substitute(h: &[f64], b: &mut [f64], n: usize) -> bool {
+fn substitute_lanes(h: &[f64], b: &mut [f64], n: usize) -> bool {
     for k in (0..n).rev() {
         let value = b[k] / h[k * n + k];
         b[k] = value;
