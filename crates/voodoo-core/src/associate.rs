@@ -136,10 +136,13 @@ struct Block {
 
 impl Block {
     fn load(points: &Points, start: usize, count: usize) -> Self {
-        let pad = |from: &[f32]| {
-            let mut to = [from[start + count - 1]; BLOCK];
-            to[..count].copy_from_slice(&from[start..start + count]);
-            to
+        let pad = |from: &[f32]| match from[start..].first_chunk() {
+            Some(whole) => *whole,
+            None => {
+                let mut to = [from[start + count - 1]; BLOCK];
+                to[..count].copy_from_slice(&from[start..]);
+                to
+            }
         };
         Self { x: pad(&points.x), y: pad(&points.y), z: pad(&points.z) }
     }

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use crate::frame::{DepthImage, Frame};
+use crate::frame::{DepthImage, DepthPixels, Frame};
 use crate::geometry::Pose;
+use crate::simd::widest;
 
 /// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth.
 const MARGIN: (f32, f32) = (0.04, 0.012);
@@ -47,16 +48,34 @@ impl Background {
             && self.depth.len() == image.pixels.len()
     }
 
-    fn learn_pixel(depth: &mut f32, z: f32) {
-        if !z.is_finite() || z <= 0.0 {
-            return;
-        }
-        if *depth == 0.0 || z > *depth + DEEPER {
-            *depth = z;
-        } else if (z - *depth).abs() < DEEPER {
-            *depth += LEARNING * (z - *depth);
-        }
+    /// Learns from neighbouring pixels, without a branch.
+    fn learn(&mut self, image: &DepthImage, pixels: Range<usize>) {
+        let scale = image.metres_per_unit as f32;
+        let depth = &mut self.depth[pixels.clone()];
+        widest(
+            #[inline(always)]
+            || match image.pixels {
+                DepthPixels::U16(all) => {
+                    depth
+                        .iter_mut()
+                        .zip(&all[pixels])
+                        .for_each(|(depth, z)| *depth = learnt(*depth, f32::from(*z) * scale));
+                }
+                DepthPixels::F32(all) => {
+                    depth.iter_mut().zip(&all[pixels]).for_each(|(depth, z)| *depth = learnt(*depth, *z * scale));
+                }
+            },
+        );
     }
+}
+
+/// What is known of a pixel after a return at `z`.
+#[inline(always)]
+fn learnt(depth: f32, z: f32) -> f32 {
+    let change = z - depth;
+    let near = if change.abs() < DEEPER { depth + LEARNING * change } else { depth };
+    let new = if (depth == 0.0) | (z > depth + DEEPER) { z } else { near };
+    if (z > 0.0) & (z < f32::INFINITY) { new } else { depth }
 }
 
 impl Backgrounds {
@@ -70,17 +89,14 @@ impl Backgrounds {
         self.images.clear();
     }
 
-    /// Starts from a frame whose body pose is known: every pixel for which `is_body(image, pixel, depth)` is false is scene.
-    pub fn start(&mut self, frame: &Frame, mut is_body: impl FnMut(&DepthImage, usize, f32) -> bool) {
+    /// Starts from a frame whose body pose is known: `forget_body` sets those of all depths to 0 that may be the body's, the
+    /// others are scene.
+    pub fn start(&mut self, frame: &Frame, mut forget_body: impl FnMut(&DepthImage, &mut [f32])) {
         self.images.clear();
         for image in frame.images {
-            let mut depth = vec![0.0; image.pixels.len()];
-            for (index, learnt) in depth.iter_mut().enumerate() {
-                let z = image.pixels.get(index) * image.metres_per_unit as f32;
-                if z > 0.0 && z.is_finite() && !is_body(image, index, z) {
-                    *learnt = z;
-                }
-            }
+            let depths = (0..image.pixels.len()).map(|index| image.pixels.get(index) * image.metres_per_unit as f32);
+            let mut depth: Vec<f32> = depths.map(|z| if z > 0.0 && z.is_finite() { z } else { 0.0 }).collect();
+            forget_body(image, &mut depth);
             self.images.push(Background {
                 world_from_sensor: Some(image.world_from_sensor),
                 width: image.width,
@@ -104,13 +120,12 @@ impl Backgrounds {
             let (columns, rows) = window(image);
             background.row = (background.row + 1) % ROW_STEP;
             for row in (background.row..image.height).step_by(ROW_STEP) {
-                for column in 0..image.width {
-                    if rows.contains(&row) && columns.contains(&column) {
-                        continue;
-                    }
-                    let index = row * image.width + column;
-                    let z = image.pixels.get(index) * image.metres_per_unit as f32;
-                    Background::learn_pixel(&mut background.depth[index], z);
+                let (start, end) = (row * image.width, (row + 1) * image.width);
+                if rows.contains(&row) {
+                    background.learn(image, start..start + columns.start);
+                    background.learn(image, start + columns.end..end);
+                } else {
+                    background.learn(image, start..end);
                 }
             }
         }

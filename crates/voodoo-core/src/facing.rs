@@ -5,10 +5,13 @@
 //! instead, and draw the limb back to them. At the outline the two coincide: nothing jumps. Points behind a limb keep their
 //! closest point: they may belong to what lies behind it.
 
+use std::ops::Range;
+
 use crate::candidates::Candidates;
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Pose, Vec3};
 use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
+use crate::simd::widest;
 
 /// Turns the matches of depth pixels inside a limb that face away from their camera to the near side.
 pub fn face_cameras(
@@ -18,34 +21,64 @@ pub fn face_cameras(
     max_distance: f64,
     matches: &mut LimbMatches,
 ) {
-    let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
-    let LimbMatches { candidate, measured, weight, surface } = matches;
     let mut start = 0;
     for (end, camera) in &candidates.cameras {
         // The candidates of a limb ascend.
-        let stop = start + candidate[start..].partition_point(|candidate| candidate < end);
-        let [x, y, z] = to_f32(*camera);
-        for index in start..stop {
-            let normals = &surface.normals;
-            let facing_away = normals.x[index] * (measured.x[index] - x)
-                + normals.y[index] * (measured.y[index] - y)
-                + normals.z[index] * (measured.z[index] - z);
-            let inside = surface.signed_distance[index] < 0.0 && surface.region[index] == Region::Side as u8;
-            if facing_away <= 0.0 || !inside || weight[index] <= 0.0 {
-                continue;
-            }
-            let view = pose.rotation.inverse() * (measured.get(index) - *camera);
-            let (place, normal) = near_side(shape, pose.inverse_transform_point(surface.points.get(index)), view);
-            let (place, normal) = (*pose * place, pose.rotation * normal);
-            let distance = normal.dot(measured.get(index) - place);
-            surface.points.set(index, to_f32(place));
-            surface.normals.set(index, to_f32(normal));
-            surface.signed_distance[index] = distance as f32;
-            if distance.abs() > max_distance {
-                weight[index] = 0.0;
+        let stop = start + matches.candidate[start..].partition_point(|candidate| candidate < end);
+        for first in (start..stop).step_by(LANES) {
+            let last = stop.min(first + LANES);
+            let away = widest(
+                #[inline(always)]
+                || facing_away(matches, first..last, camera.as_vec3().to_array()),
+            );
+            for index in (first..last).filter(|index| away[index - first]) {
+                turn_match(shape, pose, *camera, max_distance, matches, index);
             }
         }
         start = stop;
+    }
+}
+
+/// Matches looked at together.
+const LANES: usize = 32;
+
+/// Which matches, of points inside, are on the side that faces away from a camera.
+#[inline(always)]
+fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) -> [bool; LANES] {
+    let LimbMatches { measured, weight, surface, .. } = matches;
+    let mut away = [false; LANES];
+    let (px, py, pz) = (&measured.x[range.clone()], &measured.y[range.clone()], &measured.z[range.clone()]);
+    let normals = &surface.normals;
+    let (nx, ny, nz) = (&normals.x[range.clone()], &normals.y[range.clone()], &normals.z[range.clone()]);
+    let (distance, region) = (&surface.signed_distance[range.clone()], &surface.region[range.clone()]);
+    let weight = &weight[range.clone()];
+    for i in 0..range.len() {
+        let along = nx[i] * (px[i] - x) + ny[i] * (py[i] - y) + nz[i] * (pz[i] - z);
+        away[i] = (along > 0.0) & (distance[i] < 0.0) & (region[i] == Region::Side as u8) & (weight[i] > 0.0);
+    }
+    away
+}
+
+/// Turns one match to the near side.
+fn turn_match(
+    shape: &TaperedEllipticCylinder,
+    pose: &Pose,
+    camera: Vec3,
+    max_distance: f64,
+    matches: &mut LimbMatches,
+    index: usize,
+) {
+    let LimbMatches { measured, weight, surface, .. } = matches;
+    let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
+    let view = pose.rotation.inverse() * (measured.get(index) - camera);
+    let (place, normal) = near_side(shape, pose.inverse_transform_point(surface.points.get(index)), view);
+    let (place, normal) = (*pose * place, pose.rotation * normal);
+    let distance = normal.dot(measured.get(index) - place);
+    surface.points.set(index, to_f32(place));
+    surface.normals.set(index, to_f32(normal));
+    surface.signed_distance[index] = distance as f32;
+    if distance.abs() > max_distance {
+        weight[index] = 0.0;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::body::{Body, Limb};
 use crate::correspondence::EdgePair;
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{Points, Pose, Vec3};
 use crate::view::{Pixel, View};
 
 /// Places along a limb that are looked at; the ends belong to the neighbours as well.
@@ -15,6 +15,9 @@ const ASLANT: f64 = 0.5;
 const EDGE_REACH: f64 = 0.08;
 /// The same beyond a free limb's tip.
 const TIP_REACH: f64 = 0.20;
+/// Edges are approached in strides of about this length, metres, of so many half pixels at most.
+const STRIDE: f64 = 0.008;
+const MOST_STEPS: f64 = 4.0;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,26 +31,19 @@ pub struct Edge {
     pub foot: Vec3,
     /// Distance of the seen edge, likewise, metres.
     pub seen: f64,
+    /// The last place seen on the body, working frame.
+    pub place: Vec3,
 }
 
-/// Looks for the edges on both sides of a limb, and at its tip when it ends free. `owns` tells whether a point (working
-/// frame) is nearer to this limb than to all others: an edge of another limb is none of this one.
-pub fn edges(
-    view: &View,
-    limb: &Limb,
-    working_from_limb: &Pose,
-    mut owns: impl FnMut(Vec3) -> bool,
-    mut found: impl FnMut(Edge),
-) {
+/// Looks for the edges on both sides of a limb, and at its tip when it ends free.
+pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
         let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
         let walk = Walk { start, along, rim, thickness, reach };
-        if let Some((seen, place)) = walk.edge(view)
-            && (seen <= rim || owns(view.working_from_camera * place))
-        {
-            found(Edge { side, rim, foot, seen });
+        if let Some((seen, place)) = walk.edge(view) {
+            found(Edge { side, rim, foot, seen, place: view.working_from_camera * place });
         }
     };
     for t in STATIONS {
@@ -60,9 +56,9 @@ pub fn edges(
         if sight.with_z(0.0).length() < ASLANT * sight.length() {
             continue;
         }
-        let thickness = (a * ahead.x).hypot(b * ahead.y);
+        let thickness = length(a * ahead.x, b * ahead.y);
         for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
-            let rim = (a * side.x).hypot(b * side.y);
+            let rim = length(a * side.x, b * side.y);
             let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
             look(axis, side, rim, thickness, foot, EDGE_REACH);
         }
@@ -73,6 +69,10 @@ pub fn edges(
         let thickness = shape.a1().max(shape.b1());
         look(Vec3::ZERO, Vec3::Z, shape.length(), thickness, tip, TIP_REACH);
     }
+}
+
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// A way across an image: from a point along a direction (camera frame), metres.
@@ -93,32 +93,103 @@ impl Walk {
         let deep = self.thickness + DEPTH_REACH;
         let mut last = None;
         let mut r = 0.0;
+        // Long strides as far as the first look past the body, then back, and on in small steps.
+        let mut stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
+        let mut from = 0.0;
         while r <= self.rim + self.reach {
             let place = self.start + self.along * r;
             match view.at(place) {
                 Pixel::Unknown => return None,
                 Pixel::Something(z) if z < place.z - deep => return None,
-                Pixel::Something(z) if z <= place.z + deep => last = Some(place * (z / place.z)),
-                // The edge lies between the two last looks.
-                Pixel::Something(_) | Pixel::Scene(_) => return last.map(|last| (r - 0.25 * step, last)),
+                Pixel::Something(z) if z <= place.z + deep => {
+                    last = Some(place * (z / place.z));
+                    from = r;
+                }
+                Pixel::Something(_) | Pixel::Scene(_) => {
+                    let last = last?;
+                    if stride <= step || r - from <= step {
+                        // The edge lies between the two last looks.
+                        return Some((r - 0.25 * step, last));
+                    }
+                    (r, stride) = (from, step);
+                }
             }
             // What lies well inside the limb is no edge: one look on the way out will do.
-            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + step };
+            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + stride };
         }
         None
     }
 }
 
-/// Edges of all limbs in all depth images as pairs, into `pairs`.
-pub fn match_edges<'a>(body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>, pairs: &mut Vec<EdgePair>) {
-    pairs.clear();
-    for view in views {
-        for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
-            let owns = |point| body.closest_limb(poses, point) == index;
-            edges(&view, limb, pose, owns, |edge| {
-                let (x, normal) = (*pose * edge.foot, pose.rotation * edge.side);
-                pairs.push(EdgePair { limb: index, x, normal, distance: edge.seen - edge.rim });
-            });
+/// The edges of all limbs in all depth images of a frame, and working memory.
+#[derive(Debug, Default)]
+pub struct Outline {
+    edges: Vec<Found>,
+    places: Points,
+    distance: Vec<f32>,
+    least: Vec<f32>,
+    closest: Vec<usize>,
+}
+
+/// The edge of a limb, and where it stands in the working frame.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    limb: usize,
+    edge: Edge,
+    target: Vec3,
+}
+
+impl Outline {
+    /// Forgets all edges.
+    pub fn clear(&mut self) {
+        self.edges.clear();
+    }
+
+    /// Looks for the edges at `poses`.
+    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>) {
+        self.edges.clear();
+        self.places.clear();
+        for view in views {
+            for (limb, (part, pose)) in body.limbs().iter().zip(poses).enumerate() {
+                edges(&view, part, pose, |edge| {
+                    self.places.push(edge.place.to_array().map(|value| value as f32));
+                    let target = *pose * (edge.foot + edge.side * (edge.seen - edge.rim));
+                    self.edges.push(Found { limb, edge, target });
+                });
+            }
         }
+        self.find_closest(body, poses);
+        let mut closest = self.closest.iter();
+        self.edges.retain(|found| {
+            let closest = closest.next();
+            // Beyond the rim, the edge may be another limb's.
+            found.edge.seen <= found.edge.rim || closest == Some(&found.limb)
+        });
+    }
+
+    /// The limb that is nearest to each place.
+    fn find_closest(&mut self, body: &Body, poses: &[Pose]) {
+        let count = self.places.len();
+        self.least.clear();
+        self.least.resize(count, f32::INFINITY);
+        self.closest.clear();
+        self.closest.resize(count, 0);
+        for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
+            limb.shape.approximate_distances(pose, &self.places, &mut self.distance);
+            for ((least, closest), distance) in self.least.iter_mut().zip(&mut self.closest).zip(&self.distance) {
+                if distance < least {
+                    (*least, *closest) = (*distance, index);
+                }
+            }
+        }
+    }
+
+    /// The rims at `poses` and the edges that were found, as pairs.
+    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<EdgePair>) {
+        pairs.clear();
+        pairs.extend(self.edges.iter().map(|Found { limb, edge, target }| {
+            let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
+            EdgePair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
+        }));
     }
 }

@@ -14,7 +14,7 @@ use crate::estimate::{Estimate, LimbStatus, Status};
 use crate::facing::face_cameras;
 use crate::frame::{DepthImage, Frame, PointSlice};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
-use crate::outline::{edges, match_edges};
+use crate::outline::{Outline, edges};
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
@@ -60,6 +60,7 @@ pub struct Tracker {
     candidates: Candidates,
     assignment: Assignment,
     correspondences: Correspondences,
+    outline: Outline,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
@@ -101,6 +102,7 @@ impl Tracker {
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
+            outline: Outline::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
             pairs: Vec::new(),
@@ -203,7 +205,12 @@ impl Tracker {
         let mut steps = 0;
         let mut previous = f64::INFINITY;
         while steps < self.config.max_steps {
-            let distance = self.match_and_solve(frame, pace, steps);
+            if self.solver.renews(steps) {
+                self.match_all(frame, steps);
+            } else {
+                self.match_again(frame, steps);
+            }
+            let distance = self.solve(pace, steps);
             steps += 1;
             if (previous - distance).abs() < self.config.min_change {
                 break;
@@ -259,17 +266,26 @@ impl Tracker {
 
     /// Steps 2-5 at the current poses: everything measured becomes a correspondence.
     fn match_all(&mut self, frame: &Frame, step: usize) {
-        // 2 Assign points to limbs, 3 reduce their number, 4 find closest points.
+        // 2 Assign points to limbs.
+        let gate = self.solver.gate(&self.config, step);
+        self.assign(&gate);
+        if self.config.outline && step >= OUTLINE_FROM {
+            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            self.outline.find(&self.body, &self.poses, views.iter());
+        } else {
+            self.outline.clear();
+        }
+        self.match_again(frame, step);
+    }
+
+    /// Steps 3-5: points stay with their limbs, rims with their edges.
+    fn match_again(&mut self, frame: &Frame, step: usize) {
+        // 3 Reduce the number of points, 4 find closest points.
         let gate = self.solver.gate(&self.config, step);
         self.match_points(&gate, self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
-        if self.config.outline && step >= OUTLINE_FROM {
-            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
-            match_edges(&self.body, &self.poses, views.iter(), &mut self.correspondences.edges);
-        } else {
-            self.correspondences.edges.clear();
-        }
+        self.outline.pairs(&self.poses, &mut self.correspondences.edges);
     }
 
     /// Lets the solver follow the named sites before the points are assigned.
@@ -288,9 +304,16 @@ impl Tracker {
     /// One ICP step (2-7); returns the mean squared distance it started from.
     fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) -> f64 {
         self.match_all(frame, step);
+        self.solve(pace, step)
+    }
+
+    /// Moves the body to what was matched; returns the mean squared distance before.
+    fn solve(&mut self, pace: f64, step: usize) -> f64 {
         let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
         // 6 Elastic bands on both limbs.
-        self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
+        if self.solver.reads_bands() {
+            self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
+        }
         // 7 Fit the model.
         let Self { body, correspondences, predicted, config, solver, poses, .. } = self;
         solver.solve(&Problem { body, correspondences, predicted, step, pace, config }, poses);
@@ -329,6 +352,7 @@ impl Tracker {
         let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
             // The pose is known: what is closest is what was seen.
+            self.assign(&gate);
             self.match_points(&gate, false);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
@@ -337,8 +361,12 @@ impl Tracker {
                 let views =
                     Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
                 for view in views.iter() {
-                    let owns = |point| self.body.closest_limb(&self.poses, point) == limb;
-                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], owns, |edge| seen.push(edge));
+                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], |edge| {
+                        // Beyond the rim, the edge may be another limb's.
+                        if edge.seen <= edge.rim || self.body.closest_limb(&self.poses, edge.place) == limb {
+                            seen.push(edge);
+                        }
+                    });
                 }
                 if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
                     self.body.change_tip(limb, (tip.seen / tip.rim).clamp(0.8, 1.25));
@@ -388,25 +416,36 @@ impl Tracker {
             backgrounds.update(frame, window);
             return;
         }
-        let mut query = Points::default();
-        let mut surface = SurfaceBatch::default();
-        backgrounds.start(frame, |image, index, z| {
-            let point = shifted(&image.world_from_sensor, *origin) * image.back_project(index, z);
-            if !bounds.contains_local_point(point) {
-                return false;
+        let (mut queries, mut pixels, mut surface) = (Points::default(), Vec::new(), SurfaceBatch::default());
+        backgrounds.start(frame, |image, depth| {
+            let working_from_sensor = shifted(&image.world_from_sensor, *origin);
+            queries.clear();
+            pixels.clear();
+            for (index, z) in depth.iter().enumerate().filter(|(_, z)| **z > 0.0) {
+                let point = working_from_sensor * image.back_project(index, *z);
+                if bounds.contains_local_point(point) {
+                    queries.push(point.to_array().map(|value| value as f32));
+                    pixels.push(index);
+                }
             }
-            query.clear();
-            query.push(point.to_array().map(|value| value as f32));
-            body.limbs().iter().zip(poses.iter()).any(|(limb, pose)| {
-                limb.shape.closest_points(pose, &query, &mut surface);
-                surface.signed_distance[0] < BODY_REACH
-            })
+            for (limb, pose) in body.limbs().iter().zip(poses.iter()) {
+                limb.shape.closest_points(pose, &queries, &mut surface);
+                for (pixel, distance) in pixels.iter().zip(&surface.signed_distance) {
+                    if *distance < BODY_REACH {
+                        depth[*pixel] = 0.0;
+                    }
+                }
+            }
         });
+    }
+
+    fn assign(&mut self, gate: &Gate) {
+        let Self { body, poses, candidates, assignment, config, .. } = self;
+        assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
     }
 
     fn match_points(&mut self, gate: &Gate, facing: bool) {
         let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
-        assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let assignment = &*assignment;
         let work = |(index, matches): (usize, &mut LimbMatches)| {

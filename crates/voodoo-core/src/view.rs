@@ -61,14 +61,16 @@ impl<'a> Views<'a> {
 impl View<'_> {
     /// What the pixel that a point (camera frame) falls in shows. Images of distorting lenses say nothing: their rays are
     /// known by the pixel, not the pixel by the ray.
+    #[inline]
     pub fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
         let [fx, fy, cx, cy] = image.intrinsics;
         if point.z < 0.05 || image.rays.is_some() {
             return Pixel::Unknown;
         }
-        let column = (fx * point.x / point.z + cx).round();
-        let row = (fy * point.y / point.z + cy).round();
+        let near = 1.0 / point.z;
+        // Half a pixel on, so that cutting off rounds.
+        let (column, row) = (fx * point.x * near + (cx + 0.5), fy * point.y * near + (cy + 0.5));
         if !(column >= 0.0 && row >= 0.0 && column < image.width as f64 && row < image.height as f64) {
             return Pixel::Unknown;
         }

@@ -1,7 +1,8 @@
 //! A cheap distance, for choosing the limb of a point.
 
 use super::TaperedEllipticCylinder;
-use crate::geometry::Vec3;
+use crate::geometry::{Mat3, Points, Pose, Vec3};
+use crate::simd::widest;
 
 impl TaperedEllipticCylinder {
     /// An approximate signed distance from `q` to the closed surface, limb frame, metres, negative inside.
@@ -14,7 +15,7 @@ impl TaperedEllipticCylinder {
         let tiny = 1e-9;
         let (inv_a, inv_b) = (1.0 / a.max(tiny), 1.0 / b.max(tiny));
         let (u, v) = (q.x * inv_a, q.y * inv_b);
-        let rho = u.hypot(v);
+        let rho = (u * u + v * v).sqrt();
         let above = (-q.z).max(q.z - self.length);
         // ρ ∇ρ = (x/a², y/b², -(u² a'/a + v² b'/b)); beyond a cap the slice no longer depends on z.
         let climb = if above > 0.0 {
@@ -26,6 +27,96 @@ impl TaperedEllipticCylinder {
         let gradient = Vec3::new(u * inv_a, v * inv_b, climb).length();
         // The level function has a cusp on the axis, where the distance is the lesser semi-axis.
         let side = if gradient > 0.0 { ((rho - 1.0) * rho / gradient).max(-a.min(b)) } else { -a.min(b) };
-        if above <= 0.0 { side.max(above) } else { side.max(0.0).hypot(above) }
+        if above <= 0.0 {
+            side.max(above)
+        } else {
+            let side = side.max(0.0);
+            (side * side + above * above).sqrt()
+        }
+    }
+
+    /// [`Self::approximate_distance`] of every query in the frame `world`, in single precision, into `out`.
+    pub fn approximate_distances(&self, world_from_limb: &Pose, queries: &Points, out: &mut Vec<f32>) {
+        out.resize(queries.len(), 0.0);
+        let rough = Rough::new(self, world_from_limb);
+        widest(
+            #[inline(always)]
+            || {
+                let places = queries.x.iter().zip(&queries.y).zip(&queries.z);
+                for (((x, y), z), out) in places.zip(out.iter_mut()) {
+                    *out = rough.distance([*x, *y, *z]);
+                }
+            },
+        );
+    }
+}
+
+/// What the single-precision distance needs of shape and pose.
+struct Rough {
+    /// Rows of the rotation, and the shift, from the world to the limb.
+    rows: [[f32; 4]; 3],
+    length: f32,
+    /// Semi-axes at the proximal end, and their growth by the metre.
+    start: [f32; 2],
+    growth: [f32; 2],
+}
+
+impl Rough {
+    fn new(shape: &TaperedEllipticCylinder, world_from_limb: &Pose) -> Self {
+        let limb_from_world = world_from_limb.inverse();
+        let rotation = Mat3::from_quat(limb_from_world.rotation);
+        let shift = limb_from_world.translation;
+        let row = |axis: usize| [rotation.row(axis).x, rotation.row(axis).y, rotation.row(axis).z, shift[axis]];
+        let rate = 1.0 / shape.length;
+        Self {
+            rows: [0, 1, 2].map(|axis| row(axis).map(|value| value as f32)),
+            length: shape.length as f32,
+            start: [shape.a0, shape.b0].map(|value| value as f32),
+            growth: [(shape.a1 - shape.a0) * rate, (shape.b1 - shape.b0) * rate].map(|value| value as f32),
+        }
+    }
+
+    #[inline(always)]
+    fn distance(&self, p: [f32; 3]) -> f32 {
+        let [x, y, z] = self.rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]);
+        let max = |a: f32, b: f32| if a > b { a } else { b };
+        let min = |a: f32, b: f32| if a < b { a } else { b };
+        let within = min(max(z, 0.0), self.length);
+        let [a, b] = [0, 1].map(|i| max(self.start[i] + self.growth[i] * within, 1e-9));
+        let (inv_a, inv_b) = (1.0 / a, 1.0 / b);
+        let (u, v) = (x * inv_a, y * inv_b);
+        let rho_square = u * u + v * v;
+        let above = max(-z, z - self.length);
+        let climb = u * u * self.growth[0] * inv_a + v * v * self.growth[1] * inv_b;
+        let climb = if above > 0.0 { 0.0 } else { climb };
+        let (gx, gy) = (u * inv_a, v * inv_b);
+        let gradient = (gx * gx + gy * gy + climb * climb).sqrt();
+        let side = max((rho_square - rho_square.sqrt()) / max(gradient, 1e-12), -min(a, b));
+        let outside = max(side, 0.0);
+        let beyond = (outside * outside + above * above).sqrt();
+        if above <= 0.0 { max(side, above) } else { beyond }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_precision_agrees_with_double() -> Result<(), crate::shape::ShapeError> {
+        let shape = TaperedEllipticCylinder::new(0.4, 0.10, 0.06, 0.05, 0.04)?;
+        let pose = Pose::new(Vec3::new(0.3, -0.2, 0.5), Vec3::new(0.4, 1.1, -0.7));
+        let mut queries = Points::default();
+        for n in 0..4000 {
+            let part = |step: usize| (n * step % 997) as f32 / 997.0 - 0.5;
+            queries.push([0.3 + part(3), -0.2 + part(71), 0.5 + part(401)]);
+        }
+        let mut found = Vec::new();
+        shape.approximate_distances(&pose, &queries, &mut found);
+        for (index, found) in found.iter().enumerate() {
+            let expected = shape.approximate_distance(pose.inverse_transform_point(queries.get(index)));
+            assert!((f64::from(*found) - expected).abs() < 2e-6, "{found} is not {expected}");
+        }
+        Ok(())
     }
 }

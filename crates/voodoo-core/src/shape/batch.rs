@@ -2,7 +2,7 @@
 
 use super::kernel::{BLOCK, Block, Constants, Surface, closest};
 use super::{SurfacePoint, TaperedEllipticCylinder};
-use crate::geometry::{Points, Pose};
+use crate::geometry::{Points, Pose, Vec3};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted to find the right basin.
@@ -77,7 +77,7 @@ impl TaperedEllipticCylinder {
         out.resize(xs.len());
         if self.aspect_change() > ONE_BASIN || !self.is_blunt() {
             for i in 0..xs.len() {
-                self.closest_exactly(world_from_limb, [xs[i], ys[i], zs[i]], i, out);
+                self.closest_exactly(world_from_limb, [xs[i], ys[i], zs[i]], Self::closest_point, i, out);
             }
             return;
         }
@@ -89,35 +89,59 @@ impl TaperedEllipticCylinder {
             let count = BLOCK.min(xs.len() - start);
             let span = start..start + count;
             // The tail is padded with what the block held before, so every point meets the same instructions.
-            block.x[..count].copy_from_slice(&xs[span.clone()]);
-            block.y[..count].copy_from_slice(&ys[span.clone()]);
-            block.z[..count].copy_from_slice(&zs[span.clone()]);
+            load(&mut block.x, &xs[span.clone()]);
+            load(&mut block.y, &ys[span.clone()]);
+            load(&mut block.z, &zs[span.clone()]);
             run(&constants, &block, &mut found);
-            out.points.x[span.clone()].copy_from_slice(&found.points.x[..count]);
-            out.points.y[span.clone()].copy_from_slice(&found.points.y[..count]);
-            out.points.z[span.clone()].copy_from_slice(&found.points.z[..count]);
-            out.normals.x[span.clone()].copy_from_slice(&found.normals.x[..count]);
-            out.normals.y[span.clone()].copy_from_slice(&found.normals.y[..count]);
-            out.normals.z[span.clone()].copy_from_slice(&found.normals.z[..count]);
-            out.signed_distance[span.clone()].copy_from_slice(&found.signed_distance[..count]);
-            out.region[span].copy_from_slice(&found.region[..count]);
+            store(&mut out.points.x[span.clone()], &found.points.x);
+            store(&mut out.points.y[span.clone()], &found.points.y);
+            store(&mut out.points.z[span.clone()], &found.points.z);
+            store(&mut out.normals.x[span.clone()], &found.normals.x);
+            store(&mut out.normals.y[span.clone()], &found.normals.y);
+            store(&mut out.normals.z[span.clone()], &found.normals.z);
+            store(&mut out.signed_distance[span.clone()], &found.signed_distance);
+            store(&mut out.region[span], &found.region);
             if found.doubtful.iter().fold(0, |any, doubt| any | doubt) == 0 {
                 continue;
             }
             for i in 0..count {
                 if found.doubtful[i] != 0 {
                     let query = [block.x[i], block.y[i], block.z[i]];
-                    self.closest_exactly(world_from_limb, query, start + i, out);
+                    self.closest_exactly(world_from_limb, query, Self::closest_point_in_one_basin, start + i, out);
                 }
             }
         }
     }
 
     #[cold]
-    fn closest_exactly(&self, world_from_limb: &Pose, query: [f32; 3], index: usize, out: &mut SurfaceBatch) {
-        let world = crate::geometry::Vec3::from_array(query.map(f64::from));
-        let found = self.closest_point(world_from_limb.inverse_transform_point(world));
+    fn closest_exactly(
+        &self,
+        world_from_limb: &Pose,
+        query: [f32; 3],
+        closest: fn(&Self, Vec3) -> SurfacePoint,
+        index: usize,
+        out: &mut SurfaceBatch,
+    ) {
+        let world = Vec3::from_array(query.map(f64::from));
+        let found = closest(self, world_from_limb.inverse_transform_point(world));
         out.set(index, &found, world_from_limb);
+    }
+}
+
+/// Copies a block, mostly a whole one: its size is then known to the compiler.
+#[inline(always)]
+fn load(to: &mut [f32; BLOCK], from: &[f32]) {
+    match from.first_chunk() {
+        Some(from) => *to = *from,
+        None => to[..from.len()].copy_from_slice(from),
+    }
+}
+
+#[inline(always)]
+fn store<T: Copy>(to: &mut [T], from: &[T; BLOCK]) {
+    match to.first_chunk_mut() {
+        Some(to) => *to = *from,
+        None => to.copy_from_slice(&from[..to.len()]),
     }
 }
 
@@ -152,7 +176,6 @@ fn closest_avx2(constants: &Constants, queries: &Block, out: &mut Surface) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
 
     /// Points on a grid around the side, from 2 cm inside to 4 cm outside.
     fn shell(shape: &TaperedEllipticCylinder) -> Vec<Block> {

@@ -29,6 +29,13 @@ const COSINES: [f64; SCAN + 1] = [
 /// Least ratio of the semi-axes for which the scan is stretched towards the sharp tips of an ellipse.
 const SHARPEST: f64 = 1e-3;
 
+/// Least ratio of `g''/2` to `|P_θ|²` of a minimum that is taken for the only one; it falls to 0 at the medial axis.
+pub(super) const DISTINCT: f64 = 0.3;
+
+fn folded(q: Vec3) -> Vec3 {
+    Vec3::new(q.x.abs(), q.y.abs(), q.z)
+}
+
 impl TaperedEllipticCylinder {
     /// The closest point of the closed surface to `q`, limb frame, metres.
     ///
@@ -42,7 +49,21 @@ impl TaperedEllipticCylinder {
         if !q.is_finite() {
             return SurfacePoint { point: Vec3::NAN, normal: Vec3::Z, signed_distance: f64::NAN, region: Region::Side };
         }
-        let side = self.closest_on_side(Vec3::new(q.x.abs(), q.y.abs(), q.z));
+        self.nearest_face(q, self.closest_on_side(folded(q)))
+    }
+
+    /// [`Self::closest_point`] for shapes whose end ellipses differ little: where the minimum found first is a distinct one,
+    /// the side has no other basin, and none is looked for.
+    pub(super) fn closest_point_in_one_basin(&self, q: Vec3) -> SurfacePoint {
+        let folded_query = folded(q);
+        let guessed = self.refine(Angle::ZERO, self.guess(folded_query), Angle::RIGHT, folded_query);
+        let (a, b) = self.semi_axes(guessed.t * self.length);
+        let tangent = (a * guessed.angle.s).powi(2) + (b * guessed.angle.c).powi(2);
+        if guessed.bend >= DISTINCT * tangent { self.nearest_face(q, guessed) } else { self.closest_point(q) }
+    }
+
+    /// The closest point when that of the side is known: a cap may be nearer.
+    fn nearest_face(&self, q: Vec3, side: Foot) -> SurfacePoint {
         let mut squared = side.squared;
         let mut cap = None;
         for (z, a, b, region, normal) in [
@@ -105,7 +126,7 @@ impl TaperedEllipticCylinder {
         if self.aspect_change() < 1e-12 && self.is_blunt() {
             return guessed;
         }
-        let mut best = self.scan(Angle { c: 1.0, s: 1.0 }, q);
+        let mut best = self.scan(None, q);
         if guessed.squared < best.squared {
             best = guessed;
         }
@@ -114,7 +135,7 @@ impl TaperedEllipticCylinder {
             if ratio < 0.5 {
                 // Equal steps of the normal's direction instead of θ: dense at the tips of a flat ellipse.
                 let floor = SHARPEST * a.max(b);
-                let foot = self.scan(Angle { c: a.max(floor), s: b.max(floor) }, q);
+                let foot = self.scan(Some(Angle { c: a.max(floor), s: b.max(floor) }), q);
                 if foot.squared < best.squared {
                     best = foot;
                 }
@@ -123,11 +144,15 @@ impl TaperedEllipticCylinder {
         best
     }
 
-    /// The best local minimum found from the angles `(stretch.c cos φ, stretch.s sin φ)`, φ in equal steps.
-    fn scan(&self, stretch: Angle, q: Vec3) -> Foot {
+    /// The best local minimum found from the angles φ, or `(stretch.c cos φ, stretch.s sin φ)`, φ in equal steps.
+    fn scan(&self, stretch: Option<Angle>, q: Vec3) -> Foot {
         let feet: [Foot; SCAN + 1] = std::array::from_fn(|k| {
-            let (c, s) = (COSINES[k] * stretch.c, COSINES[SCAN - k] * stretch.s);
-            self.foot(Angle::of(c, s).unwrap_or(Angle::ZERO), q)
+            let (c, s) = (COSINES[k], COSINES[SCAN - k]);
+            let angle = match stretch {
+                Some(stretch) => Angle::of(c * stretch.c, s * stretch.s).unwrap_or(Angle::ZERO),
+                None => Angle { c, s },
+            };
+            self.foot(angle, q)
         });
         let mut best = feet[0];
         for k in 0..=SCAN {

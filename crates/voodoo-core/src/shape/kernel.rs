@@ -1,5 +1,6 @@
 //! The arithmetic of the batch: one point as straight-line f32 code, which the compiler turns into one SIMD lane.
 
+use super::closest::DISTINCT;
 use super::{RIM_NORMAL_DISTANCE, Region, TaperedEllipticCylinder};
 use crate::geometry::{Mat3, Pose, Vec3};
 
@@ -7,9 +8,8 @@ use crate::geometry::{Mat3, Pose, Vec3};
 pub(super) const BLOCK: usize = 32;
 /// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, metres, that passes.
 const CONVERGED: f32 = 3e-8;
-/// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned; it falls to 0 at the medial axis, and the error of the
-/// foot is that of the query divided by it.
-const CONDITIONED: f32 = 0.3;
+/// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned: the error of the foot is that of the query divided by it.
+const CONDITIONED: f32 = DISTINCT as f32;
 
 /// One block of points, structure of arrays.
 #[derive(Clone, Copy)]
@@ -240,9 +240,11 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         // Caps, where the query projects into them. Beyond one it is the nearest face, whatever the rounding of `side`.
         let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
         let top = z - k.length;
-        let proximal = over(k.proximal) & ((z < 0.0) | (z * z < side));
+        let (over_proximal, over_distal) = (over(k.proximal), over(k.distal));
+        let decided = (over_proximal & (z < 0.0)) | (over_distal & (top > 0.0));
+        let proximal = over_proximal & ((z < 0.0) | (z * z < side));
         let squared = select(proximal, z * z, side);
-        let distal = over(k.distal) & ((top > 0.0) | (top * top < squared));
+        let distal = over_distal & ((top > 0.0) | (top * top < squared));
         let squared = select(distal, top * top, squared);
         let proximal = proximal & !distal;
         let cap = proximal | distal;
@@ -286,7 +288,8 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
         let flat = if distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere is doubtful.
-        let clear = trusted & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        let clear =
+            (trusted | decided) & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
         out.doubtful[i] = u8::from(!clear);
     }
 }

@@ -16,7 +16,8 @@ impl Angle {
 
     /// The angle of the vector `(x, y)`, `None` for the zero vector.
     pub fn of(x: f64, y: f64) -> Option<Self> {
-        let norm = x.hypot(y);
+        // Lengths and their products: far from where the squares overflow or vanish, so no need for the slower `hypot`.
+        let norm = (x * x + y * y).sqrt();
         (norm > 0.0 && norm.is_finite()).then(|| Self { c: x / norm, s: y / norm })
     }
 

@@ -53,6 +53,10 @@ impl Solver for Limbwise {
         problem.step + 1 < LEAD
     }
 
+    fn reads_bands(&self) -> bool {
+        true
+    }
+
     fn gate(&self, config: &Config, _step: usize) -> Gate {
         Gate { box_margin: config.limb_box_margin, distance: config.max_distance }
     }

@@ -63,8 +63,19 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// Whether it reads the elastic bands among the correspondences.
+    fn reads_bands(&self) -> bool {
+        false
+    }
+
     /// Which points may be matched in a step of a frame.
     fn gate(&self, config: &Config, step: usize) -> Gate;
+
+    /// Whether points get new limbs and rims new edges in a step of a frame, or keep those of the step before: once the gate
+    /// has narrowed, few change. The published method renews them in every step.
+    fn renews(&self, _step: usize) -> bool {
+        true
+    }
 
     /// Whether a frame starts from the predicted poses; the published method starts from the last ones.
     fn starts_from_prediction(&self) -> bool;

@@ -17,6 +17,8 @@ const OVERLAP_SIGMA: f64 = 0.03;
 const FREE_SHARE: f64 = 0.3;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
+/// From this step on, only every second one assigns points and looks for edges.
+const RENEWED: usize = 2;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const SHOWN: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
@@ -61,6 +63,10 @@ impl Solver for WholeBody {
     fn gate(&self, config: &Config, step: usize) -> Gate {
         let distance = narrowed(config.gate_start, config.gate_end, step);
         Gate { box_margin: distance, distance }
+    }
+
+    fn renews(&self, step: usize) -> bool {
+        step < RENEWED || (step - RENEWED).is_multiple_of(2)
     }
 
     fn starts_from_prediction(&self) -> bool {

@@ -5,6 +5,7 @@ use crate::body::Body;
 use crate::correspondence::{Correspondences, LimbMatches};
 use crate::geometry::{Mat3, Pose};
 use crate::normal::{LimbBlock, Normal};
+use crate::simd::widest;
 
 /// `W = w (n n^T + slide (I - n n^T))` under the Geman-McClure kernel of the signed distance.
 #[derive(Debug)]
@@ -29,62 +30,142 @@ pub fn geman_mcclure(r: f64, scale: f64) -> (f64, f64) {
 impl Term for Surface<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut Normal) {
         for (matches, block) in self.correspondences.limbs.iter().zip(&mut normal.limbs) {
-            normal.cost += self.add_limb(matches, block);
+            let sums = widest(
+                #[inline(always)]
+                || self.sum(matches),
+            );
+            normal.cost += sums.add_to(block);
         }
     }
 }
 
+/// Points that are summed side by side: a whole number of SIMD lanes.
+const LANES: usize = 8;
+type Lanes = [f32; LANES];
+
+/// Sums over the points of a limb, each split into lanes. Points lie near the working frame's origin and are single
+/// precision themselves: so are their sums.
+struct Sums {
+    cost: Lanes,
+    /// Lower triangle of the point-to-plane information, row by row.
+    plane: [Lanes; 21],
+    gradient: [Lanes; 6],
+    /// The isotropic part: w, w x, w x x^T (upper triangle).
+    iso: [Lanes; 10],
+}
+
 impl Surface<'_> {
-    fn add_limb(&self, matches: &LimbMatches, block: &mut LimbBlock) -> f64 {
-        let mut cost = 0.0;
-        let mut lower = [0.0_f64; 21];
-        let mut gradient = [0.0_f64; 6];
-        // Sums of the isotropic part: w, w x, w x x^T (upper).
-        let mut iso = [0.0_f64; 10];
-        for index in 0..matches.weight.len() {
-            let weight = f64::from(matches.weight[index]) * self.information;
-            if weight <= 0.0 {
-                continue;
-            }
-            let distance = f64::from(matches.surface.signed_distance[index]);
-            let (rho, kernel) = geman_mcclure(distance, self.scale);
-            cost += weight * rho;
-            let weight = weight * kernel;
-            let x = matches.surface.points.get(index);
-            let n = matches.surface.normals.get(index);
-            let m = x.cross(n);
-            let row = [m.x, m.y, m.z, n.x, n.y, n.z];
+    #[inline(always)]
+    fn sum(&self, matches: &LimbMatches) -> Sums {
+        let mut sums = Sums {
+            cost: [0.0; LANES],
+            plane: [[0.0; LANES]; 21],
+            gradient: [[0.0; LANES]; 6],
+            iso: [[0.0; LANES]; 10],
+        };
+        let (points, normals) = (&matches.surface.points, &matches.surface.normals);
+        let columns = [
+            &points.x,
+            &points.y,
+            &points.z,
+            &normals.x,
+            &normals.y,
+            &normals.z,
+            &matches.surface.signed_distance,
+            &matches.weight,
+        ];
+        let columns = columns.map(|column| column.as_chunks::<LANES>());
+        for block in 0..columns[0].0.len() {
+            self.sum_block(&columns.map(|(blocks, _)| blocks[block]), &mut sums);
+        }
+        if !columns[0].1.is_empty() {
+            // Nothing is what the empty lanes weigh.
+            let last = columns.map(|(_, rest)| {
+                let mut lanes = [0.0; LANES];
+                lanes[..rest.len()].copy_from_slice(rest);
+                lanes
+            });
+            self.sum_block(&last, &mut sums);
+        }
+        sums
+    }
+
+    #[inline(always)]
+    fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight]: &[Lanes; 8], sums: &mut Sums) {
+        let (information, slide) = (self.information as f32, self.slide as f32);
+        let inverse_square = (1.0 / (self.scale * self.scale)) as f32;
+        let (mut pull, mut plane, mut iso) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let mut row = [[0.0; LANES], [0.0; LANES], [0.0; LANES], *nx, *ny, *nz];
+        for l in 0..LANES {
+            let square = distance[l] * distance[l];
+            let falloff = 1.0 / (1.0 + square * inverse_square);
+            let weight = weight[l] * information;
+            sums.cost[l] += weight * square * falloff;
+            let weight = weight * falloff * falloff;
             // The residual n . (x - p) is the negative signed distance of the measured point.
-            let pull = -weight * distance;
-            let plane = weight * (1.0 - self.slide);
-            let mut entry = 0;
-            for i in 0..6 {
-                gradient[i] += pull * row[i];
-                let scaled = plane * row[i];
-                for value in &row[..=i] {
-                    lower[entry] += scaled * value;
-                    entry += 1;
-                }
-            }
-            let weight = weight * self.slide;
-            let sums = [1.0, x.x, x.y, x.z, x.x * x.x, x.x * x.y, x.x * x.z, x.y * x.y, x.y * x.z, x.z * x.z];
-            for (sum, value) in iso.iter_mut().zip(sums) {
-                *sum += weight * value;
-            }
+            pull[l] = -weight * distance[l];
+            plane[l] = weight * (1.0 - slide);
+            iso[l] = weight * slide;
+            row[0][l] = y[l] * nz[l] - z[l] * ny[l];
+            row[1][l] = z[l] * nx[l] - x[l] * nz[l];
+            row[2][l] = x[l] * ny[l] - y[l] * nx[l];
         }
         let mut entry = 0;
         for i in 0..6 {
-            block.g[i] += gradient[i];
+            add_product(&mut sums.gradient[i], &pull, &row[i]);
+            let scaled = product(&plane, &row[i]);
+            for other in &row[..=i] {
+                add_product(&mut sums.plane[entry], &scaled, other);
+                entry += 1;
+            }
+        }
+        let (wx, wy, wz) = (product(&iso, x), product(&iso, y), product(&iso, z));
+        for (sum, values) in sums.iso.iter_mut().zip([&iso, &wx, &wy, &wz]) {
+            for l in 0..LANES {
+                sum[l] += values[l];
+            }
+        }
+        let squares = [(&wx, x), (&wx, y), (&wx, z), (&wy, y), (&wy, z), (&wz, z)];
+        for (sum, (left, right)) in sums.iso[4..].iter_mut().zip(squares) {
+            add_product(sum, left, right);
+        }
+    }
+}
+
+#[inline(always)]
+fn product(left: &Lanes, right: &Lanes) -> Lanes {
+    let mut found = [0.0; LANES];
+    for l in 0..LANES {
+        found[l] = left[l] * right[l];
+    }
+    found
+}
+
+#[inline(always)]
+fn add_product(sum: &mut Lanes, left: &Lanes, right: &Lanes) {
+    for l in 0..LANES {
+        sum[l] += left[l] * right[l];
+    }
+}
+
+impl Sums {
+    /// Adds the sums to a limb's normal equations; returns the cost.
+    fn add_to(&self, block: &mut LimbBlock) -> f64 {
+        let total = |lanes: &Lanes| lanes.iter().map(|value| f64::from(*value)).sum::<f64>();
+        let mut entry = 0;
+        for i in 0..6 {
+            block.g[i] += total(&self.gradient[i]);
             for j in 0..=i {
-                block.h[(i, j)] += lower[entry];
+                let value = total(&self.plane[entry]);
+                block.h[(i, j)] += value;
                 if i != j {
-                    block.h[(j, i)] += lower[entry];
+                    block.h[(j, i)] += value;
                 }
                 entry += 1;
             }
         }
-        add_isotropic(block, &iso);
-        cost
+        add_isotropic(block, &self.iso.map(|lanes| total(&lanes)));
+        total(&self.cost)
     }
 }
 
