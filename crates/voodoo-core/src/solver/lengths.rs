@@ -3,7 +3,7 @@
 use nalgebra::Vector6;
 
 use super::ChainSolver;
-use super::cholesky::solve_in_place;
+use super::cholesky::{factor, solve_in_place, substitute};
 use crate::body::{Body, Pair};
 use crate::geometry::{Pose, Vec3};
 use crate::normal::Normal;
@@ -89,11 +89,14 @@ impl ChainSolver {
             }
         }
         // `step` holds the negative gradient of the pose's unknowns.
+        copy.clone_from(h);
+        if !factor(copy, n) {
+            return false;
+        }
         for row in 0..count {
-            copy.clone_from(h);
             column.clear();
             column.extend_from_slice(&mixed[row * n..(row + 1) * n]);
-            if !solve_in_place(copy, column, n) {
+            if !substitute(copy, column, n) {
                 return false;
             }
             for other in 0..count {

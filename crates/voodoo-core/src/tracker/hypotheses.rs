@@ -7,7 +7,6 @@ use crate::evidence::{EXPLAINED, Visibility, look, unexplained};
 use crate::frame::Frame;
 use crate::geometry::{Points, Pose, Vec3};
 use crate::recover::TwoBone;
-use crate::shape::SurfaceBatch;
 use crate::terms::ShortestAxis;
 use crate::view::Views;
 
@@ -51,7 +50,7 @@ pub(super) struct Hypotheses {
     own_weight: Vec<f64>,
     best: Vec<f32>,
     others: Vec<f32>,
-    surface: SurfaceBatch,
+    distances: Vec<f32>,
     trial: Vec<Pose>,
     kept: Vec<Pose>,
     kept_predicted: Vec<Pose>,
@@ -144,30 +143,29 @@ impl Tracker {
         }
         work.near_weight.extend(&work.own_weight);
         // What the other limbs explain anyway is no merit of this one.
-        self.distances_to_others(chain, &work.near, &mut work.others, &mut work.surface);
-        thin(&mut work.near, &mut work.near_weight, &mut work.others, SAMPLE);
+        thin(&mut work.near, &mut work.near_weight, SAMPLE);
+        self.distances_to_others(chain, &work.near, &mut work.others, &mut work.best);
         let others = std::mem::take(&mut work.others);
-        let score =
-            |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, surface: &mut SurfaceBatch| {
-                best.clone_from(&others);
-                for limb in chain.limbs() {
-                    self.body.limbs()[limb].shape.closest_points(&poses[limb], near, surface);
-                    for (best, distance) in best.iter_mut().zip(&surface.signed_distance) {
-                        *best = best.min(distance.abs());
-                    }
+        let score = |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, distances: &mut Vec<f32>| {
+            best.clone_from(&others);
+            for limb in chain.limbs() {
+                self.body.limbs()[limb].shape.approximate_distances(&poses[limb], near, distances);
+                for (best, distance) in best.iter_mut().zip(distances.iter()) {
+                    *best = best.min(distance.abs());
                 }
-                let points: f64 =
-                    best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / EXPLAINED).powi(2).min(1.0)).sum();
-                points + look(poses).cost() + self.strain(chain, poses)
-            };
-        let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
+            }
+            let points: f64 =
+                best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / EXPLAINED).powi(2).min(1.0)).sum();
+            points + look(poses).cost() + self.strain(chain, poses)
+        };
+        let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
         let mut least = current - GAIN;
         let mut found = false;
         for target in targets.into_iter().flatten() {
             for swivel in 0..TwoBone::swivels() {
                 work.trial.clone_from(&self.poses);
                 chain.point_at(&self.body, &mut work.trial, target, swivel);
-                let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
+                let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
                 if cost < least {
                     least = cost;
                     found = true;
@@ -179,7 +177,7 @@ impl Tracker {
             // Where the chain was a frame ago, carried by its parent.
             work.trial.clone_from(&self.poses);
             carry(chain, &self.body, &self.previous, &mut work.trial);
-            let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.surface);
+            let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
             if cost < least {
                 found = true;
                 work.kept.clone_from(&work.trial);
@@ -194,7 +192,7 @@ impl Tracker {
 
     /// Whether the frame speaks against a chain where it is: against all of it, and against what lies beyond its hinge.
     fn suspect(&self, chain: &TwoBone, views: Views, work: &mut Hypotheses) -> [bool; 2] {
-        let Hypotheses { own, own_weight, others, surface, .. } = work;
+        let Hypotheses { own, own_weight, others, best, .. } = work;
         own.clear();
         own_weight.clear();
         let mut upper = 0;
@@ -210,7 +208,7 @@ impl Tracker {
                 upper = own.len();
             }
         }
-        self.distances_to_others(chain, own, others, surface);
+        self.distances_to_others(chain, own, others, best);
         let alone = |from: usize| -> f64 {
             let weighted = others[from..].iter().zip(&own_weight[from..]);
             weighted.filter(|(other, _)| f64::from(**other) > EXPLAINED).map(|(_, weight)| *weight).sum()
@@ -229,12 +227,12 @@ impl Tracker {
     }
 
     /// Distance of points to the nearest limb that does not belong to a chain.
-    fn distances_to_others(&self, chain: &TwoBone, points: &Points, others: &mut Vec<f32>, surface: &mut SurfaceBatch) {
+    fn distances_to_others(&self, chain: &TwoBone, points: &Points, others: &mut Vec<f32>, distances: &mut Vec<f32>) {
         others.clear();
         others.resize(points.len(), f32::INFINITY);
         for limb in (0..self.poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
-            self.body.limbs()[limb].shape.closest_points(&self.poses[limb], points, surface);
-            for (least, distance) in others.iter_mut().zip(&surface.signed_distance) {
+            self.body.limbs()[limb].shape.approximate_distances(&self.poses[limb], points, distances);
+            for (least, distance) in others.iter_mut().zip(distances.iter()) {
                 *least = least.min(distance.abs());
             }
         }
@@ -355,7 +353,7 @@ fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -
 }
 
 /// Keeps about `most` of the points, evenly, and their total weight.
-fn thin(points: &mut Points, weights: &mut Vec<f64>, others: &mut Vec<f32>, most: usize) {
+fn thin(points: &mut Points, weights: &mut Vec<f64>, most: usize) {
     let count = points.len();
     if count <= most {
         return;
@@ -366,11 +364,9 @@ fn thin(points: &mut Points, weights: &mut Vec<f64>, others: &mut Vec<f32>, most
         let point = points.get(from).to_array().map(|value| value as f32);
         points.set(kept, point);
         weights[kept] = weights[from] * scale;
-        others[kept] = others[from];
     }
     points.x.truncate(most);
     points.y.truncate(most);
     points.z.truncate(most);
     weights.truncate(most);
-    others.truncate(most);
 }

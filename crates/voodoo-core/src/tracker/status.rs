@@ -8,6 +8,7 @@ use super::Tracker;
 use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, look};
 use crate::frame::Frame;
+use crate::geometry::Points;
 use crate::view::Views;
 
 /// Candidates that are looked at, about.
@@ -43,7 +44,10 @@ pub(super) struct Support {
 pub(super) struct Judgement {
     limbs: Vec<Support>,
     alone: Vec<f64>,
-    distances: Vec<f64>,
+    sample: Points,
+    distances: Vec<f32>,
+    /// Distances of the whole sample, limb after limb.
+    all: Vec<f32>,
 }
 
 impl Judgement {
@@ -119,27 +123,32 @@ impl Tracker {
 
     /// Weight of the candidates that each limb explains and no other but its neighbours.
     fn count_alone(&self, work: &mut Judgement) {
-        let Judgement { alone, distances, .. } = work;
+        let Judgement { alone, sample, distances, all, .. } = work;
         let count = self.poses.len();
         alone.clear();
         alone.resize(count, 0.0);
         let step = (self.candidates.len() / SAMPLE).max(1);
-        for index in (0..self.candidates.len()).step_by(step) {
-            let point = self.candidates.points.get(index);
-            distances.clear();
-            distances.extend(
-                self.body
-                    .limbs()
-                    .iter()
-                    .zip(&self.poses)
-                    .map(|(limb, pose)| limb.shape.approximate_distance(pose.inverse_transform_point(point)).abs()),
-            );
-            let closest = (1..count).fold(0, |best, limb| if distances[limb] < distances[best] { limb } else { best });
+        let points = &self.candidates.points;
+        sample.clear();
+        for index in (0..points.len()).step_by(step) {
+            sample.push([points.x[index], points.y[index], points.z[index]]);
+        }
+        all.clear();
+        for (limb, pose) in self.body.limbs().iter().zip(&self.poses) {
+            limb.shape.approximate_distances(pose, sample, distances);
+            all.extend(distances.iter().map(|distance| distance.abs()));
+        }
+        for place in 0..sample.len() {
+            let distance = |limb: usize| all[limb * sample.len() + place];
+            let closest = (1..count).fold(0, |best, limb| if distance(limb) < distance(best) { limb } else { best });
+            if distance(closest) >= EXPLAINED as f32 {
+                continue;
+            }
             let rival = |other: &usize| {
-                *other != closest && distances[*other] <= EXPLAINED && !self.body.adjacent(*other, closest)
+                *other != closest && distance(*other) <= EXPLAINED as f32 && !self.body.adjacent(*other, closest)
             };
-            if distances[closest] < EXPLAINED && (0..count).find(rival).is_none() {
-                alone[closest] += f64::from(self.candidates.weight[index]) * step as f64;
+            if (0..count).find(rival).is_none() {
+                alone[closest] += f64::from(self.candidates.weight[place * step]) * step as f64;
             }
         }
     }
