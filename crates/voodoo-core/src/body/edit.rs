@@ -82,17 +82,6 @@ impl Body {
         pairs
     }
 
-    /// Mean distance of the joints a limb carries from its own along its axis, metres.
-    pub(super) fn bone(&self, limb: usize) -> f64 {
-        let own = self.limbs[limb].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (_, joint) in self.children(limb).filter_map(|child| self.limbs[child].parent.as_ref()) {
-            sum += (joint.parent_from_joint.translation.z - own).abs();
-            count += 1.0;
-        }
-        if count > 0.0 { sum / count } else { 0.0 }
-    }
-
     /// Makes a limb longer by a factor, with all that is fixed to it. A change that makes no solid is not made.
     pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
         let shape = self.limbs[limb].shape;

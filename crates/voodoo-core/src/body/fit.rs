@@ -1,6 +1,6 @@
 //! Pose and sizes of a body from named positions in the world.
 
-use super::{Body, Joint, JointKind, Pair};
+use super::{Body, Joint, JointKind};
 use crate::chain::joint_turn;
 use crate::error::TrackError;
 use crate::geometry::{Mat3, Pose, Quat, Vec3};
@@ -10,8 +10,6 @@ use crate::rigid::Moments;
 const BENT: f64 = 0.3;
 /// A joint whose every range is narrower than this (radians) belongs to the trunk: spine and neck, not shoulder and hip.
 const STEADY: f64 = 2.5;
-/// Factor by which a limb's length over the model's may differ from the usual one of the body.
-const OUT_OF_PROPORTION: f64 = 1.2;
 /// Weight and lever (metres) of the prior orientation against landmarks of weight one.
 const PRIOR_WEIGHT: f64 = 0.01;
 const PRIOR_LEVER: f64 = 0.1;
@@ -58,10 +56,7 @@ impl Body {
                 body.align_hinge(limb, &poses);
             }
         }
-        if fit_sizes {
-            body.keep_proportions(self);
-        }
-        // The limbs may have stretched after their parents were placed; every joint is closed once more.
+        // The last limbs may have stretched after their parents were placed; every joint is closed once more.
         body.close_joints(&mut poses);
         Ok((body, poses))
     }
@@ -230,27 +225,6 @@ impl Body {
                 .find(|(known, _)| (*known - position).length() < 1e-9)
                 .map_or(position * stretch, |(_, measured)| *measured)
         });
-    }
-
-    /// Left and right become equally long, and no limb is out of proportion: a skeleton found in a picture misplaces knees
-    /// and ankles along the leg, the more so of one who sits.
-    fn keep_proportions(&mut self, model: &Self) {
-        let pairs = self.pairs();
-        let mean = |body: &Self, pair: &Pair| pair.iter().map(|limb| body.bone(*limb)).sum::<f64>() / pair.len() as f64;
-        let ratio = |body: &Self, pair: &Pair| mean(body, pair) / mean(model, pair).max(f64::MIN_POSITIVE);
-        let mut ratios: Vec<f64> = pairs.iter().map(|pair| ratio(self, pair)).collect();
-        ratios.sort_by(f64::total_cmp);
-        let Some(usual) = ratios.get(ratios.len() / 2).copied() else { return };
-        for pair in pairs.iter().filter(|pair| pair.len() > 1) {
-            let wanted =
-                ratio(self, pair).clamp(usual / OUT_OF_PROPORTION, usual * OUT_OF_PROPORTION) * mean(model, pair);
-            for limb in pair {
-                let length = self.bone(*limb);
-                if length > 0.0 {
-                    self.change_length(*limb, wanted / length);
-                }
-            }
-        }
     }
 
     /// Turns the hinge on a limb so that its measured pose is one the hinge can take: nobody's elbow or knee axis is quite
