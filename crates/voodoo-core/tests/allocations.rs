@@ -88,10 +88,16 @@ fn ik_allocations() -> usize {
     // Optical frame: z towards -x of the world, 3 m away.
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-    let view =
-        View { distance: &image, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+    let view = View {
+        distance: &image,
+        thickness: &[],
+        width: 160,
+        height: 120,
+        intrinsics: [140.0, 140.0, 79.5, 59.5],
+        camera_from_world,
+    };
     let segments = bones(&body, &model, 1.0);
-    let criterion = Criterion { views: &[view], segments: &segments };
+    let criterion = Criterion { views: &[view], segments: &segments, thin: 0.0 };
     let mut solver = Solver::default();
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {

@@ -107,10 +107,10 @@ proptest! {
         // Optical frame: z towards -x of the world, 3 m away.
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { distance: &image, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
+        let view = View { distance: &image, thickness: &[], width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
-        let criterion = Criterion { views: &[view, view], segments: &segments };
+        let criterion = Criterion { views: &[view, view], segments: &segments, thin: 0.0 };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
             model.place(&Pose::identity(), angles, &mut at);

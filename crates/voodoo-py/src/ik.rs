@@ -24,6 +24,7 @@ type OptionParts = (usize, f64, f64, f64, f64, f64);
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
 pub struct PyView {
     distance: Vec<f32>,
+    thickness: Vec<f32>,
     width: usize,
     height: usize,
     intrinsics: [f64; 4],
@@ -35,6 +36,7 @@ impl PyView {
     #[new]
     fn new(
         distance: PyReadonlyArray2<'_, f32>,
+        thickness: PyReadonlyArray2<'_, f32>,
         intrinsics: [f64; 4],
         camera_from_world: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
@@ -45,6 +47,7 @@ impl PyView {
         }
         Ok(Self {
             distance: distance.as_slice()?.to_vec(),
+            thickness: thickness.as_slice()?.to_vec(),
             width,
             height,
             intrinsics,
@@ -57,6 +60,7 @@ impl PyView {
     fn view(&self) -> ik::View<'_> {
         ik::View {
             distance: &self.distance,
+            thickness: &self.thickness,
             width: self.width,
             height: self.height,
             intrinsics: self.intrinsics,
@@ -208,15 +212,16 @@ impl PyChain {
         base: &Bound<'py, PyAny>,
         angles: Vec<f64>,
         segments: Option<Vec<SegmentParts>>,
-        margin: f64,
+        depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
     ) -> PyResult<(f64, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
-        let segments = self.bones(py, segments, margin)?;
+        let segments = self.bones(py, segments, depth.0)?;
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
         let mut gradient = vec![0.0; self.model.freedoms()];
-        let h = Criterion { views: &views, segments: &segments }.evaluate(&self.model, &at, &mut gradient);
+        let h =
+            Criterion { views: &views, segments: &segments, thin: depth.1 }.evaluate(&self.model, &at, &mut gradient);
         Ok((h, frozen(py, gradient, &[self.model.freedoms()])?))
     }
 
@@ -245,7 +250,7 @@ impl PyChain {
         start: PyReadonlyArray1<'py, f64>,
         goals: Vec<GoalParts>,
         segments: Option<Vec<SegmentParts>>,
-        margin: f64,
+        depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
     ) -> PyResult<Solved<'py>> {
@@ -256,9 +261,9 @@ impl PyChain {
         let goals = self.goals(py, &goals)?;
         let mut ordered = goals.clone();
         ordered.sort_by_key(|goal| goal.level);
-        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, margin)? };
+        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let criterion = Criterion { views: &views, segments: &segments };
+        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1 };
         let mut solver = Solver::default();
         let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &options(how), &mut angles);
         let at = solver.kinematics();
@@ -289,16 +294,16 @@ impl PyChain {
         goals: Vec<GoalParts>,
         positions: PyReadonlyArray3<'py, f64>,
         segments: Option<Vec<SegmentParts>>,
-        margin: f64,
+        depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
     ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
         let py = base.py();
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
-        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, margin)? };
+        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let criterion = Criterion { views: &views, segments: &segments };
+        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1 };
         let (count, n) = (starts.shape()[0], self.model.freedoms());
         let mut angles = starts.as_slice()?.to_vec();
         let positions = positions.as_slice()?;

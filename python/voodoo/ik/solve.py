@@ -56,7 +56,7 @@ def solve(
         vector(begin),
         target_parts(targets),
         listed_bones(options.bones),
-        options.margin,
+        (options.margin, options.thin),
         views,
         options.parts(),
     )
@@ -117,7 +117,7 @@ def solve_many(
         goals,
         places,
         listed_bones(options.bones),
-        options.margin,
+        (options.margin, options.thin),
         views,
         options.parts(),
     )

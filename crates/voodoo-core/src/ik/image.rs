@@ -7,6 +7,8 @@ use crate::geometry::{Mat3, Pose, Vec3};
 pub const SAMPLES: usize = 8;
 /// A silhouette's border is known to a pixel: that much less deep is deep enough.
 const BORDER: f64 = 1.0;
+/// The middle between two borders is known to half of that.
+const MIDDLE: f64 = 0.5;
 /// Points nearer to the camera plane than this, or behind it, are not seen; metres.
 const NEAREST: f64 = 0.05;
 
@@ -15,6 +17,9 @@ const NEAREST: f64 = 0.05;
 pub struct View<'a> {
     /// Distances, row by row; at least 2 x 2.
     pub distance: &'a [f32],
+    /// Of every pixel inside, the radius of the largest disc within the silhouette that covers it, pixels: half its local
+    /// width. As many as distances, or none: then no bone is centred.
+    pub thickness: &'a [f32],
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -35,13 +40,15 @@ pub struct Segment {
 }
 
 /// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less a
-/// pixel.
+/// pixel or, where the silhouette is about as thin as the limb, half the silhouette's width less half a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
     pub views: &'a [View<'a>],
     /// The bones.
     pub segments: &'a [Segment],
+    /// Up to how many radii the silhouette is the limb itself, in whose middle the bone shall lie; 0: nowhere.
+    pub thin: f64,
 }
 
 impl Criterion<'_> {
@@ -79,7 +86,7 @@ impl Criterion<'_> {
                 for sample in 0..SAMPLES {
                     let t = (sample as f64 + 0.5) / SAMPLES as f64;
                     let radius = segment.radius[0] + t * (segment.radius[1] - segment.radius[0]);
-                    let (value, slope) = view.outside(a + t * (b - a), radius);
+                    let (value, slope) = view.outside(a + t * (b - a), radius, self.thin);
                     h += value;
                     pull[0] += (1.0 - t) * slope;
                     pull[1] += t * slope;
@@ -105,17 +112,27 @@ impl Criterion<'_> {
 
 impl View<'_> {
     /// `max(distance + depth, 0)` of a point in the optical frame and its derivative by that point.
-    fn outside(&self, x: Vec3, radius: f64) -> (f64, Vec3) {
+    fn outside(&self, x: Vec3, radius: f64, thin: f64) -> (f64, Vec3) {
         if x.z < NEAREST {
             return (0.0, Vec3::ZERO);
         }
         let [fx, fy, cx, cy] = self.intrinsics;
         let inverse = 1.0 / x.z;
         let (px, py) = (x.x * inverse, x.y * inverse);
-        let (distance, du, dv) = self.sample(fx * px + cx, fy * py + cy);
-        let depth = fx * radius * inverse - BORDER;
+        let Some(at) = self.locate(fx * px + cx, fy * py + cy) else { return (0.0, Vec3::ZERO) };
+        let [distance, mut du, mut dv] = at.sample(self.distance, self.width);
+        let projected = fx * radius * inverse;
+        let mut depth = (projected - BORDER).max(0.0);
         // The derivative of the depth by the distance from the camera plane.
-        let (depth, closer) = if depth > 0.0 { (depth, depth + BORDER) } else { (0.0, 0.0) };
+        let mut closer = if depth > 0.0 { projected } else { 0.0 };
+        // No place is deeper than half the width: what is too deep to be thin need not be looked up.
+        if distance < 0.0 && -distance <= thin * projected && distance + thin * projected - MIDDLE > 0.0 {
+            let [half, su, sv] = at.sample(self.thickness, self.width);
+            if half <= thin * projected && half - MIDDLE > depth {
+                depth = half - MIDDLE;
+                (du, dv, closer) = (du + su, dv + sv, 0.0);
+            }
+        }
         let value = distance + depth;
         if value <= 0.0 {
             return (0.0, Vec3::ZERO);
@@ -124,27 +141,43 @@ impl View<'_> {
         (value, Vec3::new(gx, gy, -(gx * px + gy * py) - closer) * inverse)
     }
 
-    /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the
-    /// picture is background.
-    fn sample(&self, u: f64, v: f64) -> (f64, f64, f64) {
+    /// The four pixels around a place; outside of the picture those of its border.
+    fn locate(&self, u: f64, v: f64) -> Option<Place> {
         let (right, bottom) = ((self.width - 1) as f64, (self.height - 1) as f64);
         let (x, y) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
         let column = (x as usize).min(self.width - 2);
         let row = (y as usize).min(self.height - 2);
-        let (s, t) = (x - column as f64, y - row as f64);
-        let start = row * self.width + column;
+        let place =
+            Place { start: row * self.width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
+        (place.start + self.width + 2 <= self.distance.len()).then_some(place)
+    }
+}
+
+/// A place between four pixels, and how far beyond the picture it lies.
+struct Place {
+    start: usize,
+    s: f64,
+    t: f64,
+    beyond: [f64; 2],
+}
+
+impl Place {
+    /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the
+    /// picture is background. Zero for an image of another size.
+    fn sample(&self, image: &[f32], width: usize) -> [f64; 3] {
+        let (s, t) = (self.s, self.t);
         let (Some(upper), Some(lower)) =
-            (self.distance.get(start..start + 2), self.distance.get(start + self.width..start + self.width + 2))
+            (image.get(self.start..self.start + 2), image.get(self.start + width..self.start + width + 2))
         else {
-            return (0.0, 0.0, 0.0);
+            return [0.0; 3];
         };
         let [d00, d01, d10, d11] = [upper[0], upper[1], lower[0], lower[1]].map(f64::from);
         let (first, second) = (d00 + s * (d01 - d00), d10 + s * (d11 - d10));
         let value = first + t * (second - first);
         let (mut du, mut dv) = ((1.0 - t) * (d01 - d00) + t * (d11 - d10), second - first);
-        let (ox, oy) = (u - x, v - y);
+        let [ox, oy] = self.beyond;
         if ox == 0.0 && oy == 0.0 {
-            return (value, du, dv);
+            return [value, du, dv];
         }
         let beyond = ox.hypot(oy);
         if ox != 0.0 {
@@ -153,6 +186,6 @@ impl View<'_> {
         if oy != 0.0 {
             dv = oy / beyond;
         }
-        (value + beyond, du, dv)
+        [value + beyond, du, dv]
     }
 }
