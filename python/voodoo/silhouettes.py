@@ -136,7 +136,8 @@ def surroundings(
     """Where in a picture (height, width) the person may be, as far as known sites tell.
 
     Arms and legs with both ends known are segments, widened by as much as they can be bent and by their girth, or two segments
-    of their girth if elbow or knee are known, too; all else is the hull of the known sites, widened by 15 cm if shoulders and hips are among them, else by 35 cm.
+    of their girth if elbow or knee are known, too; all else is the hull of the known sites, widened by 15 cm if shoulders and
+    hips are among them, else by 35 cm.
 
     Args:
         known: positions (3,) [m] of sites in the root frame.

@@ -97,7 +97,7 @@ fn ik_allocations() -> usize {
         camera_from_world,
     };
     let segments = bones(&body, &model, 1.0);
-    let criterion = Criterion { views: &[view], segments: &segments, thin: 0.0 };
+    let criterion = Criterion { views: &[view], segments: &segments, thin: 0.0, trunk: &[] };
     let mut solver = Solver::default();
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {

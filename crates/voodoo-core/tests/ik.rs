@@ -110,7 +110,7 @@ proptest! {
         let view = View { distance: &image, thickness: &[], width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
-        let criterion = Criterion { views: &[view, view], segments: &segments, thin: 0.0 };
+        let criterion = Criterion { views: &[view, view], segments: &segments, thin: 0.0, trunk: &[] };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
             model.place(&Pose::identity(), angles, &mut at);

@@ -104,7 +104,9 @@ impl PyChain {
     fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Segment>> {
         parts
             .iter()
-            .map(|(a, b, radius)| Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2] }))
+            .map(|(a, b, radius)| {
+                Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
+            })
             .collect()
     }
 
@@ -219,9 +221,13 @@ impl PyChain {
         let at = self.place(py, base, &angles)?;
         let segments = self.bones(py, segments, depth.0)?;
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
+        let trunk = ik::trunk(&self.body, &self.model);
         let mut gradient = vec![0.0; self.model.freedoms()];
-        let h =
-            Criterion { views: &views, segments: &segments, thin: depth.1 }.evaluate(&self.model, &at, &mut gradient);
+        let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
+            &self.model,
+            &at,
+            &mut gradient,
+        );
         Ok((h, frozen(py, gradient, &[self.model.freedoms()])?))
     }
 
@@ -263,7 +269,8 @@ impl PyChain {
         ordered.sort_by_key(|goal| goal.level);
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1 };
+        let trunk = ik::trunk(&self.body, &self.model);
+        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let mut solver = Solver::default();
         let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &options(how), &mut angles);
         let at = solver.kinematics();
@@ -303,7 +310,8 @@ impl PyChain {
         let mut goals = self.goals(py, &goals)?;
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1 };
+        let trunk = ik::trunk(&self.body, &self.model);
+        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let (count, n) = (starts.shape()[0], self.model.freedoms());
         let mut angles = starts.as_slice()?.to_vec();
         let positions = positions.as_slice()?;

@@ -37,7 +37,7 @@ class Options:
     caution: float = 0.3
     largest_turn: float = 0.5
     margin: float = 1.1
-    thin: float = 1.35
+    thin: float = 1.7
     bones: tuple[Bone, ...] | None = None
 
     def __post_init__(self) -> None:
