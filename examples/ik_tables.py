@@ -25,7 +25,7 @@ from voodoo.silhouettes import StillScene, from_depth
 from voodoo.views import CameraView, silhouette
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
-SIDE_CAMERA = voodoo.Camera(640, 480, 580.0, 580.0, 319.5, 239.5)
+SIDE_CAMERA = voodoo.Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
 
 
 @dataclass
@@ -78,7 +78,7 @@ def rendered(path: Path) -> Rendered:
         # The model's limbs leave cracks at neck and shoulders that no person has.
         for end in ("l_shoulder", "r_shoulder", "skullbase"):
             line, _ = view.project(np.stack([truth["vc7"][index], truth[end][index]]))
-            cv2.line(mask, *np.rint(line).astype(int).tolist(), 1, 20)
+            cv2.line(mask, *np.rint(line).astype(int).tolist(), 1, 10)
         side.append(ik.Silhouette(mask, camera=SIDE_CAMERA, world_from_camera=pose))
     return Rendered(recording.name, height, truth, depths, side)
 
