@@ -292,7 +292,7 @@ impl PyChain {
     }
 
     /// Many postures that share sites, images and options: angles `(N, n)`, sites `(N, S, 3)`, h `(N,)`, steps `(N,)`,
-    /// converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
+    /// postures tried `(N,)`, converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
     #[allow(clippy::too_many_arguments, clippy::type_complexity, reason = "called by voodoo.ik only")]
     fn solve_many<'py>(
         &self,
@@ -304,7 +304,7 @@ impl PyChain {
         depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
-    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
+    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
         let py = base.py();
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
@@ -318,7 +318,7 @@ impl PyChain {
         let sites: Vec<(usize, Vec3)> = self.site_parts().map(|(_, part, x)| (part, x)).collect();
         let how = options(how);
         let mut points = Vec::with_capacity(3 * sites.len() * count);
-        let (mut h, mut steps, mut converged) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut h, mut steps, mut tried, mut converged) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         py.detach(|| {
             let mut solver = Solver::default();
             let width = 3 * goals.len();
@@ -333,6 +333,7 @@ impl PyChain {
                 points.extend(sites.iter().flat_map(|(part, x)| at.poses[*part].transform_point(*x).to_array()));
                 h.push(report.h);
                 steps.push(report.steps as f64);
+                tried.push(report.tried as f64);
                 converged.push(f64::from(u8::from(report.converged)));
             }
         });
@@ -341,6 +342,7 @@ impl PyChain {
             frozen(py, points, &[count, sites.len(), 3])?,
             frozen(py, h, &[count])?,
             frozen(py, steps, &[count])?,
+            frozen(py, tried, &[count])?,
             frozen(py, converged, &[count])?,
         ))
     }

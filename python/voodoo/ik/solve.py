@@ -121,8 +121,8 @@ def solve_many(
         views,
         options.parts(),
     )
-    angles, joints, h, steps, converged = found
-    return Postures(angles, joints, h, steps, converged != 0.0)
+    angles, joints, h, steps, tried, converged = found
+    return Postures(angles, joints, h, steps, tried, converged != 0.0)
 
 
 class Follower:
