@@ -1,5 +1,6 @@
 """Postures a second of J10's arm: two joints of three freedoms, 15 steps, with and without the image constraint, one
-core.
+core; and what the constraint's time goes to. The same picture twice leads the same way, so what it adds is the sampling and its
+gradient; what else one picture adds is steps in the null space and kinematics of postures tried.
 
     python benches/ik_speed.py
 """
@@ -54,8 +55,10 @@ def main() -> None:
     goals = np.array([chain.forward(row)[1]["wrist"] for row in rng.uniform(-0.8, 0.8, (count, 6))])[:, None]
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {count} postures, 15 steps a phase")
     print(
-        "| images | postures a second | us a posture | steps | us a step | reached within 0.1 mm |\n|---|---|---|---|---|---|"
+        "| images | postures a second | us a posture | steps | tried | us a step | reached within 0.1 mm |\n"
+        "|---|---|---|---|---|---|---|"
     )
+    took, tries = [], []
     for views in (0, 1, 2):
         # The fastest of some rounds for each few hundred postures: waiting for other programs does not count.
         fastest = np.full(len(parts), np.inf)
@@ -68,11 +71,21 @@ def main() -> None:
                 )
                 fastest[index] = min(fastest[index], time.perf_counter() - began)
         best, steps = fastest.sum(), sum(some.steps.sum() for some in found)
+        took.append(1e6 * best / count)
+        tries.append(sum(some.tried.sum() for some in found) / count)
         reached = np.linalg.norm(np.concatenate([some.joints[:, 0] for some in found]) - goals[:, 0], axis=1) < 1e-4
         print(
-            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {1e6 * best / steps:.2f} | "
+            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {tries[-1]:.1f} | "
+            f"{1e6 * best / steps:.2f} | "
             f"{100 * reached.mean():.1f} % |"
         )
+    plain, one, two = took
+    print(f"one picture: {plain:.1f} us without it, {two - one:.1f} us sampling and gradient, ", end="")
+    print(
+        f"{2 * one - two - plain:.1f} us null space, kinematics and limits; {two - one:.1f} us / {tries[1]:.1f} tries = ",
+        end="",
+    )
+    print(f"{1e3 * (two - one) / tries[1]:.0f} ns a picture and try")
 
 
 if __name__ == "__main__":

@@ -84,23 +84,30 @@ def typical_frame(truth: Truth) -> int:
     return int(np.argmin(np.square(lengths - np.median(lengths, axis=0)).sum(axis=1)))
 
 
-def reachable(truth: Truth) -> dict[str, np.ndarray]:
-    """The places (F, 3) nearest to every estimated joint that limbs of the median lengths can reach between the known ends.
+def steady(truth: Truth) -> dict[str, np.ndarray]:
+    """The truth with every arm and leg replaced by the nearest one (least squares over its three joints) of the median lengths.
 
-    With exact truth these are the joints themselves; triangulated limbs change their lengths from frame to frame.
+    Exact truth stays as it is; triangulated limbs change their lengths from frame to frame, which no chain can follow.
     """
-    found = {}
+    found = dict(truth)
     for joint, (_, first, last) in LIMBS.items():
-        upper, lower = np.median(limb_lengths(truth)[joint], axis=0)
-        axis = truth[last] - truth[first]
-        distance = np.linalg.norm(axis, axis=1)[:, None]
-        axis = axis / distance
-        straight = np.minimum(distance, upper + lower)
-        along = (straight**2 + upper**2 - lower**2) / (2.0 * straight)
-        radius = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
-        offset = truth[joint] - truth[first]
-        across = offset - (offset * axis).sum(axis=1)[:, None] * axis
-        found[joint] = truth[first] + along * axis + radius * across / np.linalg.norm(across, axis=1)[:, None]
+        names = (first, joint, last)
+        lengths = np.median(limb_lengths(truth)[joint], axis=0)
+        measured = np.stack([truth[name] for name in names], axis=1)
+        places = measured.copy()
+        # Least squares under two constraints, each linearised where the last step led.
+        for _ in range(50):
+            bones = np.diff(places, axis=1)
+            now = np.linalg.norm(bones, axis=2)
+            ways = bones / now[..., None]
+            rows = np.zeros((len(places), 2, 3, 3))
+            for bone in (0, 1):
+                rows[:, bone, bone], rows[:, bone, bone + 1] = -ways[:, bone], ways[:, bone]
+            rows = rows.reshape(-1, 2, 9)
+            wanted = (lengths - now)[..., None] + rows @ (places - measured).reshape(-1, 9, 1)
+            step = rows.transpose(0, 2, 1) @ np.linalg.solve(rows @ rows.transpose(0, 2, 1), wanted)
+            places = measured + step.reshape(-1, 3, 3)
+        found.update({name: places[:, index] for index, name in enumerate(names)})
     return found
 
 

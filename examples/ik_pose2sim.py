@@ -8,54 +8,73 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from ik_limbs import LIMBS, Truth, follow, limb_lengths
+from ik_limbs import LIMBS, Truth, follow, limb_lengths, steady
 
 import voodoo
 from voodoo import ik
 from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.pose2sim import SITES
 from voodoo.sensors.background import StillBackground
-from voodoo.silhouettes import surroundings
+from voodoo.silhouettes import filled, surroundings
+from voodoo.views import CameraView
 
 SCALE = 0.25
 LEARN_EVERY = 2
+CORNERS = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
 
 
 @dataclass
 class Trial:
-    """The published triangulation, and of each camera its silhouettes (F) and its pose (4, 4)."""
+    """The published triangulation, the chains of constant limbs nearest to it, and of each camera its silhouettes (F) and its
+    pose (4, 4)."""
 
     truth: Truth
+    steady: Truth
     height: float
     views: dict[str, tuple[list[ik.Silhouette], np.ndarray]]
 
-    def solve(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
-        """Positions (F, 3) of elbows and knees with the silhouettes of some cameras."""
+    def solve(self, cameras: Sequence[str], truth: Truth) -> dict[str, np.ndarray]:
+        """Positions (F, 3) of elbows and knees with the silhouettes of some cameras, known sites as in `truth`."""
 
         def silhouettes(frame: int, last: Mapping[str, np.ndarray]) -> list[ik.Silhouette]:
             return [self.views[camera][0][frame] for camera in cameras]
 
-        return follow(self.truth, self.height, silhouettes if cameras else None)
+        return follow(truth, self.height, silhouettes if cameras else None)
 
 
 def four_cameras(path: Path) -> Trial:
     recording = voodoo.open_recording(path)
     names, positions = read_trc(next(path.glob("*_butterworth.trc")), world_from_file=Z_UP_FROM_Y_UP).of(SITES)
     truth = {name: positions[:, i] for i, name in enumerate(names)}
-    height = stature(truth)
-    views = {}
-    for placed, video in zip(recording.cameras, sorted((path / "videos").glob("*.mp4")), strict=True):
-        pictures, camera = read(video, placed.camera)
-        known = [name for name in truth if name not in LIMBS]
-        there = [
-            surroundings({name: truth[name][frame] for name in known}, camera, placed.world_from_sensor, height=height)
-            for frame in range(len(pictures))
-        ]
-        background = StillBackground(pictures[::LEARN_EVERY], occupied=there[::LEARN_EVERY])
-        masks = [background.mask(picture) & near for picture, near in zip(pictures, there, strict=True)]
-        outlines = [ik.Silhouette(mask, camera=camera, world_from_camera=placed.world_from_sensor) for mask in masks]
-        views[placed.name] = (outlines, placed.world_from_sensor)
-    return Trial(truth, height, views)
+    pictures = {
+        placed.name: (*read(video, placed.camera), placed.world_from_sensor)
+        for placed, video in zip(recording.cameras, sorted((path / "videos").glob("*.mp4")), strict=True)
+    }
+    trial = Trial(truth, steady(truth), stature(truth), {})
+    known = {name: places for name, places in truth.items() if name not in LIMBS}
+    # Twice: elbows and knees found with the first silhouettes tell better where the person is not, hence the background.
+    for _ in range(2):
+        trial.views = {name: (cut_out(*seen, known, trial.height), seen[2]) for name, seen in pictures.items()}
+        known = {**known, **trial.solve(tuple(pictures), truth)}
+    return trial
+
+
+def cut_out(
+    pictures: Sequence[np.ndarray], camera: voodoo.Camera, pose: np.ndarray, known: Truth, height: float
+) -> list[ik.Silhouette]:
+    """The person in all pictures of a camera: what differs from the background near the known sites, and the trunk."""
+    frames = range(len(pictures))
+    sites = [{name: places[frame] for name, places in known.items()} for frame in frames]
+    there = [surroundings(places, camera, pose, height=height) for places in sites]
+    background = StillBackground(pictures[::LEARN_EVERY], occupied=there[::LEARN_EVERY])
+    outlines = []
+    for picture, near, places in zip(pictures, there, sites, strict=True):
+        trunk = np.zeros(near.shape, dtype=np.uint8)
+        corners, _ = CameraView(camera, pose).project(np.stack([places[site] for site in CORNERS]))
+        cv2.fillPoly(trunk, [cv2.convexHull(np.rint(corners).astype(np.int32))], 1)
+        mask = filled((background.mask(picture) & near) | (trunk != 0))
+        outlines.append(ik.Silhouette(mask, camera=camera, world_from_camera=pose))
+    return outlines
 
 
 def read(video: Path, camera: voodoo.Camera) -> tuple[list[np.ndarray], voodoo.Camera]:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from ik_limbs import LIMBS, Truth, errors, follow, reachable, row
+from ik_limbs import LIMBS, Truth, errors, follow, row
 from ik_pose2sim import four_cameras
 
 import voodoo
@@ -72,7 +72,9 @@ def rendered(path: Path) -> Rendered:
         pose[:3, :3] = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
         pose[:3, 3] = truth["humanoid_root"][index] + np.array((0.0, 3.0, 0.2))
         view = CameraView(SIDE_CAMERA, pose)
-        mask = silhouette(tracker.body, estimate, view, width=320, height=240).astype(np.uint8)
+        mask = silhouette(tracker.body, estimate, view, width=SIDE_CAMERA.width, height=SIDE_CAMERA.height).astype(
+            np.uint8
+        )
         # The model's limbs leave cracks at neck and shoulders that no person has.
         for end in ("l_shoulder", "r_shoulder", "skullbase"):
             line, _ = view.project(np.stack([truth["vc7"][index], truth[end][index]]))
@@ -121,17 +123,21 @@ def main() -> None:
     if (arguments.data / "pose2sim").is_dir():
         trial = four_cameras(arguments.data / "pose2sim")
         sets = ((), ("cam_01",), ("cam_01", "cam_04"), tuple(trial.views))
-        found = [trial.solve(cameras) for cameras in sets]
-        print("\n| real cameras | joint | plain | 1 view | 2 views | 4 views |\n|---|---|---|---|---|---|")
-        can = reachable(trial.truth)
-        for joint in ("elbow", "knee"):
-            print(row("from the triangulation", joint, [errors(one, trial.truth) for one in found]))
-            print(row("from the nearest place in reach", joint, [errors(one, can) for one in found]))
-        for joint in ("elbow", "knee"):
-            print(row("reach from the triangulation", joint, [errors(can, trial.truth)]))
+        print(
+            "\n| real cameras, known and error from | joint | plain | 1 view | 2 views | 4 views |\n|---|---|---|---|---|---|"
+        )
+        for name, truth in (("the triangulation", trial.truth), ("its nearest chains", trial.steady)):
+            found = [trial.solve(cameras, truth) for cameras in sets]
+            for joint in LIMBS:
+                means = [1e3 * errors(one, truth)[joint].mean() for one in found]
+                print(f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")
+            for joint in ("elbow", "knee"):
+                print(row(name, joint, [errors(one, truth) for one in found]))
+        moved = {name: np.linalg.norm(trial.steady[name] - trial.truth[name], axis=1) for name in trial.truth}
+        print("\nmoved, mean mm: " + ", ".join(f"{n} {1e3 * d.mean():.1f}" for n, d in moved.items() if d.any()))
         frame = 50
-        then = [{joint: places[joint][frame] for joint in LIMBS} for places in (trial.truth, found[0], found[3])]
-        known = {site: places[frame] for site, places in trial.truth.items()}
+        then = [{joint: places[joint][frame] for joint in LIMBS} for places in (trial.steady, found[0], found[3])]
+        known = {site: places[frame] for site, places in trial.steady.items()}
         views = [picture(view[frame], pose, known, then) for view, pose in trial.views.values()]
         cv2.imwrite(str(arguments.out / "pose2sim.png"), np.hstack(views))
 

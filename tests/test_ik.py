@@ -218,6 +218,53 @@ def test_criterion_gradient(arm):
     assert np.allclose(gradient, numeric, rtol=2e-2, atol=1e-2)
 
 
+def test_a_bone_lies_in_the_middle_of_a_limb_and_is_content_in_a_trunk():
+    camera = voodoo.Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
+    v, u = np.mgrid[:120, :160]
+    limb, trunk = (np.abs(u - 40) <= 6), (np.abs(u - 110) <= 25)
+    image = ik.Silhouette((limb | trunk) & (np.abs(v - 60) < 55), camera=camera, world_from_camera=np.eye(4))
+    assert image.thickness[60, 36] == pytest.approx(6.5, abs=1.0)
+    assert image.thickness[60, 95] == pytest.approx(25.5, abs=1.0)
+    assert image.thickness[60, 60] == 0.0
+    text = """name = "bar"
+[[limbs]]
+name = "base"
+shape = { length = 0.1, a0 = 0.05, b0 = 0.05, a1 = 0.05, b1 = 0.05 }
+[[limbs]]
+name = "bone"
+parent = "base"
+shape = { length = 0.4, a0 = 0.08, b0 = 0.08, a1 = 0.08, b1 = 0.08 }
+joint = { name = "joint" }
+"""
+    chain = ik.Chain(voodoo.Body.from_toml(text), limbs=("bone",))
+
+    def h(pixel, thin):
+        # The bone runs down the picture, 2.5 m away; its radius is 4.8 px.
+        base = np.eye(4)
+        base[:3, :3] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+        base[:3, 3] = ((pixel - 79.5) / 60.0, -0.2, 2.5)
+        return chain.criterion(chain.rest(), [image], world_from_base=base, margin=1.0, thin=thin)[0]
+
+    assert h(40, 1.7) == 0.0 and h(42.5, 0.0) == 0.0
+    assert h(42.5, 1.7) == pytest.approx(2.0, abs=0.7) and h(37.5, 1.7) == pytest.approx(2.0, abs=0.7)
+    assert h(100, 1.7) == 0.0
+
+
+def test_no_elbow_in_the_trunk(arm):
+    # Everything is silhouette: nothing but the trunk speaks.
+    camera, pose = front_camera(0.3)
+    mask = np.ones((120, 160))
+    image = ik.Silhouette(mask, camera=camera, world_from_camera=pose)
+    angles = np.random.default_rng(0).uniform(arm.limits[:, 0], arm.limits[:, 1], (400, 4))
+    deep = np.array([arm.criterion(row, [image])[0] for row in angles])
+    assert 0.0 < (deep > 0.0).mean() < 0.5
+    # Its gradient leads out of it.
+    row = angles[np.argmax(deep)]
+    gradient = arm.criterion(row, [image])[1]
+    assert arm.criterion(row - 0.05 * gradient / np.linalg.norm(gradient), [image])[0] < deep.max()
+    assert all(arm.criterion(row, [image], margin=0.0)[0] == 0.0 for row in angles)  # J10's criterion knows no trunk
+
+
 def test_batch_equals_single(arm):
     rng = np.random.default_rng(3)
     goals = shoulder(arm) + rng.uniform(-0.4, 0.4, (20, 1, 3))

@@ -270,6 +270,7 @@ class View:
     def __new__(
         cls,
         distance: npt.NDArray[np.float32],
+        thickness: npt.NDArray[np.float32],
         intrinsics: tuple[float, float, float, float],
         camera_from_world: npt.ArrayLike,
     ) -> View: ...
@@ -296,7 +297,7 @@ class Chain:
         base: npt.ArrayLike,
         angles: npt.NDArray[np.float64],
         segments: Sequence[tuple[str, str, float]] | None,
-        margin: float,
+        depth: tuple[float, float],
         views: Sequence[View],
     ) -> tuple[float, npt.NDArray[np.float64]]: ...
     def project(
@@ -308,7 +309,7 @@ class Chain:
         start: npt.NDArray[np.float64],
         goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
         segments: Sequence[tuple[str, str, float]] | None,
-        margin: float,
+        depth: tuple[float, float],
         views: Sequence[View],
         how: tuple[int, float, float, float, float, float],
     ) -> tuple[
@@ -327,10 +328,11 @@ class Chain:
         goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
         positions: npt.NDArray[np.float64],
         segments: Sequence[tuple[str, str, float]] | None,
-        margin: float,
+        depth: tuple[float, float],
         views: Sequence[View],
         how: tuple[int, float, float, float, float, float],
     ) -> tuple[
+        npt.NDArray[np.float64],
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],

@@ -30,11 +30,15 @@ _BESIDE_M, _TRUNK_M, _GIRTH_M = 0.35, 0.15, 0.12
 """How far the person reaches beyond known sites: any, those of the trunk, the bones of arms and legs."""
 _TRUNK = {"l_shoulder", "r_shoulder", "l_hip", "r_hip"}
 _LIMBS = tuple(
-    (f"{side}_{first}", f"{side}_{last}", share)
+    (f"{side}_{first}", f"{side}_{middle}", f"{side}_{last}", share)
     for side in "lr"
-    for first, last, share in (("shoulder", "wrist", 0.332), ("shoulder", "hand", 0.377), ("hip", "ankle", 0.491))
+    for first, middle, last, share in (
+        ("shoulder", "elbow", "wrist", 0.332),
+        ("shoulder", "elbow", "hand", 0.377),
+        ("hip", "knee", "ankle", 0.491),
+    )
 )
-"""Ends of arms and legs, and their length as a share of the stature (Winter, fig. 4.1)."""
+"""Joints of arms and legs, and their length as a share of the stature (Winter, fig. 4.1)."""
 _BEFORE = (0.04, 0.012)
 """What stands before the scene is nearer by this: metres, and share of the depth (three deviations of a structured-light camera
 at 4 m)."""
@@ -131,8 +135,9 @@ def surroundings(
 ) -> Mask:
     """Where in a picture (height, width) the person may be, as far as known sites tell.
 
-    Arms and legs with both ends known are segments, widened by as much as they can be bent and by their girth; all else is the
-    hull of the known sites, widened by 15 cm if shoulders and hips are among them, else by 35 cm.
+    Arms and legs with both ends known are segments, widened by as much as they can be bent and by their girth, or two segments
+    of their girth if elbow or knee are known, too; all else is the hull of the known sites, widened by 15 cm if shoulders and
+    hips are among them, else by 35 cm.
 
     Args:
         known: positions (3,) [m] of sites in the root frame.
@@ -160,8 +165,12 @@ def surroundings(
         cv2.polylines(mask, [hull], True, 1, max(round(2.0 * by * scale), 1))
 
     rest = set(ends)
-    for first, last, share in _LIMBS:
-        if first in ends and last in ends:
+    for first, middle, last, share in _LIMBS:
+        if first in ends and middle in ends and last in ends:
+            widened([first, middle], _GIRTH_M)
+            widened([middle, last], _GIRTH_M)
+            rest -= {middle, last}
+        elif first in ends and last in ends:
             straight = float(np.linalg.norm(places[first] - places[last]))
             bend = 0.5 * float(np.sqrt(max((share * height) ** 2 - straight**2, 0.0)))
             widened([first, last], bend + _GIRTH_M)

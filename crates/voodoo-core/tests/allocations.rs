@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use voodoo_core::body::HumanModel;
 use voodoo_core::frame::{Frame, PositionRelation, RayRelation};
 use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::ik::{Aim, Criterion, Goal, Model, Options, Root, Solver, View, bones};
+use voodoo_core::ik::{Aim, Criterion, Goal, Model, Options, Root, Solver, View, bones, trunk};
 use voodoo_core::render::{Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Tracker};
 
@@ -85,13 +85,20 @@ fn ik_allocations() -> usize {
     let model = Model::new(&body, &[], Root::Free).unwrap();
     let image: Vec<f32> =
         (0..160 * 120).map(|i| ((i % 160) as f32 - 70.0).hypot((i / 160) as f32 - 60.0) - 9.0).collect();
-    // Optical frame: z towards -x of the world, 3 m away.
+    let thickness: Vec<f32> = image.iter().map(|distance| if *distance < 0.0 { 9.0 } else { 0.0 }).collect();
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-    let view =
-        View { distance: &image, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+    let view = View {
+        distance: &image,
+        thickness: &thickness,
+        width: 160,
+        height: 120,
+        intrinsics: [140.0, 140.0, 79.5, 59.5],
+        camera_from_world,
+    };
     let segments = bones(&body, &model, 1.0);
-    let criterion = Criterion { views: &[view], segments: &segments };
+    let trunk = trunk(&body, &model);
+    let criterion = Criterion { views: &[view], segments: &segments, thin: 1.7, trunk: &trunk };
     let mut solver = Solver::default();
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {

@@ -9,6 +9,7 @@ use voodoo_core::chain::exp;
 use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::ik::{
     Aim, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, View, bones, level_rows, log, project,
+    trunk,
 };
 use voodoo_core::normal::{LimbBlock, line};
 
@@ -98,19 +99,23 @@ proptest! {
     }
 
     #[test]
-    fn criterion_gradient_is_the_derivative(angles in values(48, 0.6), radius in 0.0..0.06_f64) {
+    fn criterion_gradient_is_the_derivative(angles in values(48, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
         let body = human();
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let mut angles = angles[..model.freedoms()].to_vec();
         angles[2] += 0.2;
         let image = disc(160, 120, [60.0, 50.0], 12.0);
+        // A disc is nowhere thinner than itself; a little slope, so that its derivative is seen.
+        let thickness: Vec<f32> = image.iter().enumerate().map(|(i, d)| if *d < 0.0 { 6.0 + 0.02 * (i % 160) as f32 } else { 0.0 }).collect();
         // Optical frame: z towards -x of the world, 3 m away.
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { distance: &image, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
+        let view = View { distance: &image, thickness: &thickness, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
-        let criterion = Criterion { views: &[view, view], segments: &segments };
+        let trunk = trunk(&body, &model);
+        prop_assert_eq!(trunk.len(), 2);
+        let criterion = Criterion { views: &[view, view], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
             model.place(&Pose::identity(), angles, &mut at);
@@ -133,6 +138,30 @@ proptest! {
             (gradient[i] - (moved(1e-7) - moved(-1e-7)) / 2e-7).abs()
         }).sum::<f64>() / angles.len() as f64;
         prop_assert!(error < 0.05 * (1.0 + gradient.iter().map(|g| g.abs()).sum::<f64>() / angles.len() as f64), "{error}");
+    }
+
+    #[test]
+    fn no_bone_in_the_trunk(x in -0.2..0.2_f64, y in -0.2..0.2_f64) {
+        let (body, model) = arm();
+        let trunk = trunk(&body, &model);
+        // The base of an arm is the trunk.
+        prop_assert_eq!(trunk.len(), 1);
+        let image = vec![-100.0_f32; 160 * 120];
+        let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
+        let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
+        let view = View { distance: &image, thickness: &[], width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+        // One short bone beside the shoulder, moved into the trunk by its base.
+        let segment = Segment { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
+        let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };
+        let mut at = Kinematics::default();
+        model.place(&Pose::identity(), &vec![0.0; model.freedoms()], &mut at);
+        at.poses[0] = Pose::from_parts(Vec3::new(x, y, 0.3), at.poses[0].rotation);
+        let h = criterion.evaluate(&model, &at, &mut vec![0.0; model.freedoms()]);
+        let shape = &body.limbs()[0].shape;
+        let t = 0.3 / shape.length();
+        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
+        let level = (x / a).hypot(y / b);
+        prop_assert!((h > 0.0) == (level < 1.0) || (level - 1.0).abs() < 0.02, "{h} {level}");
     }
 
     #[test]

@@ -24,6 +24,7 @@ type OptionParts = (usize, f64, f64, f64, f64, f64);
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
 pub struct PyView {
     distance: Vec<f32>,
+    thickness: Vec<f32>,
     width: usize,
     height: usize,
     intrinsics: [f64; 4],
@@ -35,6 +36,7 @@ impl PyView {
     #[new]
     fn new(
         distance: PyReadonlyArray2<'_, f32>,
+        thickness: PyReadonlyArray2<'_, f32>,
         intrinsics: [f64; 4],
         camera_from_world: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
@@ -45,6 +47,7 @@ impl PyView {
         }
         Ok(Self {
             distance: distance.as_slice()?.to_vec(),
+            thickness: thickness.as_slice()?.to_vec(),
             width,
             height,
             intrinsics,
@@ -57,6 +60,7 @@ impl PyView {
     fn view(&self) -> ik::View<'_> {
         ik::View {
             distance: &self.distance,
+            thickness: &self.thickness,
             width: self.width,
             height: self.height,
             intrinsics: self.intrinsics,
@@ -100,7 +104,9 @@ impl PyChain {
     fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Segment>> {
         parts
             .iter()
-            .map(|(a, b, radius)| Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2] }))
+            .map(|(a, b, radius)| {
+                Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
+            })
             .collect()
     }
 
@@ -208,15 +214,20 @@ impl PyChain {
         base: &Bound<'py, PyAny>,
         angles: Vec<f64>,
         segments: Option<Vec<SegmentParts>>,
-        margin: f64,
+        depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
     ) -> PyResult<(f64, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
-        let segments = self.bones(py, segments, margin)?;
+        let segments = self.bones(py, segments, depth.0)?;
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
+        let trunk = ik::trunk(&self.body, &self.model);
         let mut gradient = vec![0.0; self.model.freedoms()];
-        let h = Criterion { views: &views, segments: &segments }.evaluate(&self.model, &at, &mut gradient);
+        let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
+            &self.model,
+            &at,
+            &mut gradient,
+        );
         Ok((h, frozen(py, gradient, &[self.model.freedoms()])?))
     }
 
@@ -245,7 +256,7 @@ impl PyChain {
         start: PyReadonlyArray1<'py, f64>,
         goals: Vec<GoalParts>,
         segments: Option<Vec<SegmentParts>>,
-        margin: f64,
+        depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
     ) -> PyResult<Solved<'py>> {
@@ -256,9 +267,10 @@ impl PyChain {
         let goals = self.goals(py, &goals)?;
         let mut ordered = goals.clone();
         ordered.sort_by_key(|goal| goal.level);
-        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, margin)? };
+        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let criterion = Criterion { views: &views, segments: &segments };
+        let trunk = ik::trunk(&self.body, &self.model);
+        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let mut solver = Solver::default();
         let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &options(how), &mut angles);
         let at = solver.kinematics();
@@ -280,7 +292,7 @@ impl PyChain {
     }
 
     /// Many postures that share sites, images and options: angles `(N, n)`, sites `(N, S, 3)`, h `(N,)`, steps `(N,)`,
-    /// converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
+    /// postures tried `(N,)`, converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
     #[allow(clippy::too_many_arguments, clippy::type_complexity, reason = "called by voodoo.ik only")]
     fn solve_many<'py>(
         &self,
@@ -289,23 +301,24 @@ impl PyChain {
         goals: Vec<GoalParts>,
         positions: PyReadonlyArray3<'py, f64>,
         segments: Option<Vec<SegmentParts>>,
-        margin: f64,
+        depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
-    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
+    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
         let py = base.py();
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
-        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, margin)? };
+        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let criterion = Criterion { views: &views, segments: &segments };
+        let trunk = ik::trunk(&self.body, &self.model);
+        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let (count, n) = (starts.shape()[0], self.model.freedoms());
         let mut angles = starts.as_slice()?.to_vec();
         let positions = positions.as_slice()?;
         let sites: Vec<(usize, Vec3)> = self.site_parts().map(|(_, part, x)| (part, x)).collect();
         let how = options(how);
         let mut points = Vec::with_capacity(3 * sites.len() * count);
-        let (mut h, mut steps, mut converged) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut h, mut steps, mut tried, mut converged) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         py.detach(|| {
             let mut solver = Solver::default();
             let width = 3 * goals.len();
@@ -320,6 +333,7 @@ impl PyChain {
                 points.extend(sites.iter().flat_map(|(part, x)| at.poses[*part].transform_point(*x).to_array()));
                 h.push(report.h);
                 steps.push(report.steps as f64);
+                tried.push(report.tried as f64);
                 converged.push(f64::from(u8::from(report.converged)));
             }
         });
@@ -328,6 +342,7 @@ impl PyChain {
             frozen(py, points, &[count, sites.len(), 3])?,
             frozen(py, h, &[count])?,
             frozen(py, steps, &[count])?,
+            frozen(py, tried, &[count])?,
             frozen(py, converged, &[count])?,
         ))
     }

@@ -101,11 +101,14 @@ class Chain:
         *,
         world_from_base: npt.ArrayLike | None = None,
         margin: float = 1.1,
+        thin: float = 1.7,
         bones: Sequence[Bone] | None = None,
     ) -> tuple[float, FloatArray]:
         """The image criterion h [px] and its gradient (n,) (J10 eq. 5, 8); see `solve` for the arguments."""
         views = [image.core for image in images if not image.empty]
-        return self._core.criterion(base_pose(world_from_base), vector(angles), listed_bones(bones), margin, views)
+        return self._core.criterion(
+            base_pose(world_from_base), vector(angles), listed_bones(bones), (margin, thin), views
+        )
 
     def __repr__(self) -> str:
         """Limbs and unknowns."""

@@ -11,6 +11,9 @@ from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
 
 _UNDISTORTED = 0.5
+_MIDDLE = 0.3
+"""A pixel is a middle if a step of a pixel to any side gains less than all but this; smaller gains more middles."""
+_SUBPIXEL_BITS = 4
 
 
 class Silhouette:
@@ -38,6 +41,8 @@ class Silhouette:
         self.camera = camera
         self.distance: npt.NDArray[np.float32] = signed_distance(person)
         self.distance.setflags(write=False)
+        self.thickness: npt.NDArray[np.float32] = local_thickness(self.distance)
+        self.thickness.setflags(write=False)
         # A picture without the person says nothing; it takes no part.
         self.empty = not person.any()
         pose = np.asarray(world_from_camera, dtype=np.float64)
@@ -48,7 +53,7 @@ class Silhouette:
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, intrinsics, inverse)
+        self._core = _core.View(self.distance, self.thickness, intrinsics, inverse)
 
     @property
     def core(self) -> _core.View:
@@ -72,6 +77,29 @@ def signed_distance(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
     inside = cv2.distanceTransform((mask != 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     distance = np.where(mask != 0, 0.5 - inside, outside - 0.5)
     return np.ascontiguousarray(distance, dtype=np.float32)
+
+
+def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Half the local width (height, width) [px] of the inside of a signed distance: of every pixel the radius of the largest
+    disc within the silhouette that covers it; 0 outside. Exact to half a pixel."""
+    inside = np.maximum(-distance, np.float32(0.0))
+    thickness = np.zeros(distance.shape, dtype=np.float32)
+    # Discs about the middles of the silhouette cover it (its medial axis): where no neighbour's disc holds the pixel's own.
+    padded = np.pad(inside, 1)
+    middle = inside > 0.0
+    height, width = distance.shape
+    for dv in (-1, 0, 1):
+        for du in (-1, 0, 1):
+            if du or dv:
+                beside = padded[1 + dv : 1 + dv + height, 1 + du : 1 + du + width]
+                middle &= beside < inside + (np.hypot(du, dv) - _MIDDLE)
+    rows, columns = np.nonzero(middle)
+    radii = inside[rows, columns]
+    order = np.argsort(radii, kind="stable")
+    one = 1 << _SUBPIXEL_BITS
+    for u, v, radius in zip(columns[order].tolist(), rows[order].tolist(), radii[order].tolist(), strict=True):
+        cv2.circle(thickness, (u * one, v * one), round(radius * one), radius, cv2.FILLED, shift=_SUBPIXEL_BITS)
+    return np.where(inside > 0.0, np.maximum(thickness, inside), np.float32(0.0)).astype(np.float32)
 
 
 def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:

@@ -25,6 +25,8 @@ class Options:
         largest_turn: largest change of an angle in one step [rad].
         margin: how deep bones shall lie inside the silhouettes, in radii of their limbs, less a pixel; 0 is J10's
             criterion.
+        thin: up to how many times that depth a silhouette is the limb itself, in whose middle the bone shall lie; 0: bones are
+            nowhere centred.
         bones: the segments that are projected; None: joint to joint.
     """
 
@@ -35,6 +37,7 @@ class Options:
     caution: float = 0.3
     largest_turn: float = 0.5
     margin: float = 1.1
+    thin: float = 1.7
     bones: tuple[Bone, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -52,6 +55,7 @@ class Options:
             ("caution", 0.0, 10.0),
             ("largest_turn", 1e-6, math.pi),
             ("margin", 0.0, 2.0),
+            ("thin", 0.0, 3.0),
         ):
             value = getattr(self, name)
             if not (isinstance(value, (int, float)) and low <= value <= high):

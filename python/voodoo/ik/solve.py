@@ -56,7 +56,7 @@ def solve(
         vector(begin),
         target_parts(targets),
         listed_bones(options.bones),
-        options.margin,
+        (options.margin, options.thin),
         views,
         options.parts(),
     )
@@ -117,12 +117,12 @@ def solve_many(
         goals,
         places,
         listed_bones(options.bones),
-        options.margin,
+        (options.margin, options.thin),
         views,
         options.parts(),
     )
-    angles, joints, h, steps, converged = found
-    return Postures(angles, joints, h, steps, converged != 0.0)
+    angles, joints, h, steps, tried, converged = found
+    return Postures(angles, joints, h, steps, tried, converged != 0.0)
 
 
 class Follower:

@@ -1,7 +1,8 @@
-//! The segments that stand for a chain in the images: joint to joint (J10 eq. 6).
+//! The segments that stand for a chain in the images, joint to joint (J10 eq. 6), and the trunk they cannot be in.
 
 use super::image::Segment;
 use super::model::Model;
+use super::trunk::Trunk;
 use crate::body::Body;
 use crate::geometry::Vec3;
 
@@ -23,7 +24,40 @@ pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Segment> {
             let farthest = sites.max_by(|a, b| (*a - start).length().total_cmp(&(*b - start).length()));
             ends.push(farthest.filter(|end| (*end - start).length() > 1e-6).unwrap_or(Vec3::Z * shape.length()));
         }
-        segments.extend(ends.into_iter().map(|end| Segment { ends: [(index, start), (index, end)], radius }));
+        let parent = limb.parent.as_ref().map_or(0, |(parent, _)| *parent);
+        // Limbs start in the trunk that carries them; those of the trunk itself are in it.
+        let apart = if branches(body, part.limb) {
+            1.0
+        } else if branches(body, parent) {
+            0.5
+        } else {
+            0.0
+        };
+        segments.extend(ends.into_iter().map(|end| Segment { ends: [(index, start), (index, end)], radius, apart }));
     }
     segments
+}
+
+/// The limbs of the chain, and its base, from which several others branch: the trunk.
+pub fn trunk(body: &Body, model: &Model) -> Vec<Trunk> {
+    let mut found = Vec::new();
+    let base =
+        model.parts().first().and_then(|part| body.limbs()[part.limb].parent.as_ref().map(|(parent, _)| *parent));
+    let parts = model.parts().iter().enumerate().map(|(index, part)| (Some(index), part.limb));
+    for (part, limb) in base.map(|limb| (None, limb)).into_iter().chain(parts) {
+        if branches(body, limb) {
+            let shape = &body.limbs()[limb].shape;
+            found.push(Trunk {
+                part,
+                length: shape.length(),
+                a: [shape.a0(), shape.a1()],
+                b: [shape.b0(), shape.b1()],
+            });
+        }
+    }
+    found
+}
+
+fn branches(body: &Body, limb: usize) -> bool {
+    body.limbs().iter().filter(|other| other.parent.as_ref().is_some_and(|(parent, _)| *parent == limb)).count() > 2
 }

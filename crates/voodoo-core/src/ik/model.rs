@@ -68,6 +68,8 @@ pub struct Column {
 /// Where everything is at one vector of angles; memory to be used again.
 #[derive(Clone, Debug, Default)]
 pub struct Kinematics {
+    /// World pose of the base.
+    pub base: Pose,
     /// World pose of every part.
     pub poses: Vec<Pose>,
     /// One column an unknown.
@@ -179,7 +181,8 @@ impl Model {
 
     /// Forward kinematics and its derivative (R07 eq. 10): poses of all parts and the screw of every unknown.
     pub fn place(&self, world_from_base: &Pose, angles: &[f64], at: &mut Kinematics) {
-        let Kinematics { poses, columns } = at;
+        let Kinematics { base, poses, columns } = at;
+        *base = *world_from_base;
         poses.clear();
         columns.clear();
         for part in &self.parts {

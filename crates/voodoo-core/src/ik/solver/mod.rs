@@ -45,6 +45,8 @@ impl Default for Options {
 pub struct Report {
     /// Steps used.
     pub steps: usize,
+    /// Postures tried, refused ones included.
+    pub tried: usize,
     /// Whether the angles came to rest (or the only level was reached).
     pub converged: bool,
     /// Image criterion at the end, pixels; 0 without images.
@@ -83,6 +85,7 @@ pub struct Solver {
     phase_start: Vec<f64>,
     saved: Vec<f64>,
     saved_cost: Vec<f64>,
+    tried: usize,
 }
 
 struct Problem<'a> {
@@ -128,6 +131,7 @@ impl Solver {
             }
         }
         report.h = self.h;
+        report.tried = self.tried;
         report
     }
 
@@ -205,6 +209,7 @@ impl Solver {
         self.stages.clear();
         self.stages.resize((count + 1) * n, 0.0);
         self.best.clear();
+        self.tried = 0;
         self.gain = problem.options.gain;
         self.evaluate_here(problem, angles);
     }
@@ -217,6 +222,7 @@ impl Solver {
 
     /// Costs, criterion and kinematics at the trial angles.
     fn evaluate(&mut self, problem: &Problem, image: bool) {
+        self.tried += 1;
         problem.model.place(problem.base, &self.trial, &mut self.trial_at);
         self.trial_cost.clear();
         let costs = self.levels.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial_at));
