@@ -22,7 +22,7 @@ const PATIENCE: usize = 3;
 /// A hypothesis must explain so many patches more than the current pose.
 const GAIN: f64 = 25.0;
 /// ICP steps that refine the best hypothesis.
-const REFINE: usize = 4;
+const REFINE: usize = 8;
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
@@ -33,6 +33,8 @@ const INSIDE: f64 = 0.01;
 const TARGETS: usize = 5;
 const HEAP: f64 = 0.08;
 const STRAY: f64 = 3.0;
+/// The same while a hypothesis is rough, metres.
+const ROUGHLY: f64 = 0.08;
 /// Points looked at when hypotheses are compared, at most.
 const SAMPLE: usize = 400;
 
@@ -155,7 +157,7 @@ impl Tracker {
                 }
             }
             let points: f64 =
-                best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / EXPLAINED).powi(2).min(1.0)).sum();
+                best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum();
             points + look(poses).cost() + self.strain(chain, poses)
         };
         let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
@@ -329,8 +331,8 @@ fn carry(chain: &TwoBone, body: &crate::body::Body, then: &[Pose], now: &mut [Po
 fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; TARGETS] {
     apart.clear();
     apart.extend((0..points.len()).map(|index| (points.get(index) - root).length() as f32));
-    let mut targets = [None; TARGETS];
-    for target in &mut targets {
+    let (mut targets, mut found) = ([None; TARGETS], 0);
+    while found < TARGETS {
         let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
         let place = points.get(next);
         if f64::from(apart[next]) < HEAP {
@@ -347,7 +349,10 @@ fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -
             }
         }
         // A few stray points are no hand.
-        *target = (total > STRAY).then(|| sum / total);
+        if total > STRAY {
+            targets[found] = Some(sum / total);
+            found += 1;
+        }
     }
     targets
 }
