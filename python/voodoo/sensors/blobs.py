@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from voodoo.sensors.assignment import assign
 from voodoo.sensors.pixels import FloatArray
@@ -31,6 +32,9 @@ HELD, DRIFTED, TAKEN, NONE = 0.3, 0.75, 0.5, 0.8
 A region that keeps its name costs less than none; two that were swapped cost more than changing back."""
 SAME_M = 0.09
 """Two candidates this near are one hand."""
+DOUBT_S, APART = 0.25, 1.25
+"""A name is given up after this time in which the body did not come nearer to it than so many gates, or in which it lay on
+another limb."""
 OLD_ENOUGH = 3
 """Pictures in which a region was seen before it may be named from afar."""
 
@@ -45,6 +49,7 @@ class Sight:
         deep: whether a depth camera saw it.
         hand: False where it cannot be a hand.
         region: number of its region.
+        still: whether nothing behind it was ever seen: it may be a thing, not the person.
     """
 
     direction: FloatArray
@@ -52,6 +57,7 @@ class Sight:
     deep: bool
     hand: bool
     region: int
+    still: bool = False
 
 
 @dataclass(eq=False)
@@ -64,6 +70,7 @@ class Blob:
     count: int = 1
     label: str | None = None
     far: dict[str, float] = field(default_factory=dict)
+    doubt: dict[str, float] = field(default_factory=dict)
 
     def at(self, stamp: float) -> FloatArray:
         """Where it should be."""
@@ -86,7 +93,8 @@ class Blob:
         if _apart(self, seen.sight, stamp) * _limit(self, stamp) > SAME_M:
             return False
         if self.label is not None and seen.label is None:
-            seen.label, seen.far, seen.count = self.label, self.far, max(seen.count, self.count)
+            seen.label, seen.far, seen.doubt = self.label, self.far, self.doubt
+            seen.count = max(seen.count, self.count)
         return True
 
 
@@ -97,6 +105,7 @@ class Blobs:
         """None yet."""
         self.items: list[Blob] = []
         self._missed: dict[str, float] = {}
+        self._stamp = -math.inf
 
     def follow(self, sights: Sequence[Sight], stamp: float) -> list[Blob]:
         """The blob of each sight of a picture, new ones included; those that were not seen for long are dropped."""
@@ -118,6 +127,7 @@ class Blobs:
         seen: Sequence[Blob],
         distance: FloatArray,
         allowed: FloatArray,
+        elsewhere: npt.NDArray[np.bool_],
         *,
         sites: Sequence[str],
         gates: Mapping[str, float],
@@ -132,6 +142,7 @@ class Blobs:
             seen: blobs of this picture.
             distance: (S, B) between the site where the model expects it and the blob [m].
             allowed: (S, B): 0 the blob cannot be the site, 1 only near where it is expected, 2 anywhere.
+            elsewhere: (S, B): the blob is on another part of the body, as far as that is where it is thought to be.
             sites: their names.
             gates: site -> gate [m].
             growth: of a gate while its site is not seen [m/s].
@@ -142,6 +153,10 @@ class Blobs:
         Returns:
             Site -> number of its blob.
         """
+        elapsed = min(max(stamp - self._stamp, 0.0), 0.1)
+        self._stamp = stamp
+        self._doubt(seen, distance, elsewhere, sites=sites, gates=gates, elapsed=elapsed)
+        allowed = np.where([[blob.doubt[site] > DOUBT_S for blob in seen] for site in sites], 0.0, allowed)
         owner = {
             site
             for row, site in enumerate(sites)
@@ -158,7 +173,7 @@ class Blobs:
                 sample = min(near / gate, 2.0) ** 2
                 share = 1.0 if blob.count == 1 else 1.0 - math.exp(-1.0 / (30.0 * AGREEMENT_S))
                 far = blob.far[site] = (1.0 - share) * blob.far.get(site, sample) + share * sample
-                if not allowed[row, column]:
+                if not allowed[row, column] or (blob.label != site and elsewhere[row, column]):
                     continue
                 if blob.label == site:
                     cost[row, column] = min(HELD * far, DRIFTED)
@@ -183,6 +198,23 @@ class Blobs:
             seen[column].label = site
             self._missed[site] = stamp
         return named
+
+    @staticmethod
+    def _doubt(
+        seen: Sequence[Blob],
+        distance: FloatArray,
+        elsewhere: npt.NDArray[np.bool_],
+        *,
+        sites: Sequence[str],
+        gates: Mapping[str, float],
+        elapsed: float,
+    ) -> None:
+        """How long each blob has spoken against being each site: on another limb, or its name without the body going there."""
+        for row, site in enumerate(sites):
+            for column, blob in enumerate(seen):
+                apart = blob.label == site and blob.sight.deep and distance[row, column] > APART * gates[site]
+                change = elapsed if elsewhere[row, column] or apart else -elapsed
+                blob.doubt[site] = min(max(blob.doubt.get(site, 0.0) + change, 0.0), 2.0 * DOUBT_S)
 
 
 def _apart(blob: Blob, sight: Sight, stamp: float) -> float:

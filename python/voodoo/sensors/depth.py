@@ -17,6 +17,14 @@ from voodoo.sensors.pixels import FloatArray, in_sensor
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 
 
+_STANDS = 1e-3
+"""A pose whose entries change by less is that of a camera that stands."""
+_BEHIND_M = 0.10
+"""What lies this far behind is another surface."""
+_ENOUGH = 3
+"""Pictures after which something is known about a scene."""
+
+
 @dataclass(frozen=True)
 class DepthFilter:
     """Drops pixels that are not surface.
@@ -97,21 +105,57 @@ class BodyView:
         mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
         pixels: (N, 2) of the points in the picture.
         depths: (N,) of the points along the colour camera's optical axis [m].
+        still: (N,) whether nothing behind a point was ever seen there: it may be the scene. None: not known.
     """
 
     mask: npt.NDArray[np.bool_]
     pixels: FloatArray
     depths: FloatArray
+    still: npt.NDArray[np.bool_] | None = None
 
-    def depth_at(self, pixel: tuple[float, float], radius: float) -> float | None:
-        """Depth [m] of the nearest surface within `radius` pixels of a place, None with less than three points
-        there."""
-        near = ((self.pixels - pixel) ** 2).sum(axis=1) < radius**2
-        if int(near.sum()) < 3:
+    def look_at(self, pixel: tuple[float, float], radius: float) -> tuple[float, bool] | None:
+        """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
+        less than three points there."""
+        offset = self.pixels - pixel
+        near = np.flatnonzero((offset * offset).sum(axis=1) < radius**2)
+        if len(near) < 3:
             return None
         depths = self.depths[near]
-        front = float(np.quantile(depths, 0.2, method="lower"))
-        return float(np.median(depths[np.abs(depths - front) < 0.1]))
+        front = np.partition(depths, (len(near) - 1) // 5)[(len(near) - 1) // 5]
+        surface = np.abs(depths - front) < 0.1
+        still = self.still is not None and 2 * int(self.still[near][surface].sum()) > int(surface.sum())
+        return float(np.median(depths[surface])), still
+
+
+class StillDepth:
+    """The farthest that a depth camera has seen in each pixel since it stands where it is.
+
+    What was never seen to have something behind it may be part of the scene: a table's edge does not become a hand. The
+    surface of a person who has not moved yet looks the same, so this only tells what has moved.
+    """
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self._farthest: npt.NDArray[np.float32] | None = None
+        self._pose: FloatArray | None = None
+        self.pictures = 0
+
+    def see(self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray) -> None:
+        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew."""
+        moved = self._pose is None or not np.allclose(self._pose, world_from_sensor, atol=_STANDS)
+        if self._farthest is None or moved or self._farthest.shape != z.shape:
+            self._farthest, self._pose, self.pictures = z.copy(), world_from_sensor, 1
+            return
+        np.maximum(self._farthest, z, out=self._farthest)
+        self.pictures += 1
+
+    def still(self, z: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_] | None:
+        """(H, W): True where nothing was seen behind an image's surface; None until there are enough pictures."""
+        if self._farthest is None or self.pictures < _ENOUGH:
+            return None
+        # At the edges of things every camera sees now the one, now the other.
+        behind = cv2.erode(self._farthest, np.ones((3, 3), np.uint8))
+        return np.asarray(behind - z < _BEHIND_M)
 
 
 def body_view(
@@ -125,6 +169,7 @@ def body_view(
     joints: npt.ArrayLike,
     margin: float = 0.30,
     step: int = 1,
+    scene: StillDepth | None = None,
 ) -> BodyView:
     """Where, in a colour image, a depth camera beside it saw something within the box around the body.
 
@@ -136,6 +181,7 @@ def body_view(
         joints: (N, 3) predicted positions of the body [m].
         margin: enlargement of their box [m].
         step: every step-th row and column of the depth image is used.
+        scene: what the depth camera saw before; takes up this image.
 
     Returns:
         Mask of the colour image and the points; the gaps between the depth pixels are closed in the mask.
@@ -143,6 +189,16 @@ def body_view(
     places = np.asarray(joints, dtype=np.float64)
     low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
     rows, columns = _window(depth_camera, world_from_depth, low, high)
+    standing = None
+    if scene is not None:
+        whole = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
+        scene.see(whole, world_from_depth)
+        rows, columns = (slice(-(-span.start // step) * step, span.stop) for span in (rows, columns))
+        standing = scene.still(whole)
+        if standing is not None:
+            standing = standing[
+                rows.start // step : -(-rows.stop // step), columns.start // step : -(-columns.stop // step)
+            ]
     z = depth[rows, columns][::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
     rays = depth_camera.rays()[rows, columns][::step, ::step]
     valid = np.isfinite(z) & (z > 0.0)
@@ -154,12 +210,14 @@ def body_view(
         place = turn[0] * x + turn[1] * y + turn[2] * z + shift
         near &= (place > low[axis]) & (place < high[axis])
     x, y, z = x[near], y[near], z[near]
+    still = None if standing is None else standing[valid][near]
     color_from_depth = np.linalg.inv(world_from_color) @ world_from_depth
     in_color = np.column_stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in color_from_depth[:3]])
     mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
     pixels = color_camera.project(in_color)
     seen = np.isfinite(pixels).all(axis=1)
     pixels, in_color = pixels[seen], in_color[seen]
+    still = None if still is None else still[seen]
     whole = np.round(pixels).astype(np.int64)
     inside = (whole >= 0).all(axis=1) & (whole < (color_camera.width, color_camera.height)).all(axis=1)
     mask[whole[inside, 1], whole[inside, 0]] = 1
@@ -167,7 +225,7 @@ def body_view(
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
     grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
     beyond = _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
-    return BodyView(grown | beyond, pixels, in_color[:, 2])
+    return BodyView(grown | beyond, pixels, in_color[:, 2], still)
 
 
 def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high: FloatArray) -> tuple[slice, slice]:

@@ -24,7 +24,7 @@ from voodoo.recordings import (
     RecordedFrame,
     Recording,
 )
-from voodoo.sensors.depth import DepthFilter, body_view
+from voodoo.sensors.depth import DepthFilter, StillDepth, body_view
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import (
     PLANAR_LASER,
@@ -118,6 +118,7 @@ class FrontEnd:
         self.rays: list[SiteRay] = []
         self.frozen: tuple[str, ...] = ()
         self._contents: dict[str, npt.NDArray[Any]] = {}
+        self._scenes: dict[str, StillDepth] = {}
         self._predictor = SitePredictor()
         chosen = self.settings
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
@@ -225,6 +226,7 @@ class FrontEnd:
                 world_from_color=item.root_from_sensor,
                 joints=list(then.values()),
                 step=max(depth.camera.width // 200, 1),
+                scene=self._scenes.setdefault(depth.sensor, StillDepth()),
             )
         rays = skin.observe(
             item.image,
@@ -233,10 +235,13 @@ class FrontEnd:
             then,
             stamp=item.stamp,
             body=body,
-            surface=self.tracker.distance,
+            surface=self._limb_distances,
             source=item.sensor,
         )
         self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
+
+    def _limb_distances(self, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
+        return dict(zip(self.tracker.estimate.world_from_limb, self.tracker.limb_distances(places), strict=True))
 
     def _add_keypoints(
         self,

@@ -33,15 +33,17 @@ from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
-from voodoo.sensors.rays import SiteRay, beyond_bias
+from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
 from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
 
-Surface: TypeAlias = Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
-"""Distances of places (N, 3) from the surface of the body (N,) [m]."""
+Surface: TypeAlias = Callable[[FloatArray], Mapping[str, npt.NDArray[np.floating[Any]]]]
+"""Limb name -> distances (N,) of places (N, 3) from its surface [m]."""
+ON_LIMB_M, OFF_LIMB_M = 0.03, 0.06
+"""What is no farther than this from a limb, and this much farther from another, is of the first."""
 FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
 """The middle of a head lies this far behind its face, that of a hand behind its skin."""
 
@@ -51,7 +53,7 @@ class SkinSettings:
     """How skin regions become rays.
 
     Args:
-        sites: site -> how far [m] a region's middle may always be from it, see `beyond_bias`. A face is the front of the
+        sites: site -> how far [m] a region's middle may always be from it, see `SiteRay.bias`. A face is the front of the
             head.
         gate: a new region farther than this from the predicted site is not it [m]; one that has its name keeps it.
         lost_gate: see gate_growth [m].
@@ -144,7 +146,8 @@ class SkinTracker:
             stamp: of the picture [s]; None: 1/30 s after the last.
             body: what a depth camera saw near the body; None: not known. A candidate must then lie at about the depth
                 of its site, so that a hand hidden behind the body does not jump to what is in front.
-            surface: distances of places (N, 3) from the body's surface (N,) [m], as `Tracker.distance` gives them.
+            surface: distances of places (N, 3) from each limb's surface, limb name -> (N,) [m]; see
+                `Tracker.limb_distances`.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -180,10 +183,10 @@ class SkinTracker:
         axis = pose[:3, 2]
         sights = []
         for item, direction in zip(self.candidates, directions, strict=True):
-            along = None if body is None else body.depth_at(item.pixel, 1.5 * PALM_M * focal / nearest)
-            z = nearest if along is None else along
+            looked = None if body is None else body.look_at(item.pixel, 1.5 * PALM_M * focal / nearest)
+            z, still = (nearest, False) if looked is None else looked
             place = origin + direction * (z / float(direction @ axis))
-            sights.append(Sight(direction, place, along is not None, item.hand, item.region))
+            sights.append(Sight(direction, place, looked is not None, item.hand, item.region, still))
         seen = self.blobs.follow(sights, stamp)
         sites = list(places)
         distance = np.array(
@@ -197,10 +200,12 @@ class SkinTracker:
                 for site in sites
             ]
         )
+        limbs = {} if surface is None else surface(np.array([sight.place for sight in sights]))
         found = self.blobs.name(
             seen,
             distance,
-            self._allowed(sites, sights, seen, predicted, surface),
+            self._allowed(sites, sights, seen, predicted, limbs),
+            _elsewhere(sites, sights, limbs),
             sites=sites,
             gates=dict.fromkeys(sites, self.settings.gate),
             growth=self.settings.gate_growth,
@@ -219,8 +224,8 @@ class SkinTracker:
             across = self.settings.noise.sigma(places[site][1], focal)
             sight = sights[column]
             place = self._inside(site, sight) if sight.deep else None
-            trust = beyond_bias(self.settings.sites[site], float(distance[sites.index(site), column]))
-            rays.append(SiteRay(site, origin, sight.direction, across, source, trust, place))
+            bias = self.settings.sites[site]
+            rays.append(SiteRay(site, origin, sight.direction, across, source, bias=bias, place=place))
         return rays
 
     def _inside(self, site: str, sight: Sight) -> FloatArray:
@@ -233,7 +238,7 @@ class SkinTracker:
         sights: list[Sight],
         seen: list[Blob],
         predicted: Mapping[str, FloatArray],
-        surface: Surface | None,
+        limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
     ) -> FloatArray:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
@@ -241,16 +246,13 @@ class SkinTracker:
         the body does not explain where it is thought to be.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
-        away: npt.NDArray[np.floating[Any]] = np.zeros(len(sights))
-        if surface is not None:
-            away = surface(np.array([sight.place for sight in sights]))
+        away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
+        outside = away > self.settings.unexplained
         far = np.array(
-            [
-                sight.deep and sight.region not in owned and outside > self.settings.unexplained
-                for sight, outside in zip(sights, away, strict=True)
-            ]
+            [sight.deep and sight.region not in owned and out for sight, out in zip(sights, outside, strict=True)]
         )
-        allowed = np.tile(1.0 + far, (len(sites), 1))
+        scene = np.array([sight.still and out for sight, out in zip(sights, outside, strict=True)])
+        allowed = np.tile(np.where(scene, 0.0, 1.0 + far), (len(sites), 1))
         for row, site in enumerate(sites):
             side = site[0]
             shoulder = predicted.get(f"{side}_shoulder")
@@ -342,6 +344,22 @@ def _reach(side: str, predicted: Mapping[str, FloatArray]) -> float:
         return math.inf
     shoulder, elbow, hand = (np.asarray(joint) for joint in joints)
     return 1.2 * float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(hand - elbow)) + 0.15
+
+
+def _elsewhere(
+    sites: list[str], sights: list[Sight], limbs: Mapping[str, npt.NDArray[np.floating[Any]]]
+) -> npt.NDArray[np.bool_]:
+    """(S, B): whether a sight is the surface of a limb other than a hand's own forearm."""
+    result = np.zeros((len(sites), len(sights)), dtype=np.bool_)
+    deep = np.array([sight.deep for sight in sights])
+    for row, site in enumerate(sites):
+        own = [name for name in limbs if name.startswith(site[0]) and name.endswith(("forearm", "hand"))]
+        if not own or site.startswith("head"):
+            continue
+        others = np.min([distances for name, distances in limbs.items() if name not in own], axis=0)
+        own_away = np.min([limbs[name] for name in own], axis=0)
+        result[row] = deep & (others < ON_LIMB_M) & (own_away > others + OFF_LIMB_M)
+    return result
 
 
 def _hand_ends(sights: list[Sight], hand: FloatArray, elbow: FloatArray) -> list[bool]:
