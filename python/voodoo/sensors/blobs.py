@@ -168,23 +168,29 @@ class Blobs:
             gate = gates[site]
             waited = stamp - self._missed.setdefault(site, stamp)
             reach = max(gate, min(gate + growth * waited, widest[site]))
+            able = [
+                allowed[row, column]
+                and not elsewhere[row, column]
+                and (near < gate or (near < reach and allowed[row, column] > 1 and blob.count >= OLD_ENOUGH))
+                for column, (blob, near) in enumerate(zip(seen, distance[row], strict=True))
+            ]
             for column, blob in enumerate(seen):
                 near = float(distance[row, column])
                 sample = min(near / gate, 2.0) ** 2
                 share = 1.0 if blob.count == 1 else 1.0 - math.exp(-1.0 / (30.0 * AGREEMENT_S))
                 far = blob.far[site] = (1.0 - share) * blob.far.get(site, sample) + share * sample
-                if not allowed[row, column] or (blob.label != site and elsewhere[row, column]):
-                    continue
-                if blob.label == site:
+                if blob.label == site and allowed[row, column]:
                     cost[row, column] = min(HELD * far, DRIFTED)
+                elif not able[column]:
+                    continue
                 elif site in owner or blob.label in owner:
                     if blob.count >= OLD_ENOUGH and near < gate:
                         cost[row, column] = TAKEN + far
-                elif near < gate or (near < reach and allowed[row, column] > 1 and blob.count >= OLD_ENOUGH):
+                else:
                     rivals = [
                         float(distance[row, other])
                         for other in range(len(seen))
-                        if allowed[row, other]
+                        if able[other]
                         and seen[other].label is None
                         and float(np.linalg.norm(seen[other].sight.place - blob.sight.place)) > SAME_M
                     ]

@@ -3,7 +3,7 @@ from standard deviations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -236,9 +236,15 @@ class FrontEnd:
             stamp=item.stamp,
             body=body,
             surface=self._limb_distances,
+            lost=self._lost(skin.settings.sites) if depth is not None else (),
             source=item.sensor,
         )
         self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
+
+    def _lost(self, sites: Iterable[str]) -> set[str]:
+        """Hands whose forearm was not measured in the last frame."""
+        status = self.tracker.estimate.limb_status
+        return {site for site in sites if status.get(f"{site[:2]}forearm", "measured") != "measured"}
 
     def _limb_distances(self, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
         return dict(zip(self.tracker.estimate.world_from_limb, self.tracker.limb_distances(places), strict=True))

@@ -18,7 +18,7 @@ With a depth image a region is a place in space, not only a ray.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -42,6 +42,8 @@ ByteImage = npt.NDArray[np.uint8]
 
 Surface: TypeAlias = Callable[[FloatArray], Mapping[str, npt.NDArray[np.floating[Any]]]]
 """Limb name -> distances (N,) of places (N, 3) from its surface [m]."""
+BARE = ("head", "neck", "upperarm", "forearm", "hand")
+"""Endings of the names of limbs that show skin."""
 ON_LIMB_M, OFF_LIMB_M = 0.03, 0.06
 """What is no farther than this from a limb, and this much farther from another, is of the first."""
 FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
@@ -134,6 +136,7 @@ class SkinTracker:
         stamp: float | None = None,
         body: BodyView | None = None,
         surface: Surface | None = None,
+        lost: Collection[str] = (),
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -148,6 +151,7 @@ class SkinTracker:
                 of its site, so that a hand hidden behind the body does not jump to what is in front.
             surface: distances of places (N, 3) from each limb's surface, limb name -> (N,) [m]; see
                 `Tracker.limb_distances`.
+            lost: sites whose limb the other sensors do not show where the body has it.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -204,8 +208,8 @@ class SkinTracker:
         found = self.blobs.name(
             seen,
             distance,
-            self._allowed(sites, sights, seen, predicted, limbs),
-            _elsewhere(sites, sights, limbs),
+            self._allowed(sites, sights, seen, predicted, limbs, lost),
+            _elsewhere(sites, sights, limbs, lost),
             sites=sites,
             gates=dict.fromkeys(sites, self.settings.gate),
             growth=self.settings.gate_growth,
@@ -239,20 +243,23 @@ class SkinTracker:
         seen: list[Blob],
         predicted: Mapping[str, FloatArray],
         limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
+        lost: Collection[str],
     ) -> FloatArray:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
-        A site that was lost is taken up far from where it is expected only in a region that no other site has, and which
-        the body does not explain where it is thought to be.
+        A site that was not seen is taken up far from where it is expected only in a region that no other site has, and
+        which the body does not explain where it is thought to be. A hand whose forearm is lost may also hang before trunk or
+        legs: those have no skin to show.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
         away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
         outside = away > self.settings.unexplained
-        far = np.array(
-            [sight.deep and sight.region not in owned and out for sight, out in zip(sights, outside, strict=True)]
-        )
-        scene = np.array([sight.still and out for sight, out in zip(sights, outside, strict=True)])
-        allowed = np.tile(np.where(scene, 0.0, 1.0 + far), (len(sites), 1))
+        free = np.array([sight.deep and sight.region not in owned for sight in sights])
+        scene = np.array([sight.still for sight in sights]) & outside
+        bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]
+        dressed = (np.min(bare, axis=0) if bare else away) > ON_LIMB_M
+        far = np.array([free & (outside | (dressed if site in lost else False)) for site in sites])
+        allowed = np.where(scene, 0.0, 1.0 + far)
         for row, site in enumerate(sites):
             side = site[0]
             shoulder = predicted.get(f"{side}_shoulder")
@@ -265,7 +272,7 @@ class SkinTracker:
                 allowed[row] *= [not sight.deep or d < reach for sight, d in zip(sights, distance, strict=True)]
             elbow = predicted.get(f"{side}_elbow")
             if elbow is not None:
-                allowed[row] *= _hand_ends(sights, predicted[site], elbow)
+                allowed[row] *= _hand_ends(sights, None if site in lost else predicted[site], elbow)
         return allowed
 
     def learn(
@@ -347,24 +354,31 @@ def _reach(side: str, predicted: Mapping[str, FloatArray]) -> float:
 
 
 def _elsewhere(
-    sites: list[str], sights: list[Sight], limbs: Mapping[str, npt.NDArray[np.floating[Any]]]
+    sites: list[str],
+    sights: list[Sight],
+    limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
+    lost: Collection[str],
 ) -> npt.NDArray[np.bool_]:
-    """(S, B): whether a sight is the surface of a limb other than a hand's own forearm."""
+    """(S, B): whether a sight is the surface of a limb other than a hand's own forearm, of a bare one if that is lost."""
     result = np.zeros((len(sites), len(sights)), dtype=np.bool_)
     deep = np.array([sight.deep for sight in sights])
     for row, site in enumerate(sites):
         own = [name for name in limbs if name.startswith(site[0]) and name.endswith(("forearm", "hand"))]
         if not own or site.startswith("head"):
             continue
-        others = np.min([distances for name, distances in limbs.items() if name not in own], axis=0)
+        names = [name for name in limbs if name not in own and (site not in lost or name.endswith(BARE))]
+        others = np.min([limbs[name] for name in names], axis=0, initial=np.inf)
         own_away = np.min([limbs[name] for name in own], axis=0)
         result[row] = deep & (others < ON_LIMB_M) & (own_away > others + OFF_LIMB_M)
     return result
 
 
-def _hand_ends(sights: list[Sight], hand: FloatArray, elbow: FloatArray) -> list[bool]:
+def _hand_ends(sights: list[Sight], hand: FloatArray | None, elbow: FloatArray) -> list[bool]:
     """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region."""
-    towards = [float(np.linalg.norm(item.place - hand) - np.linalg.norm(item.place - elbow)) for item in sights]
+    towards = [
+        (0.0 if hand is None else float(np.linalg.norm(item.place - hand))) - float(np.linalg.norm(item.place - elbow))
+        for item in sights
+    ]
     least: dict[int, float] = {}
     for item, value in zip(sights, towards, strict=True):
         if item.hand:
