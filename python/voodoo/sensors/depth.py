@@ -113,11 +113,15 @@ class BodyView:
     depths: FloatArray
     still: npt.NDArray[np.bool_] | None = None
 
-    def look_at(self, pixel: tuple[float, float], radius: float) -> tuple[float, bool] | None:
+    def look_at(
+        self, pixel: tuple[float, float], radius: float, *, among: npt.NDArray[np.bool_] | None = None
+    ) -> tuple[float, bool] | None:
         """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
-        less than three points there."""
+        less than three points there. Where three of the points `among` (N,) are there, only those count."""
         offset = self.pixels - pixel
         near = np.flatnonzero((offset * offset).sum(axis=1) < radius**2)
+        if among is not None and int((inside := among[near]).sum()) >= 3:
+            near = near[inside]
         if len(near) < 3:
             return None
         depths = self.depths[near]
@@ -125,6 +129,14 @@ class BodyView:
         surface = np.abs(depths - front) < 0.1
         still = self.still is not None and 2 * int(self.still[near][surface].sum()) > int(surface.sum())
         return float(np.median(depths[surface])), still
+
+    def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+        """Values (N,) of the picture (H, W) at the points, -1 outside."""
+        u, v = np.rint(self.pixels.T).astype(np.intp)
+        inside = (u >= 0) & (v >= 0) & (u < image.shape[1]) & (v < image.shape[0])
+        values = np.full(len(u), -1, dtype=np.int32)
+        values[inside] = image[v[inside], u[inside]]
+        return values
 
 
 class StillDepth:

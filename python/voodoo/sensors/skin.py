@@ -180,14 +180,18 @@ class SkinTracker:
             return []
         focal = math.sqrt(camera.fx * camera.fy)
         nearest = min(z for _, z in places.values())
-        self.candidates = candidates(skin, palm_px=PALM_M * focal / nearest)
+        self.candidates, labels = candidates(skin, palm_px=PALM_M * focal / nearest)
         if not self.candidates:
             return []
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
         axis = pose[:3, 2]
+        regions = None if body is None else body.sample(labels)
         sights = []
         for item, direction in zip(self.candidates, directions, strict=True):
-            looked = None if body is None else body.look_at(item.pixel, 1.5 * PALM_M * focal / nearest)
+            looked = None
+            if body is not None and regions is not None:
+                radius = 1.5 * PALM_M * focal / nearest
+                looked = body.look_at(item.pixel, radius, among=regions == item.region)
             z, still = (nearest, False) if looked is None else looked
             place = origin + direction * (z / float(direction @ axis))
             sights.append(Sight(direction, place, looked is not None, item.hand, item.region, still))

@@ -13,6 +13,7 @@ from scipy.ndimage import maximum_filter1d
 from voodoo.sensors.pixels import FloatArray
 
 Mask = npt.NDArray[np.bool_]
+Labels = npt.NDArray[np.int32]
 
 PALM_M, FACE_M = 0.045, 0.085
 """Radii of a palm and of a face."""
@@ -37,7 +38,7 @@ class Candidate:
     hand: bool = True
 
 
-def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
+def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
     """Where in a skin mask (H, W) a head or a hand may be.
 
     Regions with less than a fifth of a palm's area are noise. Each other one offers its middle, unless it is larger
@@ -47,6 +48,9 @@ def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
     Args:
         skin: True where the colour is skin's.
         palm_px: radius of a palm in the image [px].
+
+    Returns:
+        The candidates, and the number of its region in each pixel (H, W).
     """
     smallest = max(0.2 * math.pi * palm_px**2, 6.0)
     largest = 4.0 * math.pi * (FACE_M / PALM_M * palm_px) ** 2
@@ -63,7 +67,7 @@ def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
             mask = labels[top : top + height, left : left + width] == region
             for u, v in _tips(mask, palm_px):
                 found.append(Candidate((u + left, v + top), region, area))
-    return found
+    return found, np.asarray(labels, dtype=np.int32)
 
 
 def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
