@@ -31,6 +31,10 @@ pub struct SitePair {
     pub weight: f64,
     /// Scalar weight as it was given.
     pub given: f64,
+    /// The measurement may always be this far off, metres.
+    pub bias: f64,
+    /// What of a difference counts: the identity for a position, `I - d d^T` for a ray along `d`.
+    pub across: Mat3,
     /// Weight times the identity for a position, times `I - d d^T` for a ray along `d` (method: every datum has an information).
     pub information: Mat3,
     /// Number of the source.

@@ -33,6 +33,8 @@ impl Correspondences {
                 p,
                 weight,
                 given: relation.weight,
+                bias: relation.bias,
+                across: Mat3::IDENTITY,
                 information: Mat3::IDENTITY * weight,
                 source: relation.source,
             });
@@ -52,6 +54,8 @@ impl Correspondences {
                 p,
                 weight,
                 given: relation.weight,
+                bias: relation.bias,
+                across,
                 information: across * weight,
                 source: relation.source,
             });

@@ -485,6 +485,7 @@ impl Tracker {
 
 mod distances;
 mod hypotheses;
+mod named;
 mod report;
 mod status;
 

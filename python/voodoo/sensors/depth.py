@@ -3,6 +3,7 @@ range."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -21,8 +22,8 @@ _STANDS = 1e-3
 """A pose whose entries change by less is that of a camera that stands."""
 _BEHIND_M = 0.10
 """What lies this far behind is another surface."""
-_ENOUGH = 3
-"""Pictures after which something is known about a scene."""
+_STAYS, _STAYED_M = 6, 0.03
+"""Over so many pictures the scene's depth changes by less than this [m]."""
 
 
 @dataclass(frozen=True)
@@ -140,34 +141,36 @@ class BodyView:
 
 
 class StillDepth:
-    """The farthest that a depth camera has seen in each pixel since it stands where it is.
+    """What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind
+    which nothing was ever seen. A table's edge does not become a hand.
 
-    What was never seen to have something behind it may be part of the scene: a table's edge does not become a hand. The
-    surface of a person who has not moved yet looks the same, so this only tells what has moved.
+    The surface of a person who has not moved yet looks the same, so this only tells what has moved.
     """
 
     def __init__(self) -> None:
         """Nothing seen yet."""
         self._farthest: npt.NDArray[np.float32] | None = None
         self._pose: FloatArray | None = None
-        self.pictures = 0
+        self._last: deque[npt.NDArray[np.float32]] = deque(maxlen=_STAYS)
 
-    def see(self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray) -> None:
-        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew."""
+    def see(self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray) -> npt.NDArray[np.bool_] | None:
+        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew.
+
+        Returns:
+            (H, W): True where the image shows what may be the scene; None as long as too little was seen.
+        """
         moved = self._pose is None or not np.allclose(self._pose, world_from_sensor, atol=_STANDS)
         if self._farthest is None or moved or self._farthest.shape != z.shape:
-            self._farthest, self._pose, self.pictures = z.copy(), world_from_sensor, 1
-            return
+            self._farthest, self._pose = z.copy(), world_from_sensor
+            self._last.clear()
         np.maximum(self._farthest, z, out=self._farthest)
-        self.pictures += 1
-
-    def still(self, z: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_] | None:
-        """(H, W): True where nothing was seen behind an image's surface; None until there are enough pictures."""
-        if self._farthest is None or self.pictures < _ENOUGH:
-            return None
-        # At the edges of things every camera sees now the one, now the other.
-        behind = cv2.erode(self._farthest, np.ones((3, 3), np.uint8))
-        return np.asarray(behind - z < _BEHIND_M)
+        still = None
+        if len(self._last) == _STAYS:
+            # At the edges of things every camera sees now the one, now the other.
+            behind = cv2.erode(self._farthest, np.ones((3, 3), np.uint8))
+            still = np.asarray((behind - z < _BEHIND_M) & (np.abs(z - self._last[0]) < _STAYED_M))
+        self._last.append(z)
+        return still
 
 
 def body_view(
@@ -204,9 +207,8 @@ def body_view(
     standing = None
     if scene is not None:
         whole = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
-        scene.see(whole, world_from_depth)
         rows, columns = (slice(-(-span.start // step) * step, span.stop) for span in (rows, columns))
-        standing = scene.still(whole)
+        standing = scene.see(whole, world_from_depth)
         if standing is not None:
             standing = standing[
                 rows.start // step : -(-rows.stop // step), columns.start // step : -(-columns.stop // step)

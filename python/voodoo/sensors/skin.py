@@ -212,7 +212,7 @@ class SkinTracker:
         found = self.blobs.name(
             seen,
             distance,
-            self._allowed(sites, sights, seen, predicted, limbs, lost),
+            self._allowed(sites, sights, seen, predicted, limbs, lost, palm=math.pi * (PALM_M * focal / nearest) ** 2),
             _elsewhere(sites, sights, limbs, lost),
             sites=sites,
             gates=dict.fromkeys(sites, self.settings.gate),
@@ -248,17 +248,20 @@ class SkinTracker:
         predicted: Mapping[str, FloatArray],
         limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
         lost: Collection[str],
+        *,
+        palm: float,
     ) -> FloatArray:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
-        A site that was not seen is taken up far from where it is expected only in a region that no other site has, and
-        which the body does not explain where it is thought to be. A hand whose forearm is lost may also hang before trunk or
-        legs: those have no skin to show.
+        A site that was not seen is taken up far from where it is expected only in a region that no other site has, which
+        is at least as large as a palm, and which the body does not explain where it is thought to be. A hand whose
+        forearm is lost may also hang before trunk or legs: those have no skin to show.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
         away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
         outside = away > self.settings.unexplained
-        free = np.array([sight.deep and sight.region not in owned for sight in sights])
+        whole = [item.area > palm for item in self.candidates]
+        free = np.array([a and b.deep and b.region not in owned for a, b in zip(whole, sights, strict=True)])
         scene = np.array([sight.still for sight in sights]) & outside
         bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]
         dressed = (np.min(bare, axis=0) if bare else away) > ON_LIMB_M

@@ -1,8 +1,9 @@
 //! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Pair, Problem, Solver, TreeSolver};
+use super::{ChainSolver, Gate, Guide, Pair, Problem, Solver, TreeSolver};
 use crate::config::Config;
+use crate::correspondence::SitePair;
 use crate::geometry::Pose;
 use crate::normal::Normal;
 use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
@@ -21,6 +22,9 @@ const SHOWN: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
+/// Sites farther than this from their measurement lead the chain before the points are assigned, metres; rounds of it.
+const LED_FROM: f64 = 0.25;
+const LEAD: usize = 3;
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
 
@@ -37,6 +41,7 @@ pub struct WholeBody {
     /// Moves the limbs instead of the chain, if there.
     tree: Option<TreeSolver>,
     lengths: Lengths,
+    guide: Guide,
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
@@ -55,6 +60,16 @@ impl Solver for WholeBody {
         self.sum_terms(problem, poses);
         let Self { normal, chain, lengths, .. } = self;
         chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
+    }
+
+    fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+        // From so far, points that are thought to lie on the limb where it was would hold it there.
+        let far = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() > LED_FROM;
+        if self.tree.is_some() || !problem.correspondences.sites.iter().any(far) {
+            return false;
+        }
+        self.guide.step(problem, poses);
+        problem.step + 1 < LEAD
     }
 
     fn gate(&self, config: &Config, step: usize) -> Gate {
