@@ -2,6 +2,8 @@
 
 use super::lengths::Lengths;
 use super::{ChainSolver, Gate, Guide, Pair, Problem, Solver, TreeSolver};
+use crate::body::Body;
+use crate::chain::{joint_turn, place};
 use crate::config::Config;
 use crate::correspondence::SitePair;
 use crate::geometry::Pose;
@@ -22,9 +24,11 @@ const SHOWN: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
+/// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
+const SITE_SCALE: f64 = 0.15;
 /// Sites farther than this from their measurement lead the chain before the points are assigned, metres; rounds of it.
 const LED_FROM: f64 = 0.25;
-const LEAD: usize = 3;
+const LEAD: usize = 4;
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
 
@@ -41,7 +45,11 @@ pub struct WholeBody {
     /// Moves the limbs instead of the chain, if there.
     tree: Option<TreeSolver>,
     lengths: Lengths,
+    /// Moves limbs whose sites are far away, and which those are.
     guide: Guide,
+    led: Vec<bool>,
+    before: Vec<Pose>,
+    moved: Vec<Pose>,
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
@@ -63,12 +71,37 @@ impl Solver for WholeBody {
     }
 
     fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        // From so far, points that are thought to lie on the limb where it was would hold it there.
-        let far = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() > LED_FROM;
-        if self.tree.is_some() || !problem.correspondences.sites.iter().any(far) {
+        if self.tree.is_some() {
             return false;
         }
+        if problem.step == 0 {
+            // From so far, points that are thought to lie on the limb where it was would hold it there.
+            let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > LED_FROM;
+            self.led.clear();
+            self.led.resize(poses.len(), false);
+            for pair in problem.correspondences.sites.iter().filter(far) {
+                lead_from(problem.body, pair.limb, &mut self.led);
+            }
+        }
+        if !self.led.contains(&true) {
+            return false;
+        }
+        self.before.clear();
+        self.before.extend_from_slice(poses);
         self.guide.step(problem, poses);
+        self.moved.clear();
+        self.moved.extend_from_slice(poses);
+        // What is seen of a hand leads its arm, not the trunk.
+        for (limb, part) in problem.body.limbs().iter().enumerate() {
+            let pose = match &part.parent {
+                Some((parent, joint)) if self.led[limb] => {
+                    let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
+                    place(joint, &poses[*parent], turn)
+                }
+                _ => self.before[limb],
+            };
+            poses[limb] = pose;
+        }
         problem.step + 1 < LEAD
     }
 
@@ -83,6 +116,17 @@ impl Solver for WholeBody {
 
     fn faces_cameras(&self) -> bool {
         true
+    }
+}
+
+/// Marks the limbs from `limb` to the first whose parent carries several.
+fn lead_from(body: &Body, limb: usize, led: &mut [bool]) {
+    let mut next = Some(limb);
+    while let Some(limb) = next {
+        let Some((parent, _)) = &body.limbs()[limb].parent else { break };
+        led[limb] = true;
+        let carried = body.limbs().iter().filter(|other| other.parent.as_ref().is_some_and(|(limb, _)| limb == parent));
+        next = (carried.count() == 1).then_some(*parent);
     }
 }
 
@@ -121,7 +165,7 @@ impl WholeBody {
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
         let terms: [&dyn Term; 5] = [
             &Surface { correspondences, information, slide: SLIDE, scale },
-            &Sites { correspondences, information, scale: 3.0 * scale },
+            &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE) },
             &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
             &Prior { predicted, root, joints: &self.joint_sigmas },
             &Limits { sigma: LIMIT_SIGMA },
