@@ -20,10 +20,10 @@ DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 
 _STANDS = 1e-3
 """A pose whose entries change by less is that of a camera that stands."""
-_BEHIND_M = 0.10
-"""What lies this far behind is another surface."""
-_STAYS, _STAYED_M = 6, 0.03
-"""Over so many pictures the scene's depth changes by less than this [m]."""
+_BEHIND = (0.05, 0.02)
+"""What lies so far behind is another surface: metres, and share of the depth."""
+_STAYS, _STAYED = 6, (0.02, 0.015)
+"""Over so many pictures the depth of a still surface changes by less than this: metres, and share of the depth."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,8 @@ class StillDepth:
         if len(self._last) == _STAYS:
             # At the edges of things every camera sees now the one, now the other.
             behind = cv2.erode(self._farthest, np.ones((3, 3), np.uint8))
-            still = np.asarray((behind - z < _BEHIND_M) & (np.abs(z - self._last[0]) < _STAYED_M))
+            near, stayed = (low + share * z for low, share in (_BEHIND, _STAYED))
+            still = np.asarray((behind - z < near) & (np.abs(z - self._last[0]) < stayed))
         self._last.append(z)
         return still
 

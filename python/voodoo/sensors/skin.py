@@ -42,6 +42,8 @@ ByteImage = npt.NDArray[np.uint8]
 
 Surface: TypeAlias = Callable[[FloatArray], Mapping[str, npt.NDArray[np.floating[Any]]]]
 """Limb name -> distances (N,) of places (N, 3) from its surface [m]."""
+BARE_M = 0.08
+"""What is nearer to the bare limbs than this may be theirs."""
 BARE = ("head", "neck", "upperarm", "forearm", "hand")
 """Endings of the names of limbs that show skin."""
 ON_LIMB_M, OFF_LIMB_M = 0.03, 0.06
@@ -264,7 +266,7 @@ class SkinTracker:
         free = np.array([a and b.deep and b.region not in owned for a, b in zip(whole, sights, strict=True)])
         scene = np.array([sight.still for sight in sights]) & outside
         bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]
-        dressed = (np.min(bare, axis=0) if bare else away) > ON_LIMB_M
+        dressed = (np.min(bare, axis=0) if bare else away) > BARE_M
         far = np.array([free & (outside | (dressed if site in lost else False)) for site in sites])
         allowed = np.where(scene, 0.0, 1.0 + far)
         for row, site in enumerate(sites):
