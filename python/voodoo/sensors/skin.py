@@ -42,6 +42,8 @@ ByteImage = npt.NDArray[np.uint8]
 
 Surface: TypeAlias = Callable[[FloatArray], Mapping[str, npt.NDArray[np.floating[Any]]]]
 """Limb name -> distances (N,) of places (N, 3) from its surface [m]."""
+SPECK = 0.7
+"""A smaller share of a palm is a speck."""
 BARE_M = 0.08
 """What is nearer to the bare limbs than this may be theirs."""
 BARE = ("head", "neck", "upperarm", "forearm", "hand")
@@ -211,10 +213,15 @@ class SkinTracker:
             ]
         )
         limbs = {} if surface is None else surface(np.array([sight.place for sight in sights]))
+        palm = math.pi * (PALM_M * focal / nearest) ** 2
+        allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, palm=palm)
+        # A speck far from where the hand is expected is what is left of another region.
+        speck = np.array([item.area < SPECK * palm for item in self.candidates])
+        allowed[(distance > self.settings.gate) & speck] = 0.0
         found = self.blobs.name(
             seen,
             distance,
-            self._allowed(sites, sights, seen, predicted, limbs, lost, palm=math.pi * (PALM_M * focal / nearest) ** 2),
+            allowed,
             _elsewhere(sites, sights, limbs, lost),
             sites=sites,
             gates=dict.fromkeys(sites, self.settings.gate),
