@@ -88,14 +88,11 @@ class Blob:
         self.sight, self.stamp = sight, stamp
         self.count += 1
 
-    def merge(self, seen: Blob, stamp: float) -> bool:
-        """Whether it is the same as a blob that was seen just now, which then takes over its name and history."""
-        if _apart(self, seen.sight, stamp) * _limit(self, stamp) > SAME_M:
-            return False
+    def merge(self, seen: Blob) -> None:
+        """It is the same as a blob that was seen just now, which takes over its name and history."""
         if self.label is not None and seen.label is None:
             seen.label, seen.far, seen.doubt = self.label, self.far, self.doubt
             seen.count = max(seen.count, self.count)
-        return True
 
 
 class Blobs:
@@ -109,8 +106,7 @@ class Blobs:
 
     def follow(self, sights: Sequence[Sight], stamp: float) -> list[Blob]:
         """The blob of each sight of a picture, new ones included; those that were not seen for long are dropped."""
-        cost = np.array([[_apart(blob, sight, stamp) for sight in sights] for blob in self.items])
-        cost = cost.reshape(len(self.items), len(sights))
+        cost = _apart(self.items, sights, stamp)
         seen: list[Blob | None] = [None] * len(sights)
         for row, column in assign(cost, gate=1.0):
             self.items[row].move(sights[column], stamp)
@@ -119,8 +115,15 @@ class Blobs:
         unseen = [blob for blob in self.items if blob.stamp < stamp and stamp - blob.stamp < FORGET_S]
         for blob in unseen:
             blob.velocity = 0.5 * blob.velocity
-        self.items = found + [blob for blob in unseen if not any(blob.merge(other, stamp) for other in found)]
-        return found
+        apart = _apart(unseen, [blob.sight for blob in found], stamp)
+        for blob, row in zip(unseen, apart, strict=True):
+            same = np.flatnonzero(row * _limit(blob, stamp) <= SAME_M)
+            if len(same):
+                blob.merge(found[int(same[0])])
+            else:
+                found.append(blob)
+        self.items = found
+        return found[: len(sights)]
 
     def name(
         self,
@@ -223,12 +226,18 @@ class Blobs:
                 blob.doubt[site] = min(max(blob.doubt.get(site, 0.0) + change, 0.0), 2.0 * DOUBT_S)
 
 
-def _apart(blob: Blob, sight: Sight, stamp: float) -> float:
-    """Distance of a sight from where a blob should be, in units of what is possible."""
-    offset = sight.place - blob.at(stamp)
-    if not (sight.deep and blob.sight.deep):
-        offset = offset - sight.direction * float(offset @ sight.direction)
-    return float(np.linalg.norm(offset)) / _limit(blob, stamp)
+def _apart(blobs: Sequence[Blob], sights: Sequence[Sight], stamp: float) -> FloatArray:
+    """(blobs, sights): distance of a sight from where a blob should be, in units of what is possible."""
+    if not blobs or not sights:
+        return np.zeros((len(blobs), len(sights)))
+    offset = np.array([sight.place for sight in sights]) - np.array([blob.at(stamp) for blob in blobs])[:, None]
+    directions = np.array([sight.direction for sight in sights])
+    deep = np.outer([blob.sight.deep for blob in blobs], [sight.deep for sight in sights])
+    along = np.where(deep, 0.0, (offset * directions).sum(axis=2))
+    offset -= along[..., None] * directions
+    return np.asarray(
+        np.sqrt((offset * offset).sum(axis=2)) / np.array([_limit(blob, stamp) for blob in blobs])[:, None]
+    )
 
 
 def _limit(blob: Blob, stamp: float) -> float:

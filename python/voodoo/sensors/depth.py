@@ -119,17 +119,26 @@ class BodyView:
     ) -> tuple[float, bool] | None:
         """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
         less than three points there. Where three of the points `among` (N,) are there, only those count."""
-        offset = self.pixels - pixel
-        near = np.flatnonzero((offset * offset).sum(axis=1) < radius**2)
-        if among is not None and int((inside := among[near]).sum()) >= 3:
-            near = near[inside]
+        near = self._near(pixel, radius, None if among is None else np.flatnonzero(among))
+        if len(near) < 3 and among is not None:
+            near = self._near(pixel, radius, None)
         if len(near) < 3:
             return None
         depths = self.depths[near]
-        front = np.partition(depths, (len(near) - 1) // 5)[(len(near) - 1) // 5]
-        surface = np.abs(depths - front) < 0.1
-        still = self.still is not None and 2 * int(self.still[near][surface].sum()) > int(surface.sum())
-        return float(np.median(depths[surface])), still
+        fifth = (len(near) - 1) // 5
+        surface = np.abs(depths - np.partition(depths, fifth)[fifth]) < 0.1
+        depths = depths[surface]
+        still = self.still is not None and 2 * int(np.count_nonzero(self.still[near][surface])) > len(depths)
+        half = len(depths) // 2
+        return float(np.partition(depths, half)[half]), still
+
+    def _near(
+        self, pixel: tuple[float, float], radius: float, among: npt.NDArray[np.intp] | None
+    ) -> npt.NDArray[np.intp]:
+        pixels = self.pixels if among is None else self.pixels[among]
+        u, v = pixels[:, 0] - pixel[0], pixels[:, 1] - pixel[1]
+        inside = np.flatnonzero(u * u + v * v < radius**2)
+        return inside if among is None else among[inside]
 
     def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
         """Values (N,) of the picture (H, W) at the points, -1 outside."""
@@ -230,12 +239,12 @@ def body_view(
     in_color = np.column_stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in color_from_depth[:3]])
     mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
     pixels = color_camera.project(in_color)
-    seen = np.isfinite(pixels).all(axis=1)
-    pixels, in_color = pixels[seen], in_color[seen]
-    still = None if still is None else still[seen]
-    whole = np.round(pixels).astype(np.int64)
-    inside = (whole >= 0).all(axis=1) & (whole < (color_camera.width, color_camera.height)).all(axis=1)
-    mask[whole[inside, 1], whole[inside, 0]] = 1
+    u, v = np.rint(pixels).T
+    # NaN, where the colour camera cannot see, is inside of nothing.
+    inside = (u >= 0) & (v >= 0) & (u < color_camera.width) & (v < color_camera.height)
+    pixels, in_color = pixels[inside], in_color[inside]
+    still = None if still is None else still[inside]
+    mask[v[inside].astype(np.intp), u[inside].astype(np.intp)] = 1
     # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
     grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)

@@ -173,9 +173,7 @@ class SkinTracker:
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
         # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
-        skin = np.asarray(
-            cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool
-        )
+        skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
         self._skin = skin
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
@@ -327,22 +325,23 @@ class SkinTracker:
                 cv2.circle(place, centre, max(round(0.8 * radius), 1), 1, -1)
                 inside.append(place.astype(bool))
         self._pictures += 1
+        away = near == 0
         if self._seen is not None:
-            self._learn_static(self._seen, ~near.astype(bool), rate_hz)
+            self._learn_static(self._seen, away, rate_hz)
         # Light does not change from picture to picture; learning is the dearest part.
         if self.settled and self._pictures % self.settings.learn_every:
             return
         known = self._colours
         colours = known[1] if known is not None and known[0] is image else Colours.of(image)
-        if self.colour.learn(colours, inside, outside=~near.astype(bool), body=self._body):
+        if self.colour.learn(colours, inside, outside=away, body=self._body):
             self._learnt += 1
 
     def _learn_static(self, seen: Mask, away: Mask, rate_hz: float) -> None:
         """A running mean of "skin's colour, and no head or hand near": half of it is reached after static_seconds."""
         if self._static is None or self._static.shape != seen.shape:
             self._static = np.zeros(seen.shape, dtype=np.float32)
-        share = np.float32(1.0 - 0.5 ** (1.0 / (self.settings.static_seconds * rate_hz)))
-        self._static += away * share * (seen - self._static)
+        share = 1.0 - 0.5 ** (1.0 / (self.settings.static_seconds * rate_hz))
+        cv2.accumulateWeighted(seen.view(np.uint8), self._static, share, mask=away.view(np.uint8))
 
     def _places(
         self, camera: Camera, pose: FloatArray, positions: Mapping[str, npt.NDArray[np.float64]]
