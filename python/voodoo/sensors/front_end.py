@@ -302,11 +302,13 @@ class FrontEnd:
 
 
 def _content(item: Measurement, use: Sequence[str]) -> npt.NDArray[Any] | None:
-    """What a range sensor of a kind in use measured."""
+    """What a sensor of a kind in use measured."""
     if isinstance(item, DepthImage) and "depth" in use:
         return item.image
     if isinstance(item, PointCloud) and "points" in use:
         return item.points
+    if isinstance(item, ColorImage) and "skin" in use:
+        return item.image
     return item.ranges if isinstance(item, LaserScan) and "scan" in use else None
 
 

@@ -261,13 +261,13 @@ class SkinTracker:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
         A site that was not seen is taken up far from where it is expected only in a region that no other site has, which
-        is at least as large as a palm, and which the body does not explain where it is thought to be. A hand whose
+        is no speck, and which the body does not explain where it is thought to be. A hand whose
         forearm is lost may also hang before trunk or legs: those have no skin to show.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
         away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
         outside = away > self.settings.unexplained
-        whole = [item.area > palm for item in self.candidates]
+        whole = [item.area > SPECK * palm for item in self.candidates]
         free = np.array([a and b.deep and b.region not in owned for a, b in zip(whole, sights, strict=True)])
         scene = np.array([sight.still for sight in sights]) & outside
         bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]

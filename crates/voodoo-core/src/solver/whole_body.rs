@@ -2,10 +2,7 @@
 
 use super::lengths::Lengths;
 use super::{ChainSolver, Gate, Guide, Pair, Problem, Solver, TreeSolver};
-use crate::body::Body;
-use crate::chain::{joint_turn, place};
 use crate::config::Config;
-use crate::correspondence::SitePair;
 use crate::geometry::Pose;
 use crate::normal::Normal;
 use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
@@ -45,11 +42,7 @@ pub struct WholeBody {
     /// Moves the limbs instead of the chain, if there.
     tree: Option<TreeSolver>,
     lengths: Lengths,
-    /// Moves limbs whose sites are far away, and which those are.
     guide: Guide,
-    led: Vec<bool>,
-    before: Vec<Pose>,
-    moved: Vec<Pose>,
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
@@ -71,37 +64,11 @@ impl Solver for WholeBody {
     }
 
     fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        if self.tree.is_some() {
+        // From so far, points that are thought to lie on the limb where it was would hold it there.
+        if self.tree.is_some() || !self.guide.leads(problem, LED_FROM) {
             return false;
         }
-        if problem.step == 0 {
-            // From so far, points that are thought to lie on the limb where it was would hold it there.
-            let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > LED_FROM;
-            self.led.clear();
-            self.led.resize(poses.len(), false);
-            for pair in problem.correspondences.sites.iter().filter(far) {
-                lead_from(problem.body, pair.limb, &mut self.led);
-            }
-        }
-        if !self.led.contains(&true) {
-            return false;
-        }
-        self.before.clear();
-        self.before.extend_from_slice(poses);
         self.guide.step(problem, poses);
-        self.moved.clear();
-        self.moved.extend_from_slice(poses);
-        // What is seen of a hand leads its arm, not the trunk.
-        for (limb, part) in problem.body.limbs().iter().enumerate() {
-            let pose = match &part.parent {
-                Some((parent, joint)) if self.led[limb] => {
-                    let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
-                    place(joint, &poses[*parent], turn)
-                }
-                _ => self.before[limb],
-            };
-            poses[limb] = pose;
-        }
         problem.step + 1 < LEAD
     }
 
@@ -116,17 +83,6 @@ impl Solver for WholeBody {
 
     fn faces_cameras(&self) -> bool {
         true
-    }
-}
-
-/// Marks the limbs from `limb` to the first whose parent carries several.
-fn lead_from(body: &Body, limb: usize, led: &mut [bool]) {
-    let mut next = Some(limb);
-    while let Some(limb) = next {
-        let Some((parent, _)) = &body.limbs()[limb].parent else { break };
-        led[limb] = true;
-        let carried = body.limbs().iter().filter(|other| other.parent.as_ref().is_some_and(|(limb, _)| limb == parent));
-        next = (carried.count() == 1).then_some(*parent);
     }
 }
 
