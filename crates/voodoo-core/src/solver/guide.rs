@@ -37,7 +37,14 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Whether sites farther than `from` metres from where they were seen lead their limbs in this frame.
+    /// Makes all limbs follow the sites; false without any.
+    pub fn leads_all(&mut self, problem: &Problem) -> bool {
+        self.led.clear();
+        self.led.resize(problem.body.limbs().len(), true);
+        !problem.correspondences.sites.is_empty()
+    }
+
+    /// Whether sites farther than `from` metres from where they were seen lead their limbs alone in this frame.
     pub fn leads(&mut self, problem: &Problem, from: f64) -> bool {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
@@ -77,7 +84,7 @@ impl Guide {
         }
         self.before.clone_from(&self.closed);
         self.chain.step(body, &self.normal, DAMPING, &mut self.closed);
-        // What is seen of a hand leads its arm, not the trunk.
+        // The others stay where they were.
         self.moved.clone_from(&self.closed);
         for (limb, part) in body.limbs().iter().enumerate() {
             self.closed[limb] = match &part.parent {
@@ -85,6 +92,7 @@ impl Guide {
                     let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
                     place(joint, &self.closed[*parent], turn)
                 }
+                None if self.led[limb] => self.moved[limb],
                 _ => self.before[limb],
             };
         }
