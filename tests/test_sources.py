@@ -1,6 +1,8 @@
 """Sensors that drop out, freeze, come late or stand where they do not: the others carry on, and the report shows it."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -249,3 +251,14 @@ def test_what_is_out_of_a_cameras_range_is_not_used():
         row = of(estimate, "depth")
         counts[farthest] = 0 if row is None else row[0]
     assert counts[7.5] > 500 and counts[1.0] == 0
+
+
+def test_the_examples_of_the_documentation_run(capsys):
+    text = (Path(__file__).parents[1] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    chosen = [block for block in blocks if "front_end.step" in block or "estimate.sources" in block]
+    # The third one writes a file of the viewer.
+    names: dict[str, object] = {}
+    for block in (block for block in chosen if "Viewer" not in block):
+        exec(block, names)
+    assert "matched" in capsys.readouterr().out.splitlines()[-1]
