@@ -18,8 +18,8 @@ from voodoo.recordings.utd_mhad import CAMERA
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import ray_distance, world_rays
-from voodoo.sensors.rays import SiteRay, add_rays, beyond_bias
+from voodoo.sensors.pixels import world_rays
+from voodoo.sensors.rays import SiteRay, add_rays
 
 SITES = ("head_center", "l_hand", "r_hand")
 BIAS_M = 0.05
@@ -63,7 +63,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
                     direction,
                     noise.sigma(float(predicted[site][2]), CAMERA.fx),
                     "rays",
-                    beyond_bias(BIAS_M, float(ray_distance(origin, direction, predicted[site]))),
+                    bias=BIAS_M,
                 )
                 for site, direction in zip(SITES, directions, strict=True)
                 if np.isfinite(direction).all()

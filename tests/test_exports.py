@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import voodoo
 from voodoo.errors import VoodooError
 from voodoo.export import write_bag, write_bvh, write_trc
+from voodoo.export.files import check_target
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import skeleton
 from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
@@ -193,3 +194,14 @@ def test_a_track_without_limb_poses_is_refused(tmp_path, tracked):
     track.save(tmp_path / "pose.csv")
     with pytest.raises(VoodooError, match="npz"):
         write_bvh(tmp_path / "pose.bvh", Track.load(tmp_path / "pose.csv"), body)
+
+
+@pytest.mark.parametrize(
+    ("name", "folder"), [("bag", True), ("run.2026-05-01", True), ("run.v2", True), ("pose.cvs", False)]
+)
+def test_a_folder_may_have_a_dot_and_a_slip_is_told(tmp_path, name, folder):
+    if folder:
+        check_target(tmp_path / name)
+        (tmp_path / name).mkdir()
+    with pytest.raises(VoodooError, match="exists" if folder else "cvs"):
+        check_target(tmp_path / name)

@@ -1,6 +1,8 @@
 """Sensors that drop out, freeze, come late or stand where they do not: the others carry on, and the report shows it."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import voodoo
 from voodoo.errors import MeasurementError
 from voodoo.metrics import JOINTS
 from voodoo.recordings import ColorImage, DepthImage, LaserScan, RecordedFrame, open_recording, sample_path
+from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
 
 FRAMES = 40
@@ -189,3 +192,73 @@ def test_time_that_runs_backwards_is_refused_and_the_next_frame_accepted():
             front_end.step(again)
         assert np.array_equal(tracker.estimate.joint_positions, before.joint_positions)
     assert front_end.step(third).stamp == third.stamp
+
+
+def work(estimate):
+    """What a step did: ICP steps, and data given and matched of each source."""
+    return estimate.steps, {name: row[:2] for name, row in estimate.sources.items()}
+
+
+def test_a_weight_changes_no_run_time_and_a_sensor_costs_its_own_data_only():
+    recording = open_recording(sample_path())
+    recorded = next(iter(paired(recording)))
+    depth = next(item for item in recorded.measurements if isinstance(item, DepthImage))
+    config = voodoo.Config(min_change=0.0, hypotheses=False)
+    done = {}
+    for weight, more in ((1.0, False), (40.0, False), (1.0, True)):
+        tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]), config=config)
+        tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+        frame = voodoo.Frame(stamp=0.0)
+        place = {"camera": depth.camera, "world_from_sensor": depth.root_from_sensor}
+        frame.add_depth(depth.image, metres_per_unit=depth.metres_per_unit, weight=weight, source="depth", **place)
+        if more:
+            frame.add_ray("l_hand", origin=(3.0, 0.0, 1.0), direction=(-1.0, 0.0, 0.0), source="rays")
+        done[weight, more] = work(tracker.step(frame))
+    steps, sources = done[1.0, False]
+    assert steps == config.max_steps
+    assert done[40.0, False][0] == steps and done[40.0, False][1]["depth"][0] == sources["depth"][0]
+    assert done[1.0, True][0] == steps and done[1.0, True][1]["depth"][0] == sources["depth"][0]
+    assert done[1.0, True][1]["rays"] == (1, 1)
+
+
+def test_a_frozen_colour_camera_is_left_out(whole):
+    held = {}
+
+    def freeze(index, items):
+        return [
+            held.setdefault("item", item) if isinstance(item, ColorImage) and index > 10 else item for item in items
+        ]
+
+    recording = open_recording(sample_path())
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    named = 0
+    for index, (recorded, _) in enumerate(zip(paired(recording), range(FRAMES), strict=False)):
+        front_end.step(RecordedFrame(recorded.stamp, tuple(freeze(index, list(recorded.measurements)))))
+        named += any("color" in name for name in front_end.frozen)
+    assert named > 20
+
+
+def test_what_is_out_of_a_cameras_range_is_not_used():
+    recording = open_recording(sample_path())
+    counts = {}
+    for farthest in (7.5, 1.0):
+        tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+        tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+        settings = FrontEndSettings(use=("depth",), depth_filter=DepthFilter(farthest=farthest))
+        estimate = FrontEnd(tracker, settings=settings).step(next(iter(paired(recording))))
+        row = of(estimate, "depth")
+        counts[farthest] = 0 if row is None else row[0]
+    assert counts[7.5] > 500 and counts[1.0] == 0
+
+
+def test_the_examples_of_the_documentation_run(capsys):
+    text = (Path(__file__).parents[1] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    chosen = [block for block in blocks if "front_end.step" in block or "estimate.sources" in block]
+    # The third one writes a file of the viewer.
+    names: dict[str, object] = {}
+    for block in (block for block in chosen if "Viewer" not in block):
+        exec(block, names)
+    assert "matched" in capsys.readouterr().out.splitlines()[-1]

@@ -59,6 +59,22 @@ def test_without_rerun_the_message_says_what_to_install(monkeypatch, tmp_path):
         Viewer(save=tmp_path / "x.rrd")
 
 
+@pytest.mark.parametrize("display", ["", ":9"])
+def test_a_viewer_that_cannot_open_says_so(monkeypatch, display):
+    rerun = pytest.importorskip("rerun")
+
+    def fail(self, *args, **kwargs):
+        raise RuntimeError("no viewer\nlong story")
+
+    monkeypatch.setattr(rerun.RecordingStream, "spawn", fail)
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("WAYLAND_DISPLAY", "")
+    with pytest.raises(VoodooError, match="no viewer" if display else "screen") as caught:
+        Viewer()
+    assert "--save" in str(caught.value) and "long story" not in str(caught.value)
+
+
 def test_wrong_suffix(tmp_path):
     pytest.importorskip("rerun")
     with pytest.raises(VoodooError, match=r"\.rrd"):

@@ -169,9 +169,14 @@ class Frame:
         position: Sequence[float] | npt.NDArray[np.float64],
         *,
         weight: float = 1.0,
+        bias: float = 0.0,
         source: str = "positions",
     ) -> None:
-        """Add the position (3,) [m] of a named site in the world (3-D point-to-point relation)."""
+        """Add the position (3,) [m] of a named site in the world (3-D point-to-point relation).
+
+        It may always be `bias` [m] off: within that distance of the site it says nothing, beyond, its force is that of the
+        rest of the distance.
+        """
     def add_ray(
         self,
         site: str,
@@ -179,9 +184,11 @@ class Frame:
         origin: Sequence[float] | npt.NDArray[np.float64],
         direction: Sequence[float] | npt.NDArray[np.float64],
         weight: float = 1.0,
+        bias: float = 0.0,
         source: str = "rays",
     ) -> None:
-        """Add a ray in the world on which a named site was seen (2-D point-to-line relation)."""
+        """Add a ray in the world on which a named site was seen (2-D point-to-line relation); `bias` [m] as in
+        `add_position`."""
     def set_ground(self, *, normal: Sequence[float] | npt.NDArray[np.float64], offset: float = 0.0) -> None:
         """Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background."""
 
@@ -251,6 +258,7 @@ class Tracker:
     def _reset_pose(self, world_from_limb: Sequence[npt.NDArray[np.float64]]) -> Estimate: ...
     def step(self, frame: Frame) -> Estimate: ...
     def distance(self, points: _Points) -> npt.NDArray[np.float32]: ...
+    def limb_distances(self, points: _Points) -> npt.NDArray[np.float32]: ...
     def scale(self, factor: float) -> None: ...
     def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None: ...
     def _add_limb(

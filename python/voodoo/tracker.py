@@ -79,6 +79,10 @@ class Tracker:
         """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside."""
         return self._core.distance(points)
 
+    def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+        """Signed distances (limbs, N) [m] of world points (N, 3) to each limb, in the order of `Body.limb_names`."""
+        return self._core.limb_distances(points)
+
     def scale(self, factor: float) -> None:
         """Scale the whole body without losing the track."""
         self._core.scale(factor)

@@ -6,6 +6,8 @@ Rerun is an optional extra: `pip install voodoo[view]`.
 from __future__ import annotations
 
 import colorsys
+import os
+import sys
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any, TypeAlias
@@ -42,7 +44,7 @@ class Viewer:
         name: of the recording, shown in the viewer.
 
     Raises:
-        VoodooError: Rerun is not installed, or another suffix.
+        VoodooError: Rerun is not installed, another suffix, or a viewer that cannot open here.
         OSError: the file cannot be written.
     """
 
@@ -54,13 +56,25 @@ class Viewer:
         self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None)
         self._stream.send_recording_name(name)
         if save is None:
-            self._stream.spawn()
+            self._open()
         else:
             Path(save).parent.mkdir(parents=True, exist_ok=True)
             self._stream.save(str(save))
         self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._shapes: dict[str, TaperedEllipticCylinder] = {}
+
+    def _open(self) -> None:
+        """Start the viewer; without a screen it would end unseen."""
+        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise VoodooError(
+                "view: expected a screen to open the viewer on, found none; --save FILE.rrd writes a file"
+            )
+        try:
+            self._stream.spawn()
+        except (RuntimeError, OSError) as error:
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+            raise VoodooError(f"view: the viewer did not start ({reason}); --save FILE.rrd writes a file") from error
 
     def __enter__(self) -> Viewer:
         """The viewer itself."""

@@ -27,8 +27,14 @@ pub struct SitePair {
     pub x: Vec3,
     /// The target.
     pub p: Vec3,
-    /// Scalar weight, as the papers use it.
+    /// Scalar weight, as the papers use it, of what is beyond the bias.
     pub weight: f64,
+    /// Scalar weight as it was given.
+    pub given: f64,
+    /// The measurement may always be this far off, metres.
+    pub bias: f64,
+    /// What of a difference counts: the identity for a position, `I - d d^T` for a ray along `d`.
+    pub across: Mat3,
     /// Weight times the identity for a position, times `I - d d^T` for a ray along `d` (method: every datum has an information).
     pub information: Mat3,
     /// Number of the source.

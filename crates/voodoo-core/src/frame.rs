@@ -139,6 +139,8 @@ pub struct PositionRelation {
     pub position: Vec3,
     /// Its weight.
     pub weight: f64,
+    /// It may always be this far off, metres: within, it says nothing; beyond, it pulls with the rest of the distance.
+    pub bias: f64,
     /// Number of the source, for the report.
     pub source: u16,
 }
@@ -154,6 +156,8 @@ pub struct RayRelation {
     pub direction: Vec3,
     /// Its weight.
     pub weight: f64,
+    /// It may always be this far off, metres: within, it says nothing; beyond, it pulls with the rest of the distance.
+    pub bias: f64,
     /// Number of the source, for the report.
     pub source: u16,
 }
@@ -226,12 +230,14 @@ impl<'a> Frame<'a> {
             let what = |part: &str| format!("positions[{index}].{part}");
             check_site(|| what("site"), relation.site, body)?;
             check_weight(|| what("weight"), relation.weight)?;
+            check_bias(|| what("bias"), relation.bias)?;
             check_vector(|| what("position"), relation.position)?;
         }
         for (index, relation) in self.rays.iter().enumerate() {
             let what = |part: &str| format!("rays[{index}].{part}");
             check_site(|| what("site"), relation.site, body)?;
             check_weight(|| what("weight"), relation.weight)?;
+            check_bias(|| what("bias"), relation.bias)?;
             check_vector(|| what("origin"), relation.origin)?;
             check_vector(|| what("direction"), relation.direction)?;
             if relation.direction.length() < 1e-9 {
@@ -290,6 +296,14 @@ fn check_weight(what: impl FnOnce() -> String, weight: f64) -> Result<(), TrackE
         Ok(())
     } else {
         Err(TrackError::measurement(what(), "a finite weight above zero", weight.to_string()))
+    }
+}
+
+fn check_bias(what: impl FnOnce() -> String, bias: f64) -> Result<(), TrackError> {
+    if bias.is_finite() && bias >= 0.0 {
+        Ok(())
+    } else {
+        Err(TrackError::measurement(what(), "a finite length, zero or above", bias.to_string()))
     }
 }
 

@@ -8,6 +8,13 @@ use crate::geometry::{Mat3, Pose, Vec3};
 /// Weight of the bands of a limb that nothing measures; only their proportions matter there.
 const UNMEASURED: f64 = 1.0;
 
+/// Share of a weight that is left when a datum at this distance may always be `bias` off: the force on the site is then
+/// that of the part of the distance which is no bias, and nothing pulls once the rest of the frame has brought the site
+/// near. What a detector calls a hand is not where the body has its hand, in frame after frame to the same side.
+fn beyond(bias: f64, distance: f64) -> f64 {
+    if bias <= 0.0 { 1.0 } else { (1.0 - bias / distance.max(bias)).max(0.0) }
+}
+
 impl Correspondences {
     /// Point-to-point relations, and for every ray the closest point on it (K06 IV-B.4 and 5).
     pub fn add_sites(&mut self, body: &Body, poses: &[Pose], frame: &Frame, origin: Vec3) {
@@ -18,13 +25,17 @@ impl Correspondences {
         };
         for relation in frame.positions {
             let (limb, x) = place(relation.site);
-            let information = Mat3::IDENTITY * relation.weight;
+            let p = relation.position - origin;
+            let weight = relation.weight * beyond(relation.bias, (x - p).length());
             self.sites.push(SitePair {
                 limb,
                 x,
-                p: relation.position - origin,
-                weight: relation.weight,
-                information,
+                p,
+                weight,
+                given: relation.weight,
+                bias: relation.bias,
+                across: Mat3::IDENTITY,
+                information: Mat3::IDENTITY * weight,
                 source: relation.source,
             });
         }
@@ -36,12 +47,16 @@ impl Correspondences {
             let p = start + direction * (x - start).dot(direction).max(0.0);
             let across = Mat3::IDENTITY
                 - Mat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
+            let weight = relation.weight * beyond(relation.bias, (x - p).length());
             self.sites.push(SitePair {
                 limb,
                 x,
                 p,
-                weight: relation.weight,
-                information: across * relation.weight,
+                weight,
+                given: relation.weight,
+                bias: relation.bias,
+                across,
+                information: across * weight,
                 source: relation.source,
             });
         }

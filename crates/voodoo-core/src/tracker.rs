@@ -12,7 +12,7 @@ use crate::correspondence::{Correspondences, LimbMatches};
 use crate::error::{BodyError, TrackError};
 use crate::estimate::{Estimate, LimbStatus, Status};
 use crate::facing::face_cameras;
-use crate::frame::{DepthImage, Frame, PointSlice};
+use crate::frame::{DepthImage, Frame};
 use crate::geometry::{Aabb, Points, Pose, Vec3};
 use crate::outline::{Outline, edges};
 use crate::predict::predict;
@@ -229,30 +229,6 @@ impl Tracker {
         self.report(frame.stamp, steps);
         self.judge(frame);
         Ok(&self.estimate)
-    }
-
-    /// Signed distance of world points to the surface of the posed body, metres, negative inside.
-    pub fn distance(&self, points: PointSlice) -> Result<Vec<f32>, TrackError> {
-        if !self.started {
-            return Err(TrackError::NotInitialised);
-        }
-        let mut queries = Points::default();
-        for index in 0..points.len() {
-            let point = points.get(index);
-            if !point.is_finite() {
-                return Err(TrackError::measurement("points", "finite metres", format!("{point:?} in row {index}")));
-            }
-            queries.push((point - self.origin).to_array().map(|value| value as f32));
-        }
-        let mut least = vec![f32::INFINITY; points.len()];
-        let mut surface = SurfaceBatch::default();
-        for (limb, pose) in self.body.limbs().iter().zip(&self.poses) {
-            limb.shape.closest_points(pose, &queries, &mut surface);
-            for (least, distance) in least.iter_mut().zip(&surface.signed_distance) {
-                *least = least.min(*distance);
-            }
-        }
-        Ok(least)
     }
 
     /// Keeps the working frame near the body, so that single precision is enough for points.
@@ -546,7 +522,9 @@ impl Tracker {
     }
 }
 
+mod distances;
 mod hypotheses;
+mod named;
 mod report;
 mod status;
 

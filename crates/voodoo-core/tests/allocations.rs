@@ -51,12 +51,14 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     let knee = body.site_index("r_knee").unwrap();
     let mut tracker = Tracker::new(body.clone(), config).unwrap();
     let estimate = tracker.reset_pose(&scene::standing(&body)).unwrap();
-    let positions = [PositionRelation { site: wrist, position: estimate.sites[wrist], weight: 20.0, source: 1 }];
+    let positions =
+        [PositionRelation { site: wrist, position: estimate.sites[wrist], weight: 20.0, bias: 0.0, source: 1 }];
     let rays = [RayRelation {
         site: knee,
         origin: Vec3::Z,
         direction: estimate.sites[knee] - Vec3::Z,
         weight: 20.0,
+        bias: 0.0,
         source: 2,
     }];
     let mut count = 0;

@@ -75,7 +75,7 @@ proptest! {
         let target = human().site_position(&poses, site) + Vec3::from_array(offset);
         let origin = target + 2.0 * Vec3::new(-1.0, scene::Noise(from).uniform() - 0.5, 0.3);
         let direction = 3.0 * (target - origin);
-        let ray = [RayRelation { site, origin, direction, weight: 1.0, source: 0 }];
+        let ray = [RayRelation { site, origin, direction, weight: 1.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
         for stamp in 0..10 {
             tracker.step(&Frame { rays: &ray, ..Frame::empty(f64::from(stamp)) }).unwrap();
@@ -90,7 +90,7 @@ proptest! {
         let poses = scene::standing(&human());
         let site = human().site_index("r_ankle").unwrap();
         let position = human().site_position(&poses, site) + Vec3::from_array(offset);
-        let relation = [PositionRelation { site, position, weight: 1.0, source: 0 }];
+        let relation = [PositionRelation { site, position, weight: 1.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
         for stamp in 0..10 {
             tracker.step(&Frame { positions: &relation, ..Frame::empty(f64::from(stamp)) }).unwrap();
@@ -106,7 +106,7 @@ proptest! {
         let target = human().site_position(&poses, site);
         let direction = Vec3::new(1.0, 0.2, -0.1);
         // Where on the line the ray starts does not matter, as long as the site is before it.
-        let ray = [RayRelation { site, origin: target - direction * (2.0 + along), direction, weight: 5.0, source: 0 }];
+        let ray = [RayRelation { site, origin: target - direction * (2.0 + along), direction, weight: 5.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
         tracker.step(&Frame { rays: &ray, ..Frame::empty(0.0) }).unwrap();
         prop_assert!(largest_distance(&tracker.estimate().sites, &sites(&human(), &poses)) < 1e-6);
@@ -160,7 +160,7 @@ proptest! {
         let run = |factor: f64| {
             let cloud = [Cloud { weight: factor, ..scene::cloud(&points) }];
             let position = sites(&human(), &before)[site] + Vec3::Y * 0.02;
-            let positions = [PositionRelation { site, position, weight: 20.0 * factor, source: 1 }];
+            let positions = [PositionRelation { site, position, weight: 20.0 * factor, bias: 0.0, source: 1 }];
             let mut tracker = tracker(Config { max_steps: 6, ..settled() }, &before);
             tracker.step(&Frame { clouds: &cloud, positions: &positions, ..Frame::empty(0.0) }).unwrap().sites.clone()
         };

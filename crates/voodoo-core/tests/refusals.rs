@@ -105,7 +105,7 @@ fn bad_images_are_refused() {
 #[test]
 fn bad_sites_and_floors_are_refused() {
     let sites = Body::human(1.75, HumanModel::Papers).unwrap().sites().len();
-    let position = PositionRelation { site: 0, position: Vec3::ZERO, weight: 1.0, source: 0 };
+    let position = PositionRelation { site: 0, position: Vec3::ZERO, weight: 1.0, bias: 0.0, source: 0 };
     for (bad, what) in [
         (PositionRelation { site: sites, ..position }, "positions[0].site"),
         (PositionRelation { position: Vec3::NAN, ..position }, "positions[0].position"),
@@ -113,13 +113,13 @@ fn bad_sites_and_floors_are_refused() {
     ] {
         refused(&Frame { positions: &[bad], ..Frame::empty(2.0) }, what);
     }
-    let ray = RayRelation { site: 0, origin: Vec3::ZERO, direction: Vec3::X, weight: 1.0, source: 0 };
+    let ray = RayRelation { site: 0, origin: Vec3::ZERO, direction: Vec3::X, weight: 1.0, bias: 0.0, source: 0 };
     for (bad, what) in [
         (RayRelation { site: sites, ..ray }, "rays[0].site"),
         (RayRelation { origin: Vec3::INFINITY, ..ray }, "rays[0].origin"),
         (RayRelation { direction: Vec3::ZERO, ..ray }, "rays[0].direction"),
         (RayRelation { direction: Vec3::NAN, ..ray }, "rays[0].direction"),
-        (RayRelation { weight: 0.0, ..ray }, "rays[0].weight"),
+        (RayRelation { weight: 0.0, bias: 0.0, ..ray }, "rays[0].weight"),
     ] {
         refused(&Frame { rays: &[bad], ..Frame::empty(2.0) }, what);
     }

@@ -97,7 +97,7 @@ proptest! {
                 let information = if index % 2 == 0 { Mat3::IDENTITY } else { Mat3::IDENTITY - Mat3::from_cols(d * d.x, d * d.y, d * d.z) };
                 // A ray's target is the closest point on it.
                 let p = if index % 2 == 0 { p } else { p + d * (x - p).dot(d) };
-                SitePair { limb: site.limb, x, p, weight: 1.0, information, source: 0 }
+                SitePair { limb: site.limb, x, p, weight: 1.0, given: 1.0, bias: 0.0, across: Mat3::IDENTITY, information, source: 0 }
             }).collect();
             let correspondences = Correspondences { sites: pairs, ..Default::default() };
             Sites { correspondences: &correspondences, information: 1.0, scale: 0.5 }.add(&body, poses, normal);

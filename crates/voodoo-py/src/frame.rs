@@ -46,6 +46,7 @@ struct SiteData {
     position: Vec3,
     direction: Option<Vec3>,
     weight: f64,
+    bias: f64,
     source: u16,
 }
 
@@ -161,6 +162,7 @@ impl PyFrame {
                     site,
                     position: data.position,
                     weight: data.weight,
+                    bias: data.bias,
                     source: data.source,
                 }),
                 Some(direction) => rays.push(RayRelation {
@@ -168,6 +170,7 @@ impl PyFrame {
                     origin: data.position,
                     direction,
                     weight: data.weight,
+                    bias: data.bias,
                     source: data.source,
                 }),
             }
@@ -256,26 +259,35 @@ impl PyFrame {
         Ok(())
     }
 
-    #[pyo3(signature = (site, position, *, weight=1.0, source="positions"))]
-    fn add_position(&mut self, site: String, position: &Bound<'_, PyAny>, weight: f64, source: &str) -> PyResult<()> {
+    #[pyo3(signature = (site, position, *, weight=1.0, bias=0.0, source="positions"))]
+    fn add_position(
+        &mut self,
+        site: String,
+        position: &Bound<'_, PyAny>,
+        weight: f64,
+        bias: f64,
+        source: &str,
+    ) -> PyResult<()> {
         let data = SiteData {
             site,
             position: vector("position", position)?,
             direction: None,
             weight,
+            bias,
             source: self.source(source),
         };
         self.sites.push(data);
         Ok(())
     }
 
-    #[pyo3(signature = (site, *, origin, direction, weight=1.0, source="rays"))]
+    #[pyo3(signature = (site, *, origin, direction, weight=1.0, bias=0.0, source="rays"))]
     fn add_ray(
         &mut self,
         site: String,
         origin: &Bound<'_, PyAny>,
         direction: &Bound<'_, PyAny>,
         weight: f64,
+        bias: f64,
         source: &str,
     ) -> PyResult<()> {
         let data = SiteData {
@@ -283,6 +295,7 @@ impl PyFrame {
             position: vector("origin", origin)?,
             direction: Some(vector("direction", direction)?),
             weight,
+            bias,
             source: self.source(source),
         };
         self.sites.push(data);

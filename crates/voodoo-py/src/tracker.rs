@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::geometry::{Pose, Vec3};
@@ -107,6 +108,15 @@ impl PyTracker {
         let slice = view.slice()?;
         let distances = py.detach(|| self.tracker.distance(slice)).map_err(|error| error.into_py(py))?;
         Ok(PyArray1::from_vec(py, distances))
+    }
+
+    /// Signed distances `(limbs, N)` of world points `(N, 3)` to every limb of the posed body, metres, negative inside.
+    fn limb_distances<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let array = PointArray::new("points", points)?;
+        let view = array.view(py);
+        let slice = view.slice()?;
+        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(|error| error.into_py(py))?;
+        PyArray2::from_vec2(py, &distances).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
     fn scale(&mut self, py: Python<'_>, factor: f64) -> PyResult<()> {

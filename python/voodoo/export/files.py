@@ -23,13 +23,18 @@ def check_target(path: Path) -> None:
     Raises:
         VoodooError: another suffix, or a bag folder that exists.
     """
-    if path.suffix and path.suffix not in FORMATS:
+    if path.suffix not in FORMATS and not _is_folder(path):
         raise VoodooError(
             f"{path}: expected a name that ends in {', '.join(FORMATS)}, or a new folder for a ROS 2 bag, found "
             f"{path.suffix!r}"
         )
-    if not path.suffix and path.exists():
+    if _is_folder(path) and path.exists():
         raise VoodooError(f"{path}: expected a new folder for a ROS 2 bag, found one that exists")
+
+
+def _is_folder(path: Path) -> bool:
+    """Whether a name is a bag folder's: what follows its last dot, if any, is no file's suffix (run.2026-05-01)."""
+    return path.suffix not in FORMATS and not path.suffix[1:].isalpha()
 
 
 def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
@@ -56,7 +61,7 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
             bag = Path(folder) / path.stem
             write_bag(bag, track, body, root_frame=root_frame)
             shutil.move(next(bag.glob("*.mcap")), path)
-    elif not path.suffix:
+    elif _is_folder(path):
         write_bag(path, track, body, root_frame=root_frame)
     else:
         track.save(path)

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from voodoo.sensors.assignment import assign
 from voodoo.sensors.pixels import FloatArray
@@ -31,6 +32,9 @@ HELD, DRIFTED, TAKEN, NONE = 0.3, 0.75, 0.5, 0.8
 A region that keeps its name costs less than none; two that were swapped cost more than changing back."""
 SAME_M = 0.09
 """Two candidates this near are one hand."""
+DOUBT_S, APART = 0.25, 1.25
+"""A name is given up after this time in which the body did not come nearer to it than so many gates, or in which it lay on
+another limb."""
 OLD_ENOUGH = 3
 """Pictures in which a region was seen before it may be named from afar."""
 
@@ -45,6 +49,7 @@ class Sight:
         deep: whether a depth camera saw it.
         hand: False where it cannot be a hand.
         region: number of its region.
+        still: whether nothing behind it was ever seen: it may be a thing, not the person.
     """
 
     direction: FloatArray
@@ -52,6 +57,7 @@ class Sight:
     deep: bool
     hand: bool
     region: int
+    still: bool = False
 
 
 @dataclass(eq=False)
@@ -64,6 +70,7 @@ class Blob:
     count: int = 1
     label: str | None = None
     far: dict[str, float] = field(default_factory=dict)
+    doubt: dict[str, float] = field(default_factory=dict)
 
     def at(self, stamp: float) -> FloatArray:
         """Where it should be."""
@@ -81,13 +88,11 @@ class Blob:
         self.sight, self.stamp = sight, stamp
         self.count += 1
 
-    def merge(self, seen: Blob, stamp: float) -> bool:
-        """Whether it is the same as a blob that was seen just now, which then takes over its name and history."""
-        if _apart(self, seen.sight, stamp) * _limit(self, stamp) > SAME_M:
-            return False
+    def merge(self, seen: Blob) -> None:
+        """It is the same as a blob that was seen just now, which takes over its name and history."""
         if self.label is not None and seen.label is None:
-            seen.label, seen.far, seen.count = self.label, self.far, max(seen.count, self.count)
-        return True
+            seen.label, seen.far, seen.doubt = self.label, self.far, self.doubt
+            seen.count = max(seen.count, self.count)
 
 
 class Blobs:
@@ -97,11 +102,11 @@ class Blobs:
         """None yet."""
         self.items: list[Blob] = []
         self._missed: dict[str, float] = {}
+        self._stamp = -math.inf
 
     def follow(self, sights: Sequence[Sight], stamp: float) -> list[Blob]:
         """The blob of each sight of a picture, new ones included; those that were not seen for long are dropped."""
-        cost = np.array([[_apart(blob, sight, stamp) for sight in sights] for blob in self.items])
-        cost = cost.reshape(len(self.items), len(sights))
+        cost = _apart(self.items, sights, stamp)
         seen: list[Blob | None] = [None] * len(sights)
         for row, column in assign(cost, gate=1.0):
             self.items[row].move(sights[column], stamp)
@@ -110,14 +115,22 @@ class Blobs:
         unseen = [blob for blob in self.items if blob.stamp < stamp and stamp - blob.stamp < FORGET_S]
         for blob in unseen:
             blob.velocity = 0.5 * blob.velocity
-        self.items = found + [blob for blob in unseen if not any(blob.merge(other, stamp) for other in found)]
-        return found
+        apart = _apart(unseen, [blob.sight for blob in found], stamp)
+        for blob, row in zip(unseen, apart, strict=True):
+            same = np.flatnonzero(row * _limit(blob, stamp) <= SAME_M)
+            if len(same):
+                blob.merge(found[int(same[0])])
+            else:
+                found.append(blob)
+        self.items = found
+        return found[: len(sights)]
 
     def name(
         self,
         seen: Sequence[Blob],
         distance: FloatArray,
         allowed: FloatArray,
+        elsewhere: npt.NDArray[np.bool_],
         *,
         sites: Sequence[str],
         gates: Mapping[str, float],
@@ -132,6 +145,7 @@ class Blobs:
             seen: blobs of this picture.
             distance: (S, B) between the site where the model expects it and the blob [m].
             allowed: (S, B): 0 the blob cannot be the site, 1 only near where it is expected, 2 anywhere.
+            elsewhere: (S, B): the blob is on another part of the body, as far as that is where it is thought to be.
             sites: their names.
             gates: site -> gate [m].
             growth: of a gate while its site is not seen [m/s].
@@ -142,6 +156,10 @@ class Blobs:
         Returns:
             Site -> number of its blob.
         """
+        elapsed = min(max(stamp - self._stamp, 0.0), 0.1)
+        self._stamp = stamp
+        self._doubt(seen, distance, elsewhere, sites=sites, gates=gates, elapsed=elapsed)
+        allowed = np.where([[blob.doubt[site] > DOUBT_S for blob in seen] for site in sites], 0.0, allowed)
         owner = {
             site
             for row, site in enumerate(sites)
@@ -153,23 +171,29 @@ class Blobs:
             gate = gates[site]
             waited = stamp - self._missed.setdefault(site, stamp)
             reach = max(gate, min(gate + growth * waited, widest[site]))
+            able = [
+                allowed[row, column]
+                and not elsewhere[row, column]
+                and (near < gate or (near < reach and allowed[row, column] > 1 and blob.count >= OLD_ENOUGH))
+                for column, (blob, near) in enumerate(zip(seen, distance[row], strict=True))
+            ]
             for column, blob in enumerate(seen):
                 near = float(distance[row, column])
                 sample = min(near / gate, 2.0) ** 2
                 share = 1.0 if blob.count == 1 else 1.0 - math.exp(-1.0 / (30.0 * AGREEMENT_S))
                 far = blob.far[site] = (1.0 - share) * blob.far.get(site, sample) + share * sample
-                if not allowed[row, column]:
-                    continue
-                if blob.label == site:
+                if blob.label == site and allowed[row, column]:
                     cost[row, column] = min(HELD * far, DRIFTED)
+                elif not able[column]:
+                    continue
                 elif site in owner or blob.label in owner:
                     if blob.count >= OLD_ENOUGH and near < gate:
                         cost[row, column] = TAKEN + far
-                elif near < gate or (near < reach and allowed[row, column] > 1 and blob.count >= OLD_ENOUGH):
+                else:
                     rivals = [
                         float(distance[row, other])
                         for other in range(len(seen))
-                        if allowed[row, other]
+                        if able[other]
                         and seen[other].label is None
                         and float(np.linalg.norm(seen[other].sight.place - blob.sight.place)) > SAME_M
                     ]
@@ -184,13 +208,36 @@ class Blobs:
             self._missed[site] = stamp
         return named
 
+    @staticmethod
+    def _doubt(
+        seen: Sequence[Blob],
+        distance: FloatArray,
+        elsewhere: npt.NDArray[np.bool_],
+        *,
+        sites: Sequence[str],
+        gates: Mapping[str, float],
+        elapsed: float,
+    ) -> None:
+        """How long each blob has spoken against being each site: on another limb, or its name without the body going there."""
+        for row, site in enumerate(sites):
+            for column, blob in enumerate(seen):
+                apart = blob.label == site and blob.sight.deep and distance[row, column] > APART * gates[site]
+                change = elapsed if elsewhere[row, column] or apart else -elapsed
+                blob.doubt[site] = min(max(blob.doubt.get(site, 0.0) + change, 0.0), 2.0 * DOUBT_S)
 
-def _apart(blob: Blob, sight: Sight, stamp: float) -> float:
-    """Distance of a sight from where a blob should be, in units of what is possible."""
-    offset = sight.place - blob.at(stamp)
-    if not (sight.deep and blob.sight.deep):
-        offset = offset - sight.direction * float(offset @ sight.direction)
-    return float(np.linalg.norm(offset)) / _limit(blob, stamp)
+
+def _apart(blobs: Sequence[Blob], sights: Sequence[Sight], stamp: float) -> FloatArray:
+    """(blobs, sights): distance of a sight from where a blob should be, in units of what is possible."""
+    if not blobs or not sights:
+        return np.zeros((len(blobs), len(sights)))
+    offset = np.array([sight.place for sight in sights]) - np.array([blob.at(stamp) for blob in blobs])[:, None]
+    directions = np.array([sight.direction for sight in sights])
+    deep = np.outer([blob.sight.deep for blob in blobs], [sight.deep for sight in sights])
+    along = np.where(deep, 0.0, (offset * directions).sum(axis=2))
+    offset -= along[..., None] * directions
+    return np.asarray(
+        np.sqrt((offset * offset).sum(axis=2)) / np.array([_limit(blob, stamp) for blob in blobs])[:, None]
+    )
 
 
 def _limit(blob: Blob, stamp: float) -> float:

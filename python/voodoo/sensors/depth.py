@@ -3,6 +3,7 @@ range."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -15,6 +16,14 @@ from voodoo.errors import MeasurementError
 from voodoo.sensors.pixels import FloatArray, in_sensor
 
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+
+
+_STANDS = 1e-3
+"""A pose whose entries change by less is that of a camera that stands."""
+_BEHIND = (0.05, 0.02)
+"""What lies so far behind is another surface: metres, and share of the depth."""
+_STAYS, _STAYED = 6, (0.02, 0.015)
+"""Over so many pictures the depth of a still surface changes by less than this: metres, and share of the depth."""
 
 
 @dataclass(frozen=True)
@@ -97,21 +106,81 @@ class BodyView:
         mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
         pixels: (N, 2) of the points in the picture.
         depths: (N,) of the points along the colour camera's optical axis [m].
+        still: (N,) whether nothing behind a point was ever seen there: it may be the scene. None: not known.
     """
 
     mask: npt.NDArray[np.bool_]
     pixels: FloatArray
     depths: FloatArray
+    still: npt.NDArray[np.bool_] | None = None
 
-    def depth_at(self, pixel: tuple[float, float], radius: float) -> float | None:
-        """Depth [m] of the nearest surface within `radius` pixels of a place, None with less than three points
-        there."""
-        near = ((self.pixels - pixel) ** 2).sum(axis=1) < radius**2
-        if int(near.sum()) < 3:
+    def look_at(
+        self, pixel: tuple[float, float], radius: float, *, among: npt.NDArray[np.bool_] | None = None
+    ) -> tuple[float, bool] | None:
+        """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
+        less than three points there. Where three of the points `among` (N,) are there, only those count."""
+        near = self._near(pixel, radius, None if among is None else np.flatnonzero(among))
+        if len(near) < 3 and among is not None:
+            near = self._near(pixel, radius, None)
+        if len(near) < 3:
             return None
         depths = self.depths[near]
-        front = float(np.quantile(depths, 0.2, method="lower"))
-        return float(np.median(depths[np.abs(depths - front) < 0.1]))
+        fifth = (len(near) - 1) // 5
+        surface = np.abs(depths - np.partition(depths, fifth)[fifth]) < 0.1
+        depths = depths[surface]
+        still = self.still is not None and 2 * int(np.count_nonzero(self.still[near][surface])) > len(depths)
+        half = len(depths) // 2
+        return float(np.partition(depths, half)[half]), still
+
+    def _near(
+        self, pixel: tuple[float, float], radius: float, among: npt.NDArray[np.intp] | None
+    ) -> npt.NDArray[np.intp]:
+        pixels = self.pixels if among is None else self.pixels[among]
+        u, v = pixels[:, 0] - pixel[0], pixels[:, 1] - pixel[1]
+        inside = np.flatnonzero(u * u + v * v < radius**2)
+        return inside if among is None else among[inside]
+
+    def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+        """Values (N,) of the picture (H, W) at the points, -1 outside."""
+        u, v = np.rint(self.pixels.T).astype(np.intp)
+        inside = (u >= 0) & (v >= 0) & (u < image.shape[1]) & (v < image.shape[0])
+        values = np.full(len(u), -1, dtype=np.int32)
+        values[inside] = image[v[inside], u[inside]]
+        return values
+
+
+class StillDepth:
+    """What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind
+    which nothing was ever seen. A table's edge does not become a hand.
+
+    The surface of a person who has not moved yet looks the same, so this only tells what has moved.
+    """
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self._farthest: npt.NDArray[np.float32] | None = None
+        self._pose: FloatArray | None = None
+        self._last: deque[npt.NDArray[np.float32]] = deque(maxlen=_STAYS)
+
+    def see(self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray) -> npt.NDArray[np.bool_] | None:
+        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew.
+
+        Returns:
+            (H, W): True where the image shows what may be the scene; None as long as too little was seen.
+        """
+        moved = self._pose is None or not np.allclose(self._pose, world_from_sensor, atol=_STANDS)
+        if self._farthest is None or moved or self._farthest.shape != z.shape:
+            self._farthest, self._pose = z.copy(), world_from_sensor
+            self._last.clear()
+        np.maximum(self._farthest, z, out=self._farthest)
+        still = None
+        if len(self._last) == _STAYS:
+            # At the edges of things every camera sees now the one, now the other.
+            behind = cv2.erode(self._farthest, np.ones((3, 3), np.uint8))
+            near, stayed = (low + share * z for low, share in (_BEHIND, _STAYED))
+            still = np.asarray((behind - z < near) & (np.abs(z - self._last[0]) < stayed))
+        self._last.append(z)
+        return still
 
 
 def body_view(
@@ -125,6 +194,7 @@ def body_view(
     joints: npt.ArrayLike,
     margin: float = 0.30,
     step: int = 1,
+    scene: StillDepth | None = None,
 ) -> BodyView:
     """Where, in a colour image, a depth camera beside it saw something within the box around the body.
 
@@ -136,6 +206,7 @@ def body_view(
         joints: (N, 3) predicted positions of the body [m].
         margin: enlargement of their box [m].
         step: every step-th row and column of the depth image is used.
+        scene: what the depth camera saw before; takes up this image.
 
     Returns:
         Mask of the colour image and the points; the gaps between the depth pixels are closed in the mask.
@@ -143,6 +214,15 @@ def body_view(
     places = np.asarray(joints, dtype=np.float64)
     low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
     rows, columns = _window(depth_camera, world_from_depth, low, high)
+    standing = None
+    if scene is not None:
+        whole = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
+        rows, columns = (slice(-(-span.start // step) * step, span.stop) for span in (rows, columns))
+        standing = scene.see(whole, world_from_depth)
+        if standing is not None:
+            standing = standing[
+                rows.start // step : -(-rows.stop // step), columns.start // step : -(-columns.stop // step)
+            ]
     z = depth[rows, columns][::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
     rays = depth_camera.rays()[rows, columns][::step, ::step]
     valid = np.isfinite(z) & (z > 0.0)
@@ -154,20 +234,22 @@ def body_view(
         place = turn[0] * x + turn[1] * y + turn[2] * z + shift
         near &= (place > low[axis]) & (place < high[axis])
     x, y, z = x[near], y[near], z[near]
+    still = None if standing is None else standing[valid][near]
     color_from_depth = np.linalg.inv(world_from_color) @ world_from_depth
     in_color = np.column_stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in color_from_depth[:3]])
     mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
     pixels = color_camera.project(in_color)
-    seen = np.isfinite(pixels).all(axis=1)
-    pixels, in_color = pixels[seen], in_color[seen]
-    whole = np.round(pixels).astype(np.int64)
-    inside = (whole >= 0).all(axis=1) & (whole < (color_camera.width, color_camera.height)).all(axis=1)
-    mask[whole[inside, 1], whole[inside, 0]] = 1
+    u, v = np.rint(pixels).T
+    # NaN, where the colour camera cannot see, is inside of nothing.
+    inside = (u >= 0) & (v >= 0) & (u < color_camera.width) & (v < color_camera.height)
+    pixels, in_color = pixels[inside], in_color[inside]
+    still = None if still is None else still[inside]
+    mask[v[inside].astype(np.intp), u[inside].astype(np.intp)] = 1
     # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
     grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
     beyond = _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
-    return BodyView(grown | beyond, pixels, in_color[:, 2])
+    return BodyView(grown | beyond, pixels, in_color[:, 2], still)
 
 
 def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high: FloatArray) -> tuple[slice, slice]:

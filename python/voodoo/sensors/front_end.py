@@ -3,7 +3,7 @@ from standard deviations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,7 +24,7 @@ from voodoo.recordings import (
     RecordedFrame,
     Recording,
 )
-from voodoo.sensors.depth import DepthFilter, body_view
+from voodoo.sensors.depth import DepthFilter, StillDepth, body_view
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import (
     PLANAR_LASER,
@@ -118,6 +118,7 @@ class FrontEnd:
         self.rays: list[SiteRay] = []
         self.frozen: tuple[str, ...] = ()
         self._contents: dict[str, npt.NDArray[Any]] = {}
+        self._scenes: dict[str, StillDepth] = {}
         self._predictor = SitePredictor()
         chosen = self.settings
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
@@ -225,6 +226,7 @@ class FrontEnd:
                 world_from_color=item.root_from_sensor,
                 joints=list(then.values()),
                 step=max(depth.camera.width // 200, 1),
+                scene=self._scenes.setdefault(depth.sensor, StillDepth()),
             )
         rays = skin.observe(
             item.image,
@@ -233,10 +235,19 @@ class FrontEnd:
             then,
             stamp=item.stamp,
             body=body,
-            surface=self.tracker.distance,
+            surface=self._limb_distances,
+            lost=self._lost(skin.settings.sites) if depth is not None else (),
             source=item.sensor,
         )
         self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
+
+    def _lost(self, sites: Iterable[str]) -> set[str]:
+        """Hands whose forearm was not measured in the last frame."""
+        status = self.tracker.estimate.limb_status
+        return {site for site in sites if status.get(f"{site[:2]}forearm", "measured") != "measured"}
+
+    def _limb_distances(self, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
+        return dict(zip(self.tracker.estimate.world_from_limb, self.tracker.limb_distances(places), strict=True))
 
     def _add_keypoints(
         self,
@@ -291,11 +302,13 @@ class FrontEnd:
 
 
 def _content(item: Measurement, use: Sequence[str]) -> npt.NDArray[Any] | None:
-    """What a range sensor of a kind in use measured."""
+    """What a sensor of a kind in use measured."""
     if isinstance(item, DepthImage) and "depth" in use:
         return item.image
     if isinstance(item, PointCloud) and "points" in use:
         return item.points
+    if isinstance(item, ColorImage) and "skin" in use:
+        return item.image
     return item.ranges if isinstance(item, LaserScan) and "scan" in use else None
 
 

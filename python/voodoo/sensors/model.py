@@ -124,7 +124,8 @@ TIME_OF_FLIGHT = RangeNoise(constant=0.008, linear=0.004)
 STRUCTURED_LIGHT = RangeNoise(quadratic=0.0015)
 """A Kinect-like camera: 1.5 mm z^2."""
 LIDAR_CAMERA = RangeNoise(constant=0.0025, linear=0.001)
-PLANAR_LASER = RangeNoise(constant=0.010)
+PLANAR_LASER = RangeNoise(constant=0.030)
+"""A beam is good to 1 cm; the legs of the model are not those in the trousers."""
 
 
 def stereo_noise(*, focal: float, baseline: float, disparity_sigma: float = 0.5) -> RangeNoise:

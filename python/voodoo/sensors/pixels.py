@@ -14,6 +14,7 @@ from voodoo.errors import MeasurementError
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _ROUND_TRIP_PX = 0.1
+_EYE = np.eye(3)
 
 
 def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:
@@ -70,7 +71,7 @@ def rigid(world_from_sensor: npt.ArrayLike) -> FloatArray:
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise MeasurementError(f"world_from_sensor: expected a finite (4, 4) array, found shape {pose.shape}")
     turn = pose[:3, :3]
-    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) or np.linalg.det(turn) < 0.0:
+    if np.abs(turn @ turn.T - _EYE).max() > 1e-4 or float(turn[0] @ np.cross(turn[1], turn[2])) < 0.0:
         raise MeasurementError(f"world_from_sensor: expected a rotation in its upper left 3x3, found {turn.tolist()}")
     return pose
 

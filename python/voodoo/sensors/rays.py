@@ -27,6 +27,7 @@ class SiteRay:
         sigma: standard deviation across the ray at the site [m].
         source: name for `Estimate.sources`.
         trust: factor of its weight, in [0, 1].
+        bias: it may always be this far off [m]; see `Frame.add_position`.
         place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
         place_sigma: standard deviation of `place` along the ray [m].
     """
@@ -37,6 +38,7 @@ class SiteRay:
     sigma: float
     source: str
     trust: float = 1.0
+    bias: float = 0.0
     place: FloatArray | None = None
     place_sigma: float = 0.04
 
@@ -44,16 +46,6 @@ class SiteRay:
         """The ray of a site that has gone on by (3,) [m] since it was seen."""
         place = None if self.place is None else self.place + shift
         return replace(self, origin=self.origin + shift, place=place)
-
-
-def beyond_bias(bias: float, distance: float) -> float:
-    """Trust, in [0, 1), of a cue that is `distance` [m] from where its site is expected and may always be `bias` [m] off.
-
-    What a detector calls a hand is not where the body model has its hand, in frame after frame the same: no number of
-    frames averages that out. Within the bias the cue says nothing; beyond it, it pulls as `1 - bias / distance`, so that
-    the force on the site is that of the part of the distance that is not bias.
-    """
-    return max(1.0 - bias / distance, 0.0) if distance > 0.0 else 0.0
 
 
 def agreed(
@@ -114,9 +106,11 @@ def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_t
     for ray in rays:
         if ray.trust >= min_trust:
             weight = model.weight(ray.sigma) * ray.trust
-            frame.add_ray(ray.site, origin=ray.origin, direction=ray.direction, weight=weight, source=ray.source)
+            frame.add_ray(
+                ray.site, origin=ray.origin, direction=ray.direction, weight=weight, bias=ray.bias, source=ray.source
+            )
             if ray.place is not None:
                 along = model.weight(ray.place_sigma) * ray.trust
-                frame.add_position(ray.site, ray.place, weight=along, source=ray.source)
+                frame.add_position(ray.site, ray.place, weight=along, bias=ray.bias, source=ray.source)
             count += 1
     return count

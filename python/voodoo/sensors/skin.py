@@ -18,7 +18,7 @@ With a depth image a region is a place in space, not only a ray.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -33,15 +33,23 @@ from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
-from voodoo.sensors.rays import SiteRay, beyond_bias
+from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
 from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
 
-Surface: TypeAlias = Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
-"""Distances of places (N, 3) from the surface of the body (N,) [m]."""
+Surface: TypeAlias = Callable[[FloatArray], Mapping[str, npt.NDArray[np.floating[Any]]]]
+"""Limb name -> distances (N,) of places (N, 3) from its surface [m]."""
+SPECK = 0.7
+"""A smaller share of a palm is a speck."""
+BARE_M = 0.08
+"""What is nearer to the bare limbs than this may be theirs."""
+BARE = ("head", "neck", "upperarm", "forearm", "hand")
+"""Endings of the names of limbs that show skin."""
+ON_LIMB_M, OFF_LIMB_M = 0.03, 0.06
+"""What is no farther than this from a limb, and this much farther from another, is of the first."""
 FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
 """The middle of a head lies this far behind its face, that of a hand behind its skin."""
 
@@ -51,7 +59,7 @@ class SkinSettings:
     """How skin regions become rays.
 
     Args:
-        sites: site -> how far [m] a region's middle may always be from it, see `beyond_bias`. A face is the front of the
+        sites: site -> how far [m] a region's middle may always be from it, see `SiteRay.bias`. A face is the front of the
             head.
         gate: a new region farther than this from the predicted site is not it [m]; one that has its name keeps it.
         lost_gate: see gate_growth [m].
@@ -132,6 +140,7 @@ class SkinTracker:
         stamp: float | None = None,
         body: BodyView | None = None,
         surface: Surface | None = None,
+        lost: Collection[str] = (),
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -144,7 +153,9 @@ class SkinTracker:
             stamp: of the picture [s]; None: 1/30 s after the last.
             body: what a depth camera saw near the body; None: not known. A candidate must then lie at about the depth
                 of its site, so that a hand hidden behind the body does not jump to what is in front.
-            surface: distances of places (N, 3) from the body's surface (N,) [m], as `Tracker.distance` gives them.
+            surface: distances of places (N, 3) from each limb's surface, limb name -> (N,) [m]; see
+                `Tracker.limb_distances`.
+            lost: sites whose limb the other sensors do not show where the body has it.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -162,9 +173,7 @@ class SkinTracker:
         if self._static is not None and self._static.shape == skin.shape:
             skin &= self._static < 0.5
         # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
-        skin = np.asarray(
-            cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool
-        )
+        skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
         self._skin = skin
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
@@ -173,17 +182,21 @@ class SkinTracker:
             return []
         focal = math.sqrt(camera.fx * camera.fy)
         nearest = min(z for _, z in places.values())
-        self.candidates = candidates(skin, palm_px=PALM_M * focal / nearest)
+        self.candidates, labels = candidates(skin, palm_px=PALM_M * focal / nearest)
         if not self.candidates:
             return []
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
         axis = pose[:3, 2]
+        regions = None if body is None else body.sample(labels)
         sights = []
         for item, direction in zip(self.candidates, directions, strict=True):
-            along = None if body is None else body.depth_at(item.pixel, 1.5 * PALM_M * focal / nearest)
-            z = nearest if along is None else along
+            looked = None
+            if body is not None and regions is not None:
+                radius = 1.5 * PALM_M * focal / nearest
+                looked = body.look_at(item.pixel, radius, among=regions == item.region)
+            z, still = (nearest, False) if looked is None else looked
             place = origin + direction * (z / float(direction @ axis))
-            sights.append(Sight(direction, place, along is not None, item.hand, item.region))
+            sights.append(Sight(direction, place, looked is not None, item.hand, item.region, still))
         seen = self.blobs.follow(sights, stamp)
         sites = list(places)
         distance = np.array(
@@ -197,10 +210,17 @@ class SkinTracker:
                 for site in sites
             ]
         )
+        limbs = {} if surface is None else surface(np.array([sight.place for sight in sights]))
+        palm = math.pi * (PALM_M * focal / nearest) ** 2
+        allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, palm=palm)
+        # A speck far from where the hand is expected is what is left of another region.
+        speck = np.array([item.area < SPECK * palm for item in self.candidates])
+        allowed[(distance > self.settings.gate) & speck] = 0.0
         found = self.blobs.name(
             seen,
             distance,
-            self._allowed(sites, sights, seen, predicted, surface),
+            allowed,
+            _elsewhere(sites, sights, limbs, lost),
             sites=sites,
             gates=dict.fromkeys(sites, self.settings.gate),
             growth=self.settings.gate_growth,
@@ -219,8 +239,8 @@ class SkinTracker:
             across = self.settings.noise.sigma(places[site][1], focal)
             sight = sights[column]
             place = self._inside(site, sight) if sight.deep else None
-            trust = beyond_bias(self.settings.sites[site], float(distance[sites.index(site), column]))
-            rays.append(SiteRay(site, origin, sight.direction, across, source, trust, place))
+            bias = self.settings.sites[site]
+            rays.append(SiteRay(site, origin, sight.direction, across, source, bias=bias, place=place))
         return rays
 
     def _inside(self, site: str, sight: Sight) -> FloatArray:
@@ -233,24 +253,27 @@ class SkinTracker:
         sights: list[Sight],
         seen: list[Blob],
         predicted: Mapping[str, FloatArray],
-        surface: Surface | None,
+        limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
+        lost: Collection[str],
+        *,
+        palm: float,
     ) -> FloatArray:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
-        A site that was lost is taken up far from where it is expected only in a region that no other site has, and which
-        the body does not explain where it is thought to be.
+        A site that was not seen is taken up far from where it is expected only in a region that no other site has, which
+        is no speck, and which the body does not explain where it is thought to be. A hand whose
+        forearm is lost may also hang before trunk or legs: those have no skin to show.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
-        away: npt.NDArray[np.floating[Any]] = np.zeros(len(sights))
-        if surface is not None:
-            away = surface(np.array([sight.place for sight in sights]))
-        far = np.array(
-            [
-                sight.deep and sight.region not in owned and outside > self.settings.unexplained
-                for sight, outside in zip(sights, away, strict=True)
-            ]
-        )
-        allowed = np.tile(1.0 + far, (len(sites), 1))
+        away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
+        outside = away > self.settings.unexplained
+        whole = [item.area > SPECK * palm for item in self.candidates]
+        free = np.array([a and b.deep and b.region not in owned for a, b in zip(whole, sights, strict=True)])
+        scene = np.array([sight.still for sight in sights]) & outside
+        bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]
+        dressed = (np.min(bare, axis=0) if bare else away) > BARE_M
+        far = np.array([free & (outside | (dressed if site in lost else False)) for site in sites])
+        allowed = np.where(scene, 0.0, 1.0 + far)
         for row, site in enumerate(sites):
             side = site[0]
             shoulder = predicted.get(f"{side}_shoulder")
@@ -263,7 +286,7 @@ class SkinTracker:
                 allowed[row] *= [not sight.deep or d < reach for sight, d in zip(sights, distance, strict=True)]
             elbow = predicted.get(f"{side}_elbow")
             if elbow is not None:
-                allowed[row] *= _hand_ends(sights, predicted[site], elbow)
+                allowed[row] *= _hand_ends(sights, None if site in lost else predicted[site], elbow)
         return allowed
 
     def learn(
@@ -302,22 +325,23 @@ class SkinTracker:
                 cv2.circle(place, centre, max(round(0.8 * radius), 1), 1, -1)
                 inside.append(place.astype(bool))
         self._pictures += 1
+        away = near == 0
         if self._seen is not None:
-            self._learn_static(self._seen, ~near.astype(bool), rate_hz)
+            self._learn_static(self._seen, away, rate_hz)
         # Light does not change from picture to picture; learning is the dearest part.
         if self.settled and self._pictures % self.settings.learn_every:
             return
         known = self._colours
         colours = known[1] if known is not None and known[0] is image else Colours.of(image)
-        if self.colour.learn(colours, inside, outside=~near.astype(bool), body=self._body):
+        if self.colour.learn(colours, inside, outside=away, body=self._body):
             self._learnt += 1
 
     def _learn_static(self, seen: Mask, away: Mask, rate_hz: float) -> None:
         """A running mean of "skin's colour, and no head or hand near": half of it is reached after static_seconds."""
         if self._static is None or self._static.shape != seen.shape:
             self._static = np.zeros(seen.shape, dtype=np.float32)
-        share = np.float32(1.0 - 0.5 ** (1.0 / (self.settings.static_seconds * rate_hz)))
-        self._static += away * share * (seen - self._static)
+        share = 1.0 - 0.5 ** (1.0 / (self.settings.static_seconds * rate_hz))
+        cv2.accumulateWeighted(seen.view(np.uint8), self._static, share, mask=away.view(np.uint8))
 
     def _places(
         self, camera: Camera, pose: FloatArray, positions: Mapping[str, npt.NDArray[np.float64]]
@@ -344,9 +368,32 @@ def _reach(side: str, predicted: Mapping[str, FloatArray]) -> float:
     return 1.2 * float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(hand - elbow)) + 0.15
 
 
-def _hand_ends(sights: list[Sight], hand: FloatArray, elbow: FloatArray) -> list[bool]:
+def _elsewhere(
+    sites: list[str],
+    sights: list[Sight],
+    limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
+    lost: Collection[str],
+) -> npt.NDArray[np.bool_]:
+    """(S, B): whether a sight is the surface of a limb other than a hand's own forearm, of a bare one if that is lost."""
+    result = np.zeros((len(sites), len(sights)), dtype=np.bool_)
+    deep = np.array([sight.deep for sight in sights])
+    for row, site in enumerate(sites):
+        own = [name for name in limbs if name.startswith(site[0]) and name.endswith(("forearm", "hand"))]
+        if not own or site.startswith("head"):
+            continue
+        names = [name for name in limbs if name not in own and (site not in lost or name.endswith(BARE))]
+        others = np.min([limbs[name] for name in names], axis=0, initial=np.inf)
+        own_away = np.min([limbs[name] for name in own], axis=0)
+        result[row] = deep & (others < ON_LIMB_M) & (own_away > others + OFF_LIMB_M)
+    return result
+
+
+def _hand_ends(sights: list[Sight], hand: FloatArray | None, elbow: FloatArray) -> list[bool]:
     """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region."""
-    towards = [float(np.linalg.norm(item.place - hand) - np.linalg.norm(item.place - elbow)) for item in sights]
+    towards = [
+        (0.0 if hand is None else float(np.linalg.norm(item.place - hand))) - float(np.linalg.norm(item.place - elbow))
+        for item in sights
+    ]
     least: dict[int, float] = {}
     for item, value in zip(sights, towards, strict=True):
         if item.hand:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter1d
 
 ByteImage = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
@@ -19,7 +19,7 @@ LUMA_BINS, CHROMA_BINS = 8, 64
 hue."""
 _SHAPE = (LUMA_BINS, CHROMA_BINS, CHROMA_BINS)
 _SIZE = LUMA_BINS * CHROMA_BINS**2
-_SMOOTHING = (0.7, 0.8, 0.8)
+_SMOOTHING = (0.7, 0.8)
 
 _IN_COMMON = 0.1
 """Two places that share less of their colours than this do not both show skin."""
@@ -91,25 +91,42 @@ class SkinColour:
         places = [place for place in places if len(place) >= 8]
         if len(places) < 2 or sum(len(place) for place in places) < 20:
             return False
-        shown = np.sort([_histogram(place) for place in places], axis=0)[-2]
+        most, shown = np.zeros(_SHAPE, np.float32), np.zeros(_SHAPE, np.float32)
+        for place in places:
+            shares = _smoothed(_shares(place))
+            np.maximum(shown, np.minimum(most, shares), out=shown)
+            np.maximum(most, shares, out=most)
         total = float(shown.sum())
         if total < _IN_COMMON:
             return False
         # The first pictures make the general skin this person's; later ones follow slowly.
         keep = np.float32(self.forgetting if self._pictures >= 5 else 0.5)
         self.skin = keep * self.skin + (1 - keep) * (shown / np.float32(total))
-        rest = _histogram(bins[outside])
+        rest = _shares(bins[outside])
         if body is not None and (clothes := outside & body).any():
-            rest = 0.5 * rest + 0.5 * _histogram(bins[clothes])
+            rest = 0.5 * rest + 0.5 * _shares(bins[clothes])
         # A colour seen nowhere yet is not skin.
-        rest = 0.95 * rest + np.float32(0.05 / _SIZE)
+        rest = 0.95 * _smoothed(rest) + np.float32(0.05 / _SIZE)
         self.rest = keep * self.rest + (1 - keep) * rest
         self._pictures += 1
         return True
 
 
-def _histogram(bins: npt.NDArray[np.int32]) -> Histogram:
-    """Share of each bin, smoothed: the colours between those seen count too."""
+def _shares(bins: npt.NDArray[np.int32]) -> Histogram:
+    """Share of each bin."""
     counts = np.bincount(bins, minlength=_SIZE).reshape(_SHAPE).astype(np.float32)
-    counts = gaussian_filter(counts, _SMOOTHING, truncate=2.5)
-    return np.asarray(counts / max(float(counts.sum()), 1.0), dtype=np.float32)
+    return np.asarray(counts / np.float32(max(len(bins), 1)))
+
+
+def _smoothed(shares: Histogram) -> Histogram:
+    """A smoothed histogram: the colours between those seen count too."""
+    across = _LUMA_KERNEL @ (_CHROMA_KERNEL @ shares @ _CHROMA_KERNEL.T).reshape(LUMA_BINS, -1)
+    return np.asarray(across.reshape(_SHAPE))
+
+
+def _kernel(bins: int, sigma: float) -> npt.NDArray[np.float32]:
+    """Smoothing as a matrix: some small products are ten times as fast as filters along three axes."""
+    return np.asarray(gaussian_filter1d(np.eye(bins), sigma, axis=0, truncate=2.5), dtype=np.float32)
+
+
+_LUMA_KERNEL, _CHROMA_KERNEL = _kernel(LUMA_BINS, _SMOOTHING[0]), _kernel(CHROMA_BINS, _SMOOTHING[1])

@@ -13,6 +13,7 @@ from scipy.ndimage import maximum_filter1d
 from voodoo.sensors.pixels import FloatArray
 
 Mask = npt.NDArray[np.bool_]
+Labels = npt.NDArray[np.int32]
 
 PALM_M, FACE_M = 0.045, 0.085
 """Radii of a palm and of a face."""
@@ -37,7 +38,7 @@ class Candidate:
     hand: bool = True
 
 
-def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
+def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
     """Where in a skin mask (H, W) a head or a hand may be.
 
     Regions with less than a fifth of a palm's area are noise. Each other one offers its middle, unless it is larger
@@ -47,28 +48,37 @@ def candidates(skin: Mask, *, palm_px: float) -> list[Candidate]:
     Args:
         skin: True where the colour is skin's.
         palm_px: radius of a palm in the image [px].
+
+    Returns:
+        The candidates, and the number of its region in each pixel (H, W).
     """
     smallest = max(0.2 * math.pi * palm_px**2, 6.0)
     largest = 4.0 * math.pi * (FACE_M / PALM_M * palm_px) ** 2
-    count, labels, stats, centres = cv2.connectedComponentsWithStats(skin.astype(np.uint8), connectivity=8)
-    found = []
+    pixels = skin.view(np.uint8)
+    x, y, w, h = cv2.boundingRect(pixels)
+    regions = np.zeros(skin.shape, dtype=np.int32)
+    found: list[Candidate] = []
+    if not (w and h):
+        return found, regions
+    count, labels, stats, centres = cv2.connectedComponentsWithStats(pixels[y : y + h, x : x + w], connectivity=8)
+    regions[y : y + h, x : x + w] = labels
     for region in range(1, count):
         left, top, width, height, area = (int(value) for value in stats[region])
         if not smallest <= area <= largest:
             continue
         extent = math.hypot(width, height)
-        middle = (float(centres[region][0]), float(centres[region][1]))
+        middle = (float(centres[region][0]) + x, float(centres[region][1]) + y)
         found.append(Candidate(middle, region, area, hand=extent <= LONGEST_HAND * palm_px))
         if extent > LONGEST_HAND * palm_px:
             mask = labels[top : top + height, left : left + width] == region
             for u, v in _tips(mask, palm_px):
-                found.append(Candidate((u + left, v + top), region, area))
-    return found
+                found.append(Candidate((u + left + x, v + top + y), region, area))
+    return found, regions
 
 
 def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
     """Middles of the parts of a region around its tips, farthest first, at most four."""
-    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = max(contours, key=len).reshape(-1, 2).astype(np.float64)
     rows, columns = np.nonzero(mask)
     pixels = np.column_stack([columns, rows]).astype(np.float64)

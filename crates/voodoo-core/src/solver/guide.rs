@@ -6,6 +6,7 @@
 use super::{ChainSolver, Problem};
 use crate::body::Body;
 use crate::chain::{joint_turn, place};
+use crate::correspondence::SitePair;
 use crate::geometry::Pose;
 use crate::normal::Normal;
 use crate::terms::{Limits, Prior, Sites, Term};
@@ -30,9 +31,32 @@ pub struct Guide {
     start: Vec<Pose>,
     closed: Vec<Pose>,
     before: Vec<Pose>,
+    moved: Vec<Pose>,
+    /// The limbs that are led.
+    led: Vec<bool>,
 }
 
 impl Guide {
+    /// Makes all limbs follow the sites; false without any.
+    pub fn leads_all(&mut self, problem: &Problem) -> bool {
+        self.led.clear();
+        self.led.resize(problem.body.limbs().len(), true);
+        !problem.correspondences.sites.is_empty()
+    }
+
+    /// Whether sites farther than `from` metres from where they were seen lead their limbs alone in this frame.
+    pub fn leads(&mut self, problem: &Problem, from: f64) -> bool {
+        if problem.step == 0 {
+            let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
+            self.led.clear();
+            self.led.resize(problem.body.limbs().len(), false);
+            for pair in problem.correspondences.sites.iter().filter(far) {
+                lead_from(problem.body, pair.limb, &mut self.led);
+            }
+        }
+        self.led.contains(&true)
+    }
+
     /// One step: the limbs move as those of a body with closed joints would; gaps that the bands left stay as they are.
     pub fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let Problem { body, correspondences, config, .. } = problem;
@@ -60,6 +84,18 @@ impl Guide {
         }
         self.before.clone_from(&self.closed);
         self.chain.step(body, &self.normal, DAMPING, &mut self.closed);
+        // The others stay where they were.
+        self.moved.clone_from(&self.closed);
+        for (limb, part) in body.limbs().iter().enumerate() {
+            self.closed[limb] = match &part.parent {
+                Some((parent, joint)) if self.led[limb] => {
+                    let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
+                    place(joint, &self.closed[*parent], turn)
+                }
+                None if self.led[limb] => self.moved[limb],
+                _ => self.before[limb],
+            };
+        }
         for ((pose, before), after) in poses.iter_mut().zip(&self.before).zip(&self.closed) {
             *pose = *after * before.inverse() * *pose;
             pose.rotation = pose.rotation.normalize();
@@ -74,5 +110,16 @@ fn close(body: &Body, poses: &mut [Pose]) {
             let turn = joint_turn(joint, &poses[*parent], &poses[index]);
             poses[index] = place(joint, &poses[*parent], turn);
         }
+    }
+}
+
+/// Marks the limbs from `limb` to the first whose parent carries several.
+fn lead_from(body: &Body, limb: usize, led: &mut [bool]) {
+    let mut next = Some(limb);
+    while let Some(limb) = next {
+        let Some((parent, _)) = &body.limbs()[limb].parent else { break };
+        led[limb] = true;
+        let carried = body.limbs().iter().filter(|other| other.parent.as_ref().is_some_and(|(limb, _)| limb == parent));
+        next = (carried.count() == 1).then_some(*parent);
     }
 }

@@ -46,7 +46,7 @@ impl Solver for Limbwise {
     }
 
     fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        if problem.correspondences.sites.is_empty() {
+        if !self.guide.leads_all(problem) {
             return false;
         }
         self.guide.step(problem, poses);

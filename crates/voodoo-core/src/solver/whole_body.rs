@@ -1,7 +1,7 @@
 //! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Problem, Solver, TreeSolver};
+use super::{ChainSolver, Gate, Guide, Problem, Solver, TreeSolver};
 use crate::body::Pair;
 use crate::config::Config;
 use crate::geometry::Pose;
@@ -24,6 +24,11 @@ const SHOWN: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
+/// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
+const SITE_SCALE: f64 = 0.15;
+/// Sites farther than this from their measurement lead the chain before the points are assigned, metres; rounds of it.
+const LED_FROM: f64 = 0.25;
+const LEAD: usize = 4;
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
 
@@ -40,6 +45,7 @@ pub struct WholeBody {
     /// Moves the limbs instead of the chain, if there.
     tree: Option<TreeSolver>,
     lengths: Lengths,
+    guide: Guide,
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
@@ -58,6 +64,15 @@ impl Solver for WholeBody {
         self.sum_terms(problem, poses);
         let Self { normal, chain, lengths, .. } = self;
         chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
+    }
+
+    fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+        // From so far, points that are thought to lie on the limb where it was would hold it there.
+        if self.tree.is_some() || !self.guide.leads(problem, LED_FROM) {
+            return false;
+        }
+        self.guide.step(problem, poses);
+        problem.step + 1 < LEAD
     }
 
     fn gate(&self, config: &Config, step: usize) -> Gate {
@@ -113,7 +128,7 @@ impl WholeBody {
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
         let terms: [&dyn Term; 5] = [
             &Surface { correspondences, information, slide: SLIDE, scale },
-            &Sites { correspondences, information, scale: 3.0 * scale },
+            &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE) },
             &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
             &Prior { predicted, root, joints: &self.joint_sigmas },
             &Limits { sigma: LIMIT_SIGMA },

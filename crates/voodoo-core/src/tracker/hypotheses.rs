@@ -295,7 +295,7 @@ impl Tracker {
         cost
     }
 
-    /// Cost of broken joint limits and of motion since the last frame, in unexplained patches.
+    /// Cost of broken joint limits, of missed sites and of motion since the last frame, in unexplained patches.
     fn strain(&self, chain: &TwoBone, poses: &[Pose]) -> f64 {
         let mut cost = 0.0;
         for limb in [chain.upper, chain.lower] {
@@ -314,7 +314,7 @@ impl Tracker {
                 cost += moved * moved;
             }
         }
-        cost + self.inside(chain, poses)
+        cost + self.inside(chain, poses) + self.sites_missed(chain, poses)
     }
 }
 
