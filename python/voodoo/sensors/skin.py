@@ -306,7 +306,9 @@ class SkinTracker:
         Raises:
             MeasurementError: the image is not of the camera's size.
         """
-        if estimate.status != "tracking":
+        # The first picture shows the pose that was set, for which the caller vouches; without it a colour camera alone would
+        # never begin.
+        if estimate.status != "tracking" and self._pictures > 0:
             return
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
