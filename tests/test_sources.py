@@ -262,3 +262,8 @@ def test_the_examples_of_the_documentation_run(capsys):
     for block in (block for block in chosen if "Viewer" not in block):
         exec(block, names)
     assert "matched" in capsys.readouterr().out.splitlines()[-1]
+
+
+def test_a_colour_camera_alone_begins():
+    _, estimates = run(use=("skin",))
+    assert sum(of(estimate, "color") is not None for estimate in estimates) > FRAMES / 4

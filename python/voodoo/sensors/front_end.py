@@ -119,6 +119,7 @@ class FrontEnd:
         self.frozen: tuple[str, ...] = ()
         self._contents: dict[str, npt.NDArray[Any]] = {}
         self._scenes: dict[str, StillDepth] = {}
+        self._steps = 0
         self._predictor = SitePredictor()
         chosen = self.settings
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
@@ -135,7 +136,11 @@ class FrontEnd:
         self._predictor.update(recorded.stamp, estimate.joints)
         for item in recorded.measurements:
             if isinstance(item, ColorImage) and item.sensor in self.skin:
-                self.skin[item.sensor].learn(item.image, item.camera, item.root_from_sensor, estimate)
+                # The first frame shows the pose that was set; without it a colour camera alone would never begin.
+                self.skin[item.sensor].learn(
+                    item.image, item.camera, item.root_from_sensor, estimate, vouched=self._steps == 0
+                )
+        self._steps += 1
         return estimate
 
     def frame(self, recorded: RecordedFrame) -> voodoo.Frame:

@@ -297,16 +297,23 @@ class SkinTracker:
         estimate: Estimate,
         *,
         rate_hz: float = 30.0,
+        vouched: bool = False,
     ) -> None:
         """Learn colours and background from a picture and the estimate of its time; only while tracking is good.
 
         Colours are learnt around the sites that were matched (all of them before the cue has settled), and only from
         pixels that were skin already, or nearly: the hair on a head seen from behind is not skin.
 
+        Args:
+            image, camera, world_from_sensor: as in `observe`.
+            estimate: of the picture's time.
+            rate_hz: of the pictures.
+            vouched: the pose is right whatever the status says: somebody set it.
+
         Raises:
             MeasurementError: the image is not of the camera's size.
         """
-        if estimate.status != "tracking":
+        if estimate.status != "tracking" and not vouched:
             return
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
