@@ -64,10 +64,15 @@ pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
-    let sight = camera_from_limb.inverse_transform_vector(camera_from_limb * tip);
-    if limb.match_caps[1] && sight.with_z(0.0).length() > ASLANT * sight.length() {
-        let thickness = shape.a1().max(shape.b1());
-        look(Vec3::ZERO, Vec3::Z, shape.length(), thickness, tip, TIP_REACH);
+    let sight = camera_from_limb.inverse_transform_vector(-(camera_from_limb * tip)).normalize_or(Vec3::X);
+    let across = sight.with_z(0.0).length();
+    if limb.match_caps[1] && across > ASLANT {
+        // Seen aslant, the cap's rim stands out beyond its middle.
+        let ahead = sight.with_z(0.0) / across;
+        let radius = (shape.a1() * ahead.x).hypot(shape.b1() * ahead.y);
+        let foot = tip - ahead * (radius * sight.z.signum());
+        let rim = shape.length() + radius * sight.z.abs() / across;
+        look(Vec3::ZERO, Vec3::Z, rim, shape.a1().max(shape.b1()), foot, TIP_REACH);
     }
 }
 

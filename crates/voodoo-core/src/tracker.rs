@@ -345,7 +345,8 @@ impl Tracker {
                     });
                 }
                 if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
-                    self.body.change_tip(limb, (tip.seen / tip.rim).clamp(0.8, 1.25));
+                    let longer = 1.0 + (tip.seen - tip.rim) / shape.length();
+                    self.body.change_tip(limb, longer.clamp(0.8, 1.25));
                 }
                 let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
                 let (sum, step) = total.then(&step);
