@@ -26,6 +26,8 @@ const REFINE: usize = 8;
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
+/// A new configuration that costs more than this, and more than the old one, is no pose of a body.
+const STRAINED: f64 = 40.0;
 /// Places along a limb that are looked at, and how deep (metres) one lies in another limb when it is inside.
 const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const INSIDE: f64 = 0.01;
@@ -243,6 +245,7 @@ impl Tracker {
     /// Refines the kept hypothesis with the whole body and takes it when it explains the frame better as a whole.
     fn refine(&mut self, index: usize, frame: &Frame, pace: f64, work: &mut Hypotheses) -> usize {
         let before = self.overall_score(frame);
+        let strained = self.strain(&self.chains[index], &self.poses).max(STRAINED);
         work.trial.clone_from(&self.poses);
         self.poses.clone_from(&work.kept);
         // The prediction spoke for the old configuration; the new one is what is expected now.
@@ -256,7 +259,8 @@ impl Tracker {
         if self.overall_score(frame) < before - GAIN {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
             // What is as suspect as before is not worth a jump.
-            if !self.suspect(&self.chains[index], views, work)[0] {
+            let strain = self.strain(&self.chains[index], &self.poses);
+            if strain <= strained && !self.suspect(&self.chains[index], views, work)[0] {
                 return REFINE;
             }
         }
