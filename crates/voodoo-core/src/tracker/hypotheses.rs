@@ -12,11 +12,11 @@ use crate::view::Views;
 
 /// So many unexplained patches near a chain make it suspect.
 const SUSPICIOUS: f64 = 25.0;
-/// A chain is idle when the patches that it alone explains are a smaller share of those it shows, counted as this many at
-/// least, for so many frames.
+/// A chain is idle when the patches that it alone explains are a smaller share of those it shows.
 const IDLE: f64 = 0.3;
-/// It is refuted when cameras see past such a share of it.
+/// It is refuted when cameras see past a larger share of it.
 const REFUTED: f64 = 0.2;
+/// Either share is of this many patches at least, and has to last for so many frames.
 const LEAST: f64 = 20.0;
 const PATIENCE: usize = 3;
 /// A hypothesis must explain so many patches more than the current pose.
@@ -35,7 +35,7 @@ const INSIDE: f64 = 0.01;
 const TARGETS: usize = 5;
 const HEAP: f64 = 0.08;
 const STRAY: f64 = 3.0;
-/// The same while a hypothesis is rough, metres.
+/// A rough hypothesis explains points up to this distance, metres: they are drawn in when it is refined.
 const ROUGHLY: f64 = 0.08;
 /// Points looked at when hypotheses are compared, at most.
 const SAMPLE: usize = 400;
@@ -84,12 +84,20 @@ impl Tracker {
         work.open_weight.clear();
         work.near.clear();
         work.near_weight.clear();
+        work.own.clear();
+        work.own_weight.clear();
+        work.others.clear();
+        work.distances.clear();
         // Room for the worst case at once, not when the first hard frame comes.
         let most = self.candidates.len();
         work.open.reserve(most);
         work.open_weight.reserve(most);
         work.near.reserve(most);
         work.near_weight.reserve(most);
+        work.own.reserve(most);
+        work.own_weight.reserve(most);
+        work.others.reserve(most);
+        work.distances.reserve(most);
         work.best.clear();
         work.best.resize(self.candidates.len(), f32::INFINITY);
         for matches in &self.correspondences.limbs {
