@@ -12,7 +12,7 @@ from voodoo import _core
 from voodoo.body import Body
 from voodoo.errors import MeasurementError
 from voodoo.ik.image import Silhouette
-from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, named, vector
+from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, vector
 
 
 class Chain:
@@ -103,11 +103,17 @@ class Chain:
         margin: float = 1.1,
         thin: float = 1.7,
         bones: Sequence[Bone] | None = None,
+        others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> tuple[float, FloatArray]:
         """The image criterion h [px] and its gradient (n,) (J10 eq. 5, 8); see `solve` for the arguments."""
         views = [image.core for image in images if not image.empty]
         return self._core.criterion(
-            base_pose(world_from_base), vector(angles), listed_bones(bones), (margin, thin), views
+            base_pose(world_from_base),
+            vector(angles),
+            listed_bones(bones),
+            (margin, thin),
+            views,
+            listed_poses(others),
         )
 
     def __repr__(self) -> str:

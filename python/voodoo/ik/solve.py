@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from voodoo.ik.image import Silhouette
 from voodoo.ik.options import Options, chosen_options
 from voodoo.ik.posture import Posture, Postures
 from voodoo.ik.targets import Target, Targets, target_parts
-from voodoo.ik.values import FloatArray, base_pose, listed_bones, named, vector
+from voodoo.ik.values import FloatArray, base_pose, listed_bones, listed_poses, named, vector
 
 
 def solve(
@@ -25,6 +25,7 @@ def solve(
     images: Sequence[Silhouette] = (),
     start: npt.ArrayLike | Posture | None = None,
     world_from_base: npt.ArrayLike | None = None,
+    others: Mapping[str, npt.ArrayLike] | None = None,
     options: Options | None = None,
     **changes: Any,  # noqa: ANN401 - the fields of Options
 ) -> Posture:
@@ -40,11 +41,13 @@ def solve(
         start: angles (n,) or a posture to start from; None: at rest.
         world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
             chosen limbs; None: identity.
+        others: limbs of the body that are not on the chain, as far as they are known: name -> rigid (4, 4) pose, e.g.
+            `world_from_limb` of the posture of the other leg. With images no bone of the chain shall lie in them.
         options: see Options.
         **changes: single fields of Options, e.g. `steps=30, margin=0.0`.
 
     Raises:
-        BodyError: a site that is not on the chain.
+        BodyError: a site that is not on the chain, or another limb that is, or is not in the body.
         MeasurementError: a number that cannot be used; it says which.
     """
     chain = chain if isinstance(chain, Chain) else Chain(chain)
@@ -58,6 +61,7 @@ def solve(
         listed_bones(options.bones),
         (options.margin, options.thin),
         views,
+        listed_poses(others),
         options.parts(),
     )
     return Posture(
@@ -151,6 +155,7 @@ class Follower:
         *,
         images: Sequence[Silhouette] = (),
         world_from_base: npt.ArrayLike | None = None,
+        others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> Posture:
         """The next posture; see `solve`. A refused call leaves the follower where it was."""
         posture = solve(
@@ -159,6 +164,7 @@ class Follower:
             images=images,
             start=self.angles,
             world_from_base=world_from_base,
+            others=others,
             options=self.options,
         )
         self.angles = posture.angles

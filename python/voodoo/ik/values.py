@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -27,6 +27,11 @@ def listed_bones(bones: Sequence[Bone] | None) -> list[Bone] | None:
 def named(names: Sequence[str], values: FloatArray) -> MappingProxyType[str, FloatArray]:
     """Name -> row of values."""
     return MappingProxyType(dict(zip(names, values, strict=True)))
+
+
+def listed_poses(poses: Mapping[str, npt.ArrayLike] | None) -> list[tuple[str, FloatArray]]:
+    """Name and pose (4, 4) of limbs; the core checks them."""
+    return [(name, np.asarray(pose, dtype=np.float64)) for name, pose in (poses or {}).items()]
 
 
 def base_pose(pose: npt.ArrayLike | None) -> FloatArray:
