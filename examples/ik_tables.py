@@ -50,6 +50,10 @@ class Rendered:
     def __post_init__(self) -> None:
         self.scene = StillScene(self.depths)
 
+    def side_pose(self, frame: int) -> np.ndarray:
+        """Pose (4, 4) of the second camera: 3 m to the side of the root."""
+        return side_pose(self.truth["humanoid_root"][frame])
+
     def front(self, frame: int, last: Mapping[str, np.ndarray]) -> ik.Silhouette:
         """The person cut out by depth: what hangs together with the known joints and the last estimates."""
         depth = self.depths[frame]
@@ -77,10 +81,7 @@ def rendered(path: Path) -> Rendered:
         joints = {name: places[index] for name, places in truth.items()}
         estimate = tracker.reset(joints=joints, fit_sizes=index == 0)
         estimate = tracker.reset_pose(limbs_along(joints, estimate))
-        # Optical axis towards -y of the root frame, x to the front's left, y down.
-        pose = np.eye(4)
-        pose[:3, :3] = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
-        pose[:3, 3] = truth["humanoid_root"][index] + np.array((0.0, 3.0, 0.2))
+        pose = side_pose(joints["humanoid_root"])
         view = CameraView(SIDE_CAMERA, pose)
         mask = silhouette(tracker.body, estimate, view, width=SIDE_CAMERA.width, height=SIDE_CAMERA.height).astype(
             np.uint8
@@ -91,6 +92,14 @@ def rendered(path: Path) -> Rendered:
             cv2.line(mask, *np.rint(line).astype(int).tolist(), 1, 10)
         side.append(ik.Silhouette(mask, camera=SIDE_CAMERA, world_from_camera=pose))
     return Rendered(recording.name, height, truth, depths, side)
+
+
+def side_pose(root: np.ndarray) -> np.ndarray:
+    """A camera's pose (4, 4) beside the root (3,): optical axis towards -y of the root frame, y down."""
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
+    pose[:3, 3] = root + np.array((0.0, 3.0, 0.2))
+    return pose
 
 
 def limbs_along(joints: Mapping[str, np.ndarray], estimate: voodoo.Estimate) -> dict[str, np.ndarray]:

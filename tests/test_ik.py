@@ -265,6 +265,48 @@ def test_no_elbow_in_the_trunk(arm):
     assert all(arm.criterion(row, [image], margin=0.0)[0] == 0.0 for row in angles)  # J10's criterion knows no trunk
 
 
+def test_a_view_that_is_content_changes_no_step(arm):
+    camera, pose = front_camera(0.4)
+    v, u = np.mgrid[:120, :160]
+    narrow = ik.Silhouette((np.abs(u - 40) < 4) & (np.abs(v - 70) < 35), camera=camera, world_from_camera=pose)
+    content = ik.Silhouette(np.ones((120, 160)), camera=camera, world_from_camera=pose)
+    goal = {"l_hand": shoulder(arm) + np.array([0.3, 0.05, -0.2])}
+    one = ik.solve(arm, goal, images=[narrow], margin=0.0, steps=4)
+    two = ik.solve(arm, goal, images=[narrow, content], margin=0.0, steps=4)
+    assert one.h > 0.1 and two.images == 2
+    assert two.h == pytest.approx(0.5 * one.h, rel=1e-6)
+    assert two.angles == pytest.approx(one.angles, abs=1e-9)
+
+
+def test_no_bone_in_a_limb_beside_the_chain():
+    body = voodoo.Body.human(1.75, model="papers")
+    legs = {side: ik.Chain(body, limbs=(f"{side}_thigh", f"{side}_calf")) for side in "lr"}
+    camera, pose = front_camera(-0.4)
+    everything = ik.Silhouette(np.ones((120, 160)), camera=camera, world_from_camera=pose)
+    right = np.array([0.5, 0.0, 0.0, 0.9])
+    poses, sites = legs["r"].forward(right)
+    # The left leg as it was, with its knee where the right one is.
+    angles = ik.solve(legs["l"], {"l_knee": sites["r_knee"]}, start=[0.5, 0.0, 0.0, 0.9], steps=60).angles
+    alone = legs["l"].criterion(angles, [everything])[0]
+    h, gradient = legs["l"].criterion(angles, [everything], others=poses)
+    assert alone == 0.0 and h > 0.5
+    numeric = [
+        (legs["l"].criterion(angles + step, [everything], others=poses)[0]
+         - legs["l"].criterion(angles - step, [everything], others=poses)[0]) / 2e-6
+        for step in np.eye(4) * 1e-6
+    ]  # fmt: skip
+    assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-3)
+    ankle = legs["l"].forward(angles)[1]["l_ankle"]
+    found = ik.Follower(legs["l"], start=angles).step({"l_ankle": ankle}, images=[everything], others=poses)
+    assert found.residuals[0] < 1e-6 and found.h < 0.5 * h
+    with pytest.raises(voodoo.BodyError, match="not on the chain, found"):
+        ik.solve(legs["l"], {}, others={"l_calf": np.eye(4)})
+    with pytest.raises(voodoo.BodyError, match="l_fin"):
+        ik.solve(legs["l"], {}, others={"l_fin": np.eye(4)})
+    with pytest.raises(voodoo.MeasurementError, match="others"):
+        ik.solve(legs["l"], {}, others={"r_calf": np.ones((4, 4))})
+
+
 def test_batch_equals_single(arm):
     rng = np.random.default_rng(3)
     goals = shoulder(arm) + rng.uniform(-0.4, 0.4, (20, 1, 3))

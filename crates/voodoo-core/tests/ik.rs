@@ -8,8 +8,8 @@ use voodoo_core::body::HumanModel;
 use voodoo_core::chain::exp;
 use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::ik::{
-    Aim, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, View, bones, level_rows, log, project,
-    trunk,
+    Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, View, bones, level_rows, log, project,
+    Trunk, trunk,
 };
 use voodoo_core::normal::{LimbBlock, line};
 
@@ -113,8 +113,11 @@ proptest! {
         let view = View { distance: &image, thickness: &thickness, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
-        let trunk = trunk(&body, &model);
+        let mut trunk = trunk(&body, &model);
         prop_assert_eq!(trunk.len(), 2);
+        // A limb beside the chain, through the body's middle.
+        let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
+        trunk.push(Trunk::new(&body.limbs()[0].shape, Carrier::World(beside)));
         let criterion = Criterion { views: &[view, view], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);

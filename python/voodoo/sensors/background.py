@@ -126,7 +126,9 @@ class StillBackground:
         _check(picture, self._shape)
         smooth = _smooth(picture)
         differs = cv2.absdiff(smooth, self._background).max(axis=2) > self._threshold
-        differs |= np.linalg.norm(_colours(smooth) - self._colours, axis=2) > self._chroma
+        # A low threshold: smoothing carries vivid colours a pixel beyond their border.
+        colourful = np.linalg.norm(_colours(smooth) - self._colours, axis=2) > self._chroma
+        differs |= cv2.erode(colourful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
         return _large(differs.astype(np.uint8), self._smallest)
 
 
