@@ -344,12 +344,43 @@ def test_follower_starts_from_the_last_posture(arm):
         (lambda arm: ik.Target.on_ray("l_hand", origin=(0, 0, 0), direction=(0, 0, 0)), "direction"),
         (lambda arm: ik.Chain(arm.body, limbs=("l_forearm", "r_forearm")), "hang together"),
         (lambda arm: ik.Chain(arm.body, root="loose"), "root"),
+        (lambda arm: ik.Chain(arm.body, limbs="l_forearm"), "list of names"),
+        (lambda arm: ik.solve("arm", {}), "chain: expected"),
+        (lambda arm: ik.solve(arm, "l_hand"), "targets: expected"),
+        (lambda arm: ik.solve(arm, ik.Target.at("l_hand", (0, 0, 0))), "targets: expected"),
+        (lambda arm: ik.solve(arm, [("l_hand", (0, 0, 0))]), "list of Target"),
+        (lambda arm: ik.solve(arm, {3: (0, 0, 0)}), "names of sites"),
+        (lambda arm: ik.solve(arm, {}, start="rest"), "angles: expected numbers"),
+        (lambda arm: ik.solve(arm, {}, world_from_base="here"), "world_from_base: expected numbers"),
+        (lambda arm: ik.solve(arm, {}, images=np.ones((120, 160))), "list of ik.Silhouette"),
+        (lambda arm: ik.solve_many(arm, ["l_hand"], np.zeros((2, 1, 3)), images=[None]), "list of ik.Silhouette"),
+        (lambda arm: arm.criterion(arm.rest(), [3]), "list of ik.Silhouette"),
+        (lambda arm: ik.solve(arm, {}, options={"steps": 3}), "ik.Options"),
+        (lambda arm: ik.solve(arm, {}, others=["l_calf"]), "others: expected"),
+        (lambda arm: ik.Options(bones=(("l_elbow", "l_hand"),)), "site, site, radius"),
+        (lambda arm: ik.Options(bones=(("l_elbow", "l_hand", float("nan")),)), "radius of at least 0"),
+        (lambda arm: ik.Target.at("l_hand", (0, 0, 0), weight="heavy"), "weight"),
+        (lambda arm: ik.Silhouette(np.ones((120, 160)), camera=None, world_from_camera=np.eye(4)), "camera"),
+        (
+            lambda arm: ik.Silhouette(
+                np.full((120, 160), np.nan), camera=front_camera()[0], world_from_camera=np.eye(4)
+            ),
+            "finite",
+        ),
         (lambda arm: ik.Silhouette(np.zeros((3, 3)), camera=front_camera()[0], world_from_camera=np.eye(4)), "mask"),
     ],
 )
 def test_bad_input_is_named(arm, call, words):
     with pytest.raises(voodoo.VoodooError, match=words):
         call(arm)
+
+
+def test_the_example_of_the_documentation_runs():
+    text = (EXAMPLES.parent / "docs" / "ik.md").read_text(encoding="utf-8")
+    camera, pose = front_camera()
+    names = {"mask": np.ones((120, 160)), "camera": camera, "pose": pose, "hand": (0.3, 0.2, 0.1), "thorax": np.eye(4)}
+    exec(text.split("```python\n")[1].split("```")[0], names)
+    assert names["posture"].images == 1 and len(names["posture"].angles) == 7
 
 
 def test_joint_angles_of_an_estimate(tmp_path):

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from voodoo.body import Body
 from voodoo.errors import MeasurementError
 from voodoo.ik.chain import Chain
-from voodoo.ik.image import Silhouette
+from voodoo.ik.image import Silhouette, seen_views
 from voodoo.ik.options import Options, chosen_options
 from voodoo.ik.posture import Posture, Postures
 from voodoo.ik.targets import Target, Targets, target_parts
@@ -50,9 +50,9 @@ def solve(
         BodyError: a site that is not on the chain, or another limb that is, or is not in the body.
         MeasurementError: a number that cannot be used; it says which.
     """
-    chain = chain if isinstance(chain, Chain) else Chain(chain)
+    chain = _chain(chain)
     options = chosen_options(options, changes)
-    views = [image.core for image in images if not image.empty]
+    views = seen_views(images)
     begin = start.angles if isinstance(start, Posture) else chain.rest() if start is None else start
     angles, poses, sites, residuals, steps, converged, h = chain.core.solve(
         base_pose(world_from_base),
@@ -114,7 +114,7 @@ def solve_many(
         raise MeasurementError(f"starts: expected finite numbers ({n},) or (N, {n}), found shape {begin.shape}")
     begin = np.ascontiguousarray(np.broadcast_to(begin, (len(places), n)))
     goals = [Target.at(site, (0.0, 0.0, 0.0)).parts() for site in sites]
-    views = [image.core for image in images if not image.empty]
+    views = seen_views(images)
     found = chain.core.solve_many(
         base_pose(world_from_base),
         begin,
@@ -127,6 +127,12 @@ def solve_many(
     )
     angles, joints, h, steps, tried, converged = found
     return Postures(angles, joints, h, steps, tried, converged != 0.0)
+
+
+def _chain(chain: Chain | Body) -> Chain:
+    if not isinstance(chain, (Chain, Body)):
+        raise MeasurementError(f"chain: expected an ik.Chain or a voodoo.Body, found {chain!r}")
+    return chain if isinstance(chain, Chain) else Chain(chain)
 
 
 class Follower:
@@ -143,7 +149,7 @@ class Follower:
         Raises:
             MeasurementError: an option or an angle that cannot be used.
         """
-        self.chain = chain if isinstance(chain, Chain) else Chain(chain)
+        self.chain = _chain(chain)
         self.options = chosen_options(None, changes)
         begin = start.angles if isinstance(start, Posture) else self.chain.rest() if start is None else start
         self.angles: FloatArray = np.array(vector(begin))

@@ -114,7 +114,7 @@ class StillBackground:
             raise MeasurementError("occupied: expected pixels where the person is not in some picture, found none")
         hidden = self.unknown.astype(np.uint8)
         self._background = cv2.inpaint(np.nan_to_num(median).astype(np.uint8), hidden, _INPAINT_PX, cv2.INPAINT_TELEA)
-        self._colours = _colours(self._background)
+        self._colours = _colours(np.asarray(self._background, dtype=np.uint8))
         self._shape, self._threshold, self._chroma, self._smallest = pictures[0].shape, threshold, chroma, smallest
 
     def mask(self, picture: ByteImage) -> Mask:
