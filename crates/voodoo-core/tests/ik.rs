@@ -8,8 +8,8 @@ use voodoo_core::body::HumanModel;
 use voodoo_core::chain::exp;
 use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::ik::{
-    Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, View, bones, level_rows, log, project,
-    Trunk, trunk,
+    Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, Trunk, View, bones, level_rows,
+    log, project, trunk,
 };
 use voodoo_core::normal::{LimbBlock, line};
 
