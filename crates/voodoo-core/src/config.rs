@@ -262,6 +262,8 @@ config! {
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones.
     hypotheses: bool = true, "";
+    /// Look for a lost body in everything that is not background (whole-body solvers).
+    recovery: bool = true, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
     outline: bool = true, "";
     /// Limbs that are not joined push each other apart where they overlap (whole-body solvers).
