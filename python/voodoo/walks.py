@@ -126,7 +126,7 @@ class Walk:
         return found
 
     def _hip_height(self) -> float:
-        poses, sites = Chain(self.body).forward(np.zeros(len(Chain(self.body).angle_names)))
+        _, sites = Chain(self.body).forward(np.zeros(len(Chain(self.body).angle_names)))
         return float(0.08 - min(sites["l_ankle"][2], sites["r_ankle"][2]))
 
     @staticmethod

@@ -256,7 +256,8 @@ impl Tracker {
         let mut best = present - GAIN;
         let mut found = false;
         let mut opposite = f64::INFINITY;
-        let mut ahead = self.poses[0].rotation * Vec3::X;
+        let stood = self.poses[0].rotation * Vec3::X;
+        let mut ahead = stood;
         work.expected.clone_from(&self.predicted);
         for index in 0..work.trials.len() {
             let trial = work.trials[index];
@@ -271,7 +272,9 @@ impl Tracker {
             let faces = self.poses[0].rotation * Vec3::X;
             let turned = faces.dot(ahead) < 0.0;
             let stray = self.stray_share(work);
-            if score < best && stray < MOST_STRAY {
+            // A body that is where it should be may only turn out to face the other way.
+            let allowed = !(explains || work.lost == 0) || faces.dot(stood) < 0.0;
+            if allowed && score < best && stray < MOST_STRAY {
                 if turned {
                     opposite = best;
                 }
