@@ -259,7 +259,7 @@ impl Tracker {
     fn match_again(&mut self, frame: &Frame, step: usize) {
         // 3 Reduce the number of points, 4 find closest points.
         let gate = self.solver.gate(&self.config, step);
-        self.match_points(&gate, self.solver.faces_cameras());
+        self.match_points(&gate, self.config.facing && self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
         self.outline.pairs(&self.poses, &mut self.correspondences.edges);
