@@ -66,7 +66,7 @@ proptest! {
     }
 
     #[test]
-    fn jacobian_is_the_derivative(angles in values(48, 1.2), site in 0..20_usize, kind in any::<bool>()) {
+    fn jacobian_is_the_derivative(angles in values(64, 1.2), site in 0..20_usize, kind in any::<bool>()) {
         let body = human();
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let angles = &angles[..model.freedoms()];
@@ -99,7 +99,7 @@ proptest! {
     }
 
     #[test]
-    fn criterion_gradient_is_the_derivative(angles in values(48, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
+    fn criterion_gradient_is_the_derivative(angles in values(64, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
         let body = human();
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let mut angles = angles[..model.freedoms()].to_vec();
@@ -216,7 +216,7 @@ proptest! {
     }
 
     #[test]
-    fn projection_finds_the_angles_again(angles in values(48, 0.5)) {
+    fn projection_finds_the_angles_again(angles in values(64, 0.5)) {
         let body = human();
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let wanted: Vec<f64> = angles[..model.freedoms()].iter().zip(model.limits()).map(|(a, [l, h])| a.clamp(*l, *h)).collect();
