@@ -65,7 +65,7 @@ class Result:
 def run(job: tuple[Path, str, str]) -> Result:
     path, solver, mode = job
     recording = open_recording(path)
-    # The papers' solver with the papers' ten limbs, any other with the human of the command line.
+    # The papers' solver with the papers' ten limbs, any other with the default human.
     model = "papers" if solver == "limbwise" else "full"
     body = voodoo.Body.human(height=recording.start["height_m"], model=model)
     tracker = voodoo.Tracker(body, config=voodoo.Config(solver=solver))

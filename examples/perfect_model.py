@@ -122,7 +122,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="sequences at each speed (default 3)")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    true = voodoo.Body.human(height=HEIGHT)
+    true = voodoo.Body.human(height=HEIGHT, model="papers")
     chain, limbwise = voodoo.Config(), voodoo.Config(solver="limbwise")
     long = grown(true, thicker=1.10, longer=1.05)
     ways: dict[str, tuple[voodoo.Body, Start, voodoo.Config]] = {

@@ -162,7 +162,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=Path, help="folder with rendered recordings")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    body = voodoo.Body.human(height=1.78)
+    body = voodoo.Body.human(height=1.78, model="papers")
     how = Disturbance()
     lines = [
         "| `motion_scale` | lost joints | mean / max error, mm | angle error, variance, deg² | "

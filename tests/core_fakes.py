@@ -69,7 +69,7 @@ class Body:
         self.limb_names = tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height=1.75, *, model="papers"):
+    def human(cls, height=1.75, *, model="full"):
         body = cls()
         body.height = height
         return body

@@ -16,7 +16,7 @@ SMALL = voodoo.Camera(320, 240, 275.0, 275.0, 159.5, 119.5)
 
 @pytest.fixture(scope="module")
 def body():
-    return voodoo.Body.human(height=1.78)
+    return voodoo.Body.human(height=1.78, model="papers")
 
 
 def sequence(body, **how):

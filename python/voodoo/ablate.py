@@ -58,14 +58,15 @@ class Ablation:
 
 
 def variants(base: voodoo.Config) -> list[Variant]:
-    """`base` itself, then every change of one entry: each switch turned over, each other solver, and no prediction."""
+    """`base` itself, then every change of one entry: each switch turned over, each other solver, no prediction, no
+    jitter penalty."""
     values = base.values()
     changes: list[tuple[str, bool | str | float]] = [
         (key, not value) for key, value in values.items() if isinstance(value, bool)
     ]
     changes += [("solver", word) for word in voodoo.Config.words("solver") if word != values["solver"]]
-    if values["prediction"] != 0.0:
-        changes.append(("prediction", 0.0))
+    # No prediction; and motion so free that its penalty weighs nothing.
+    changes += [(key, off) for key, off in (("prediction", 0.0), ("motion_scale", 100.0)) if values[key] != off]
     changed = [Variant(f"{key} = {_toml(value)}", voodoo.Config(**{**values, key: value})) for key, value in changes]
     return [Variant(UNCHANGED, base), *changed]
 

@@ -122,7 +122,7 @@ class Body:
         return tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height: float = 1.75, *, model: Literal["papers", "full"] = "papers") -> Body:
+    def human(cls, height: float = 1.75, *, model: Literal["papers", "full"] = "full") -> Body:
         """The default human.
 
         Args:

@@ -325,7 +325,8 @@ def eval_command(
     summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end.
 
     With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
-    switch turned over, the other solvers, no prediction) and prints a row each; --out gets ablation.md and ablation.csv.
+    switch turned over, the other solvers, no prediction, no jitter penalty)
+    and prints a row each; --out gets ablation.md and ablation.csv.
 
     [bold]Examples[/bold]
 

@@ -10,6 +10,8 @@ use crate::simd::widest;
 const MARGIN: (f32, f32) = (0.04, 0.012);
 /// A deeper return by more than this replaces what was learnt (something stood before it), metres.
 const DEEPER: f32 = 0.15;
+/// Two sides of a gap that differ by less belong to one surface, metres.
+const SAME: f32 = 0.30;
 /// Share of a new return in what was learnt.
 const LEARNING: f32 = 0.1;
 /// One row of this many is learnt in a frame.
@@ -106,6 +108,16 @@ impl Backgrounds {
         }
     }
 
+    /// Guesses what lies where the body has hidden the scene since the start: what lies beside it in the same row, linearly
+    /// between its two sides, and the deeper one where they are far apart.
+    pub fn fill(&mut self) {
+        for background in &mut self.images {
+            for row in background.depth.chunks_mut(background.width.max(1)) {
+                fill_row(row);
+            }
+        }
+    }
+
     /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. A camera that moved
     /// starts anew with nothing known.
     pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> (Range<usize>, Range<usize>)) {
@@ -129,5 +141,40 @@ impl Backgrounds {
                 }
             }
         }
+    }
+}
+
+fn fill_row(row: &mut [f32]) {
+    let mut start = 0;
+    while let Some(gap) = row[start..].iter().position(|depth| *depth <= 0.0) {
+        let first = start + gap;
+        let end = row[first..].iter().position(|depth| *depth > 0.0).map_or(row.len(), |length| first + length);
+        let (left, right) = (first.checked_sub(1).map(|index| row[index]), row.get(end).copied());
+        let count = (end - first + 1) as f32;
+        for index in first..end {
+            let t = (index - first + 1) as f32 / count;
+            row[index] = match (left, right) {
+                (Some(a), Some(b)) if (a - b).abs() < SAME => a + t * (b - a),
+                (Some(a), Some(b)) => a.max(b),
+                (a, b) => a.or(b).unwrap_or(0.0),
+            };
+        }
+        start = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fill_row;
+
+    #[test]
+    fn a_gap_is_filled_from_its_sides() {
+        let mut row = [0.0, 3.0, 0.0, 0.0, 3.3, 0.0, 1.0, 0.0, 2.5, 0.0];
+        fill_row(&mut row);
+        let expected = [3.0, 3.0, 3.1, 3.2, 3.3, 3.3, 1.0, 2.5, 2.5, 2.5];
+        assert!(row.iter().zip(expected).all(|(found, wanted)| (found - wanted).abs() < 1e-6), "{row:?}");
+        let mut nothing = [0.0; 3];
+        fill_row(&mut nothing);
+        assert_eq!(nothing, [0.0; 3]);
     }
 }

@@ -262,8 +262,14 @@ config! {
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones.
     hypotheses: bool = true, "";
+    /// Look for a lost body in everything that is not background (whole-body solvers).
+    recovery: bool = true, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
     outline: bool = true, "";
+    /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).
+    facing: bool = true, "";
+    /// Keep joints within their limits, softly (whole-body solvers).
+    limits: bool = true, "";
     /// Limbs that are not joined push each other apart where they overlap (whole-body solvers).
     penetration: bool = false, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.

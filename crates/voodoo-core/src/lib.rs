@@ -9,6 +9,7 @@
 
 pub mod associate;
 pub mod background;
+mod blobs;
 pub mod body;
 mod calibrate;
 pub mod candidates;

@@ -5,32 +5,22 @@ use rayon::prelude::*;
 use crate::associate::Assignment;
 use crate::background::Backgrounds;
 use crate::body::{Body, Pair};
-use crate::calibrate::{GirthFit, girth_step};
-use crate::candidates::{Candidates, body_box, image_window, shifted};
+use crate::candidates::{Candidates, body_box, shifted};
 use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
-use crate::error::{BodyError, TrackError};
+use crate::error::TrackError;
 use crate::estimate::{Estimate, LimbStatus, Status};
 use crate::facing::face_cameras;
-use crate::frame::{DepthImage, Frame};
-use crate::geometry::{Aabb, Points, Pose, Vec3};
-use crate::outline::{Outline, edges};
+use crate::frame::Frame;
+use crate::geometry::{Pose, Vec3};
+use crate::outline::Outline;
 use crate::predict::predict;
 use crate::recover::TwoBone;
-use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
 use crate::solver::{Gate, Problem, Solver, solver};
 use crate::view::{Views, find_cut_out};
 
-/// Gauss-Newton steps of the girth fit.
-const GIRTH_STEPS: usize = 6;
-/// In the first frame, what lies within this of the body may be the body, metres.
-const BODY_REACH: f32 = 0.15;
-/// Points farther than this from the set pose say nothing about girths, metres.
-const GIRTH_GATE: f64 = 0.10;
 /// Step of a frame from which the outline speaks: earlier, it would push thin limbs off their points (method section 8).
 const OUTLINE_FROM: usize = 2;
-/// A limb becomes longer or shorter by at most this share in one frame.
-const LENGTH_STEP: f64 = 0.02;
 /// A motion is taken to go on for at most this many of its own intervals.
 const LONGEST_PREDICTION: f64 = 2.0;
 /// In the second frame after a reset the body's motion is not known yet: this much more of it is unexpected.
@@ -39,7 +29,9 @@ const UNKNOWN_MOTION: f64 = 4.0;
 /// Follows one body through frames.
 #[derive(Debug)]
 pub struct Tracker {
+    /// The body in its current sizes, and in those it was given in.
     body: Body,
+    given: Body,
     config: Config,
     solver: Box<dyn Solver>,
     threads: Option<rayon::ThreadPool>,
@@ -63,6 +55,7 @@ pub struct Tracker {
     outline: Outline,
     measured: Vec<f64>,
     hypotheses: Hypotheses,
+    search: Search,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
     pairs: Vec<Pair>,
     stretched: Vec<f64>,
@@ -86,6 +79,7 @@ impl Tracker {
         };
         Ok(Self {
             solver: solver(config.solver),
+            given: body.clone(),
             body,
             config,
             threads,
@@ -105,6 +99,7 @@ impl Tracker {
             outline: Outline::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
+            search: Search::default(),
             pairs: Vec::new(),
             stretched: Vec::new(),
             change: Vec::new(),
@@ -130,13 +125,15 @@ impl Tracker {
         &self.estimate
     }
 
-    /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position).
-    /// Time may start anew afterwards. The tracker is unchanged on error.
+    /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position);
+    /// sizes are fitted from those the body was given in, not from those of an earlier reset. Time may start anew afterwards.
+    /// The tracker is unchanged on error.
     pub fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
         if let Some((site, _)) = positions.iter().find(|(site, _)| *site >= self.body.sites().len()) {
             return Err(TrackError::measurement("joints", "the index of a site", site.to_string()));
         }
-        let (body, poses) = self.body.fit(positions, fit_sizes)?;
+        let start = if fit_sizes { &self.given } else { &self.body };
+        let (body, poses) = start.fit(positions, fit_sizes)?;
         self.restart(body, poses);
         self.girths_open = fit_sizes && self.config.fit_girths;
         if fit_sizes && self.config.fit_lengths {
@@ -164,6 +161,7 @@ impl Tracker {
         self.prepare_hypotheses();
         self.poses = world_from_limb;
         self.origin = Vec3::ZERO;
+        self.prepare_search();
         self.stamp = None;
         self.interval = None;
         self.previous.clear();
@@ -221,13 +219,16 @@ impl Tracker {
         if self.config.hypotheses && self.solver.starts_from_prediction() && self.stamp.is_some() {
             steps += self.try_hypotheses(frame, pace);
         }
-        if !self.pairs.is_empty() {
+        if !self.pairs.is_empty() && self.estimate.status != Status::Lost {
             self.refine_lengths(pace);
         }
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);
         self.judge(frame);
+        if self.config.recovery && self.solver.starts_from_prediction() {
+            self.search(frame);
+        }
         Ok(&self.estimate)
     }
 
@@ -258,7 +259,7 @@ impl Tracker {
     fn match_again(&mut self, frame: &Frame, step: usize) {
         // 3 Reduce the number of points, 4 find closest points.
         let gate = self.solver.gate(&self.config, step);
-        self.match_points(&gate, self.solver.faces_cameras());
+        self.match_points(&gate, self.config.facing && self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
         self.outline.pairs(&self.poses, &mut self.correspondences.edges);
@@ -321,101 +322,6 @@ impl Tracker {
         }
     }
 
-    /// Fits the girths to the first frame after a reset, whose pose is known.
-    fn fit_girths(&mut self, frame: &Frame) {
-        let mut totals = vec![GirthFit::default(); self.poses.len()];
-        let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
-        let mut seen = Vec::new();
-        for _ in 0..GIRTH_STEPS {
-            // The pose is known: what is closest is what was seen.
-            self.assign(&gate);
-            self.match_points(&gate, false);
-            for (limb, total) in totals.iter_mut().enumerate() {
-                let shape = self.body.limbs()[limb].shape;
-                let matches = &self.correspondences.limbs[limb];
-                seen.clear();
-                let views =
-                    Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
-                for view in views.iter() {
-                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], |edge| {
-                        // Beyond the rim, the edge may be another limb's.
-                        if edge.seen <= edge.rim || self.body.closest_limb(&self.poses, edge.place) == limb {
-                            seen.push(edge);
-                        }
-                    });
-                }
-                if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
-                    let longer = 1.0 + (tip.seen - tip.rim) / shape.length();
-                    self.body.change_tip(limb, longer.clamp(0.8, 1.25));
-                }
-                let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
-                let (sum, step) = total.then(&step);
-                if self.body.change_girth(limb, step.shift, step.axes()) {
-                    let pose = &mut self.poses[limb];
-                    pose.translation += pose.rotation * step.shift;
-                    *total = sum;
-                }
-            }
-        }
-    }
-
-    /// Starts to refine the limbs' lengths from those they have.
-    fn follow_lengths(&mut self) {
-        self.pairs = self.body.pairs();
-        self.stretched = vec![1.0; self.pairs.len()];
-    }
-
-    /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
-    fn refine_lengths(&mut self, pace: f64) {
-        let Self { body, correspondences, predicted, config, solver, poses, pairs, stretched, change, .. } = self;
-        change.clear();
-        change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
-        let step = config.max_steps;
-        if !solver.lengths(&Problem { body, correspondences, predicted, step, pace, config }, poses, pairs, change) {
-            return;
-        }
-        for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
-            let factor =
-                ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total).clamp(0.5 / *total, 2.0 / *total);
-            *total *= factor;
-            pair.iter().for_each(|limb| {
-                body.change_length(*limb, factor);
-            });
-        }
-        body.close_joints(poses);
-    }
-
-    /// In the first frame after a reset the pose is known, and all that is not near the body is scene.
-    fn learn_background(&mut self, frame: &Frame, bounds: &Aabb) {
-        let Self { backgrounds, body, poses, origin, .. } = self;
-        if self.stamp.is_some() {
-            let window = |image: &DepthImage| image_window(image, &shifted(&image.world_from_sensor, *origin), bounds);
-            backgrounds.update(frame, window);
-            return;
-        }
-        let (mut queries, mut pixels, mut surface) = (Points::default(), Vec::new(), SurfaceBatch::default());
-        backgrounds.start(frame, |image, depth| {
-            let working_from_sensor = shifted(&image.world_from_sensor, *origin);
-            queries.clear();
-            pixels.clear();
-            for (index, z) in depth.iter().enumerate().filter(|(_, z)| **z > 0.0) {
-                let point = working_from_sensor * image.back_project(index, *z);
-                if bounds.contains_local_point(point) {
-                    queries.push(point.to_array().map(|value| value as f32));
-                    pixels.push(index);
-                }
-            }
-            for (limb, pose) in body.limbs().iter().zip(poses.iter()) {
-                limb.shape.closest_points(pose, &queries, &mut surface);
-                for (pixel, distance) in pixels.iter().zip(&surface.signed_distance) {
-                    if *distance < BODY_REACH {
-                        depth[*pixel] = 0.0;
-                    }
-                }
-            }
-        });
-    }
-
     fn assign(&mut self, gate: &Gate) {
         let Self { body, poses, candidates, assignment, config, .. } = self;
         assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
@@ -447,87 +353,16 @@ impl Tracker {
     }
 }
 
-/// Changes of the body between frames that keep the track (K06 IV: "changes in the model itself").
-impl Tracker {
-    /// Scales the whole body about its root.
-    pub fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
-        let body = self.body.scaled(factor)?;
-        self.adopt(body);
-        Ok(())
-    }
-
-    /// Changes the dimensions of one limb.
-    pub fn set_shape(&mut self, limb: &str, shape: TaperedEllipticCylinder) -> Result<(), BodyError> {
-        let body = self.body.with_shape(limb, shape)?;
-        self.adopt(body);
-        Ok(())
-    }
-
-    /// Adds a limb (a held box); it starts with its joint closed and at rest.
-    pub fn add_limb(
-        &mut self,
-        name: &str,
-        parent: &str,
-        shape: TaperedEllipticCylinder,
-        joint: crate::body::Joint,
-        sites: Vec<(String, Vec3)>,
-    ) -> Result<(), BodyError> {
-        let body = self.body.with_limb(name, parent, shape, joint, sites)?;
-        if self.started
-            && let Some((parent, joint)) = body.limbs().last().and_then(|limb| limb.parent.as_ref())
-        {
-            self.poses.push(self.poses[*parent] * joint.parent_from_limb_at_rest());
-        }
-        self.adopt(body);
-        Ok(())
-    }
-
-    /// Removes a limb with all that hangs on it.
-    pub fn remove_limb(&mut self, name: &str) -> Result<(), BodyError> {
-        let (body, kept) = self.body.without_limb(name)?;
-        if self.started {
-            self.poses = kept.iter().map(|index| self.poses[*index]).collect();
-        }
-        self.adopt(body);
-        Ok(())
-    }
-
-    /// Takes a changed body and closes its joints from the root outwards, orientations kept.
-    fn adopt(&mut self, body: Body) {
-        self.body = body;
-        // The motion starts anew: the poses before belong to another body.
-        self.previous.clear();
-        self.interval = None;
-        self.prepare_hypotheses();
-        if !self.started {
-            return;
-        }
-        for (index, limb) in self.body.limbs().iter().enumerate() {
-            if let Some((parent, joint)) = &limb.parent {
-                let centre = self.poses[*parent] * joint.parent_from_joint.translation;
-                self.poses[index].translation = centre - self.poses[index].rotation * joint.limb_from_joint.translation;
-            }
-        }
-        self.correspondences.limbs.clear();
-        self.correspondences.sites.clear();
-        self.correspondences.edges.clear();
-        if !self.pairs.is_empty() {
-            self.follow_lengths();
-        }
-        self.judgement.clear();
-        self.estimate.limb_status.clear();
-        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
-        let status = self.estimate.status;
-        self.report(self.stamp.unwrap_or(f64::NAN), 0);
-        self.estimate.status = status;
-    }
-}
-
+mod changes;
 mod distances;
 mod hypotheses;
 mod named;
 mod report;
+mod scene;
+mod search;
+mod sizes;
 mod status;
 
 use hypotheses::Hypotheses;
+use search::Search;
 use status::Judgement;

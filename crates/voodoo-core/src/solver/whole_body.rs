@@ -126,15 +126,17 @@ impl WholeBody {
             [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
         self.normal.clear(poses.len());
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
-        let terms: [&dyn Term; 5] = [
+        let terms: [&dyn Term; 4] = [
             &Surface { correspondences, information, slide: SLIDE, scale },
             &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE) },
             &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
             &Prior { predicted, root, joints: &self.joint_sigmas },
-            &Limits { sigma: LIMIT_SIGMA },
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);
+        }
+        if config.limits {
+            Limits { sigma: LIMIT_SIGMA }.add(body, poses, &mut self.normal);
         }
         if config.penetration {
             Penetration { sigma: OVERLAP_SIGMA, share: FREE_SHARE }.add(body, poses, &mut self.normal);

@@ -280,7 +280,7 @@ impl Tracker {
         REFINE
     }
 
-    fn overall_score(&self, frame: &Frame) -> f64 {
+    pub(super) fn overall_score(&self, frame: &Frame) -> f64 {
         let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let limbs = self.body.limbs().iter().zip(&self.poses);
         let seen: f64 = limbs.map(|(limb, pose)| look(views, limb, pose).cost()).sum();
@@ -315,13 +315,7 @@ impl Tracker {
         for limb in [chain.upper, chain.lower] {
             let Some((parent, joint)) = &self.body.limbs()[limb].parent else { continue };
             let turn = joint_turn(joint, &poses[*parent], &poses[limb]);
-            if let Some(limits) = &joint.limits {
-                let v = turn.to_scaled_axis_shortest();
-                for (axis, [low, high]) in limits.iter().enumerate() {
-                    let excess = (low - v[axis]).max(v[axis] - high).max(0.0) / LIMIT_STRAIN;
-                    cost += excess * excess;
-                }
-            }
+            cost += limit_strain(&self.body, poses, limb);
             if self.previous.len() == poses.len() {
                 let before = joint_turn(joint, &self.previous[*parent], &self.previous[limb]);
                 let moved = (turn * before.inverse()).to_scaled_axis_shortest().length() / MOTION_STRAIN;
@@ -330,6 +324,17 @@ impl Tracker {
         }
         cost + self.inside(chain, poses) + self.sites_missed(chain, poses)
     }
+}
+
+/// Cost of the broken limits of the joint of a limb, in unexplained patches.
+pub(super) fn limit_strain(body: &crate::body::Body, poses: &[Pose], limb: usize) -> f64 {
+    let Some((parent, joint)) = &body.limbs()[limb].parent else { return 0.0 };
+    let Some(limits) = &joint.limits else { return 0.0 };
+    let turn = joint_turn(joint, &poses[*parent], &poses[limb]).to_scaled_axis_shortest();
+    let excess = |(axis, [low, high]): (usize, &[f64; 2])| {
+        ((low - turn[axis]).max(turn[axis] - high).max(0.0) / LIMIT_STRAIN).powi(2)
+    };
+    limits.iter().enumerate().map(excess).sum()
 }
 
 /// The chain's relative pose of another time on the parent of now.
@@ -372,7 +377,7 @@ fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -
 }
 
 /// Keeps about `most` of the points, evenly, and their total weight.
-fn thin(points: &mut Points, weights: &mut Vec<f64>, most: usize) {
+pub(super) fn thin(points: &mut Points, weights: &mut Vec<f64>, most: usize) {
     let count = points.len();
     if count <= most {
         return;
