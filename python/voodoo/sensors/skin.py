@@ -35,7 +35,7 @@ from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
-from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates
+from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates, joined
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
@@ -176,15 +176,19 @@ class SkinTracker:
             skin &= self._static < 0.5
         # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
         skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
+        focal = math.sqrt(camera.fx * camera.fy)
+        nearest = min((z for _, z in places.values()), default=1.0)
+        palm_px = PALM_M * focal / nearest
+        skin = joined(skin, palm_px=palm_px)
+        if body is not None:
+            skin &= body.mask
         self._skin = skin
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
         self._stamp = stamp
         if not places or not self.settled:
             return []
-        focal = math.sqrt(camera.fx * camera.fy)
-        nearest = min(z for _, z in places.values())
-        self.candidates, labels = candidates(skin, palm_px=PALM_M * focal / nearest)
+        self.candidates, labels = candidates(skin, palm_px=palm_px)
         if not self.candidates:
             return []
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
