@@ -127,7 +127,7 @@ class Body:
 
         Args:
             height: stature [m], 0.3 to 3.0.
-            model: "papers": ten limbs and nine joints (K06 III-C); "full": sixteen, with waist, neck, hands and feet.
+            model: "papers": ten limbs and nine joints (K06 III-C); "full": eighteen, with waist, neck, clavicles, hands and feet.
 
         Raises:
             BodyError: the stature is out of range, or the model unknown.

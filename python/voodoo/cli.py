@@ -59,7 +59,7 @@ _HeightOption = Annotated[
 ]
 _ModelOption = Annotated[
     HumanModel,
-    typer.Option("--model", help="The default human: of sixteen limbs (full), or of the papers' ten."),
+    typer.Option("--model", help="The default human: of eighteen limbs (full), or of the papers' ten."),
 ]
 _FrameOption = Annotated[
     str | None,

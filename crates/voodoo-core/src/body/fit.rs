@@ -10,6 +10,8 @@ use crate::rigid::Moments;
 const BENT: f64 = 0.3;
 /// A joint whose every range is narrower than this (radians) belongs to the trunk: spine and neck, not shoulder and hip.
 const STEADY: f64 = 2.5;
+/// A limb whose joint turns by less than this about any axis carries its landmarks for its parent: a clavicle for the chest.
+const RIGID: f64 = 1.0;
 /// Weight and lever (metres) of the prior orientation against landmarks of weight one.
 const PRIOR_WEIGHT: f64 = 0.01;
 const PRIOR_LEVER: f64 = 0.1;
@@ -52,6 +54,10 @@ impl Body {
             let pose = body.orient_limb(limb, &pairs, prior, anchor, positions);
             poses.push(pose);
             if fit_sizes {
+                let mut pairs = pairs;
+                if body.carried(limb) {
+                    pairs.extend(anchor);
+                }
                 body.stretch_limb(limb, &pairs, &pose);
                 body.align_hinge(limb, &poses);
             }
@@ -83,10 +89,23 @@ impl Body {
                     add(&joint.name, joint.parent_from_joint.translation);
                 } else if index == limb {
                     add(&joint.name, joint.limb_from_joint.translation);
+                } else if let Some((grandparent, carrier)) = &self.limbs()[*parent].parent
+                    && *grandparent == limb
+                    && self.carried(*parent)
+                {
+                    let limb_from_parent = carrier.parent_from_limb_at_rest();
+                    add(&joint.name, limb_from_parent * joint.parent_from_joint.translation);
                 }
             }
         }
         pairs
+    }
+
+    /// True when the limb moves little on its parent, which its landmarks then tell about: a clavicle on the chest.
+    fn carried(&self, limb: usize) -> bool {
+        let little =
+            |joint: &Joint| joint.limits.is_some_and(|limits| limits.iter().all(|[low, high]| high - low < RIGID));
+        self.limbs()[limb].parent.as_ref().is_some_and(|(_, joint)| little(joint))
     }
 
     /// Scale of the whole body: measured over modelled distances between landmarks of the same limb.

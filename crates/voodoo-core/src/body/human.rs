@@ -10,7 +10,7 @@ use crate::shape::TaperedEllipticCylinder;
 pub enum HumanModel {
     /// Ten limbs and nine joints, as the papers have it (K06 III-C): torso, head, two limbs each arm and leg.
     Papers,
-    /// Sixteen limbs: the torso split at the waist, neck, hands and feet besides.
+    /// Eighteen limbs: the torso split at the waist, neck, clavicles, hands and feet besides.
     #[default]
     Full,
 }
@@ -21,6 +21,10 @@ const HIP: [f64; 2] = [0.052, 0.530];
 const KNEE: f64 = 0.285;
 const ANKLE: f64 = 0.039;
 const SHOULDER: [f64; 2] = [0.112, 0.818];
+/// Forward, outward and height of the sternoclavicular joint's centre.
+const STERNOCLAVICULAR: [f64; 3] = [0.015, 0.030, 0.800];
+/// Where the slope of the shoulder begins beside the neck, outward and height.
+const SLOPE: [f64; 2] = [0.025, 0.838];
 const UPPER_ARM: f64 = 0.186;
 /// The shoulder's muscle rises above the joint's centre.
 const DELTOID: f64 = 0.022;
@@ -39,6 +43,8 @@ const TORSO: [f64; 4] = [0.068, 0.098, 0.064, 0.096];
 const PELVIS: [f64; 4] = [0.068, 0.098, 0.064, 0.088];
 const THORAX: [f64; 4] = [0.064, 0.090, 0.060, 0.092];
 const PAPERS_HEAD: [f64; 4] = [0.046, 0.040, 0.050, 0.042];
+/// Up and forward: the trapezius on the shoulder's slope.
+const CLAVICLE: [f64; 4] = [0.034, 0.040, 0.030, 0.034];
 const NECK: [f64; 4] = [0.036, 0.035, 0.034, 0.033];
 const HEAD: [f64; 4] = [0.050, 0.040, 0.050, 0.042];
 const UPPER_ARM_AXES: [f64; 4] = [0.031, 0.029, 0.025, 0.025];
@@ -164,13 +170,17 @@ impl Builder {
         let wrist = elbow - Vec3::Z * FOREARM;
         // The joint's y axis points backward: the left arm is raised sideways by negative turns about it.
         let shoulder_limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
+        let carrier = match model {
+            HumanModel::Papers => thorax,
+            HumanModel::Full => self.clavicle(prefix, side, shoulder, thorax),
+        };
         let upper = self.limb(
             named("upperarm"),
             shoulder + Vec3::Z * DELTOID,
             down,
             UPPER_ARM + DELTOID,
             UPPER_ARM_AXES,
-            Some((thorax, link("shoulder", shoulder, [0.0; 2], shoulder_limits, 0.35))),
+            Some((carrier, link("shoulder", shoulder, [0.0; 2], shoulder_limits, 0.35))),
             [false; 2],
         );
         let elbow_limits = [[-0.1, 2.7], [0.0; 2], [0.0; 2]];
@@ -212,6 +222,28 @@ impl Builder {
         self.site(named("elbow"), upper + 1, elbow);
         self.site(named("wrist"), carrier, wrist);
         self.site(named("hand"), carrier, wrist - Vec3::Z * HAND_CENTRE);
+    }
+
+    /// Carries the arm and moves a little on the chest: a raised arm raises its shoulder.
+    fn clavicle(&mut self, prefix: &str, side: f64, shoulder: Vec3, thorax: usize) -> usize {
+        // z outward along the slope of the shoulder, x up.
+        let start = Vec3::new(0.0, side * SLOPE[0], SLOPE[1]);
+        let outward = (shoulder - start).normalize();
+        let up = (Vec3::Z - outward * outward.z).normalize();
+        let rotation = Quat::from_mat3(&Mat3::from_cols(up, outward.cross(up), outward));
+        let [x, y, z] = STERNOCLAVICULAR;
+        let link = Link {
+            name: format!("{prefix}_sternoclavicular"),
+            centre: Vec3::new(x, side * y, z),
+            // The joint's x axis points forward: the left shoulder is raised by positive turns about it.
+            flexion: Vec3::X,
+            along: Vec3::Z,
+            semi_axes: [0.0; 2],
+            limits: [mirrored([-0.15, 0.70], side), [-0.1, 0.1], [-0.4, 0.4]],
+            motion: 0.015,
+        };
+        let length = (shoulder - start).length();
+        self.limb(format!("{prefix}_clavicle"), start, rotation, length, CLAVICLE, Some((thorax, link)), [false; 2])
     }
 
     fn leg(&mut self, model: HumanModel, prefix: &str, side: f64, pelvis: usize) {
