@@ -2,7 +2,7 @@
 
 Each row: site, {keypoint index: share}, spread [m]. A site is the sum of its keypoints times their shares; the spread
 is how far the network's idea of the joint lies from ours (a hip keypoint sits on the skin, a neck keypoint between
-the shoulders; measured at head and toes on four cameras' triangulation: the ears' middle 7 cm, the toes 5 cm from ours).
+the shoulders, ears below the middle of the head).
 Sites that would only repeat keypoints used already (a neck that a network computes from its two shoulders) are left
 out: they would count one error twice.
 """
