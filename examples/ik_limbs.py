@@ -18,6 +18,8 @@ LIMBS = {
     )
 }
 """Estimated joint -> limbs of its chain, and the known joints at its ends."""
+OTHER = {joint: ("r" if joint[0] == "l" else "l") + joint[1:] for joint in LIMBS}
+"""Estimated joint -> that of the other side, whose limbs are where they were last."""
 TRUNK = ("l_shoulder", "r_shoulder", "vc7", "l_hip", "r_hip")
 
 Truth = Mapping[str, np.ndarray]
@@ -56,6 +58,7 @@ def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **optio
         followers[joint] = ik.Follower(chain, start=start, **options)
     last = {joint: truth[joint][0] for joint in LIMBS}
     found: dict[str, list[np.ndarray]] = {joint: [] for joint in LIMBS}
+    postures: dict[str, ik.Posture] = {}
     for frame in range(len(truth["l_hip"])):
         images = [] if silhouettes is None else silhouettes(frame, last)
         base = np.eye(4)
@@ -64,7 +67,14 @@ def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **optio
         )
         for joint, (_, first, end) in LIMBS.items():
             base[:3, 3] = truth[first][frame] - base[:3, :3] @ local[first]
-            posture = followers[joint].step({end: truth[end][frame]}, images=images, world_from_base=base)
+            other = postures.get(OTHER[joint])
+            posture = followers[joint].step(
+                {end: truth[end][frame]},
+                images=images,
+                world_from_base=base,
+                others=None if other is None else other.world_from_limb,
+            )
+            postures[joint] = posture
             last[joint] = posture.joints[joint]
             found[joint].append(last[joint])
     return {joint: np.array(places) for joint, places in found.items()}

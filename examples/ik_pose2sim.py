@@ -12,7 +12,9 @@ from ik_limbs import LIMBS, Truth, follow, limb_lengths, steady
 
 import voodoo
 from voodoo import ik
+from voodoo.keypoint_layouts import LAYOUTS
 from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
+from voodoo.recordings import KeypointImage, Recording
 from voodoo.recordings.pose2sim import SITES
 from voodoo.sensors.background import StillBackground
 from voodoo.silhouettes import filled, surroundings
@@ -20,18 +22,27 @@ from voodoo.views import CameraView
 
 SCALE = 0.25
 LEARN_EVERY = 2
+AGREES_PX = 15.0
+"""Pose2Sim leaves a camera out of its triangulation that is farther off by default."""
+SURE = 0.3
 CORNERS = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
 
 
 @dataclass
 class Trial:
     """The published triangulation, the chains of constant limbs nearest to it, and of each camera its silhouettes (F) and its
-    pose (4, 4)."""
+    pose (4, 4), and how far the 2-D keypoints of the known sites lie from the triangulation as it sees it (median, pixels)."""
 
     truth: Truth
     steady: Truth
     height: float
     views: dict[str, tuple[list[ik.Silhouette], np.ndarray]]
+    apart: dict[str, float]
+
+    @property
+    def agreeing(self) -> tuple[str, ...]:
+        """The cameras whose calibration agrees with the triangulation."""
+        return tuple(name for name, pixels in self.apart.items() if pixels < AGREES_PX)
 
     def solve(self, cameras: Sequence[str], truth: Truth) -> dict[str, np.ndarray]:
         """Positions (F, 3) of elbows and knees with the silhouettes of some cameras, known sites as in `truth`."""
@@ -50,13 +61,29 @@ def four_cameras(path: Path) -> Trial:
         placed.name: (*read(video, placed.camera), placed.world_from_sensor)
         for placed, video in zip(recording.cameras, sorted((path / "videos").glob("*.mp4")), strict=True)
     }
-    trial = Trial(truth, steady(truth), stature(truth), {})
+    trial = Trial(truth, steady(truth), stature(truth), {}, offsets(recording, truth))
     known = {name: places for name, places in truth.items() if name not in LIMBS}
     # Twice: elbows and knees found with the first silhouettes tell better where the person is not, hence the background.
     for _ in range(2):
         trial.views = {name: (cut_out(*seen, known, trial.height), seen[2]) for name, seen in pictures.items()}
-        known = {**known, **trial.solve(tuple(pictures), truth)}
+        known = {**known, **trial.solve(trial.agreeing, truth)}
     return trial
+
+
+def offsets(recording: Recording, truth: Truth) -> dict[str, float]:
+    """Camera -> median distance [px] of the known sites' keypoints from the truth as projected into it."""
+    found: dict[str, list[float]] = {}
+    for frame, recorded in enumerate(recording):
+        for item in recorded.measurements:
+            if not isinstance(item, KeypointImage) or not item.people:
+                continue
+            view = CameraView(item.camera, item.root_from_sensor)
+            for part in LAYOUTS[item.layout].parts:
+                u, v, sure = np.sum([share * item.people[0][index] for index, share in part.shares.items()], axis=0)
+                if part.site in truth and part.site not in LIMBS and sure > SURE:
+                    pixel, _ = view.project(truth[part.site][frame][None])
+                    found.setdefault(item.sensor, []).append(float(np.hypot(*(pixel[0] - (u, v)))))
+    return {name: float(np.median(distances)) for name, distances in found.items()}
 
 
 def cut_out(

@@ -26,12 +26,20 @@ from voodoo.views import CameraView, silhouette
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
 SIDE_CAMERA = voodoo.Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
+BONES = {
+    "upperarm": ("shoulder", "elbow"),
+    "forearm": ("elbow", "wrist"),
+    "hand": ("wrist", "hand"),
+    "thigh": ("hip", "knee"),
+    "calf": ("knee", "ankle"),
+}
+"""Limb -> the joints its axis runs through."""
 
 
 @dataclass
 class Rendered:
-    """A rendered recording: its depth camera, and a camera 3 m to the person's side that sees the body model at the true
-    joints."""
+    """A rendered recording: its depth camera, and a camera 3 m to the person's side that sees the body model, its arms and legs
+    along the true joints."""
 
     name: str
     height: float
@@ -41,6 +49,10 @@ class Rendered:
 
     def __post_init__(self) -> None:
         self.scene = StillScene(self.depths)
+
+    def side_pose(self, frame: int) -> np.ndarray:
+        """Pose (4, 4) of the second camera: 3 m to the side of the root."""
+        return side_pose(self.truth["humanoid_root"][frame])
 
     def front(self, frame: int, last: Mapping[str, np.ndarray]) -> ik.Silhouette:
         """The person cut out by depth: what hangs together with the known joints and the last estimates."""
@@ -66,11 +78,10 @@ def rendered(path: Path) -> Rendered:
     depths, side = [], []
     for index, recorded in enumerate(recording):
         depths.append(next(item for item in recorded.measurements if isinstance(item, DepthImage)))
-        estimate = tracker.reset(joints={name: places[index] for name, places in truth.items()})
-        # Optical axis towards -y of the root frame, x to the front's left, y down.
-        pose = np.eye(4)
-        pose[:3, :3] = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
-        pose[:3, 3] = truth["humanoid_root"][index] + np.array((0.0, 3.0, 0.2))
+        joints = {name: places[index] for name, places in truth.items()}
+        estimate = tracker.reset(joints=joints, fit_sizes=index == 0)
+        estimate = tracker.reset_pose(limbs_along(joints, estimate))
+        pose = side_pose(joints["humanoid_root"])
         view = CameraView(SIDE_CAMERA, pose)
         mask = silhouette(tracker.body, estimate, view, width=SIDE_CAMERA.width, height=SIDE_CAMERA.height).astype(
             np.uint8
@@ -81,6 +92,32 @@ def rendered(path: Path) -> Rendered:
             cv2.line(mask, *np.rint(line).astype(int).tolist(), 1, 10)
         side.append(ik.Silhouette(mask, camera=SIDE_CAMERA, world_from_camera=pose))
     return Rendered(recording.name, height, truth, depths, side)
+
+
+def side_pose(root: np.ndarray) -> np.ndarray:
+    """A camera's pose (4, 4) beside the root (3,): optical axis towards -y of the root frame, y down."""
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
+    pose[:3, 3] = root + np.array((0.0, 3.0, 0.2))
+    return pose
+
+
+def limbs_along(joints: Mapping[str, np.ndarray], estimate: voodoo.Estimate) -> dict[str, np.ndarray]:
+    """The poses (4, 4) of all limbs, those of arms and legs moved so that their axes run from joint to joint exactly: no body of
+    constant sizes and exact joints can, since real shoulders shift and knees are no hinges."""
+    poses = {name: pose.copy() for name, pose in estimate.world_from_limb.items()}
+    for side in "lr":
+        for limb, (first, last) in BONES.items():
+            pose, start, end = poses[f"{side}_{limb}"], joints[f"{side}_{first}"], joints[f"{side}_{last}"]
+            way = (end - start) / np.linalg.norm(end - start)
+            axis = np.cross(pose[:3, 2], way)
+            sine = float(np.linalg.norm(axis))
+            if sine > 1e-9:
+                turn, _ = cv2.Rodrigues(axis / sine * np.arctan2(sine, pose[:3, 2] @ way))
+                pose[:3, :3] = turn @ pose[:3, :3]
+            pose[:3, 3] = start
+        poses[f"{side}_foot"][:3, 3] += joints[f"{side}_ankle"] - estimate.joints[f"{side}_ankle"]
+    return poses
 
 
 def picture(
@@ -122,9 +159,11 @@ def main() -> None:
         cv2.imwrite(str(arguments.out / f"{name}.png"), np.hstack(tiles))
     if (arguments.data / "pose2sim").is_dir():
         trial = four_cameras(arguments.data / "pose2sim")
-        sets = ((), ("cam_01",), ("cam_01", "cam_04"), tuple(trial.views))
+        sets = ((), ("cam_01",), ("cam_01", "cam_04"), trial.agreeing, tuple(trial.views))
+        print("\n2-D keypoints off by: " + ", ".join(f"{name} {pixels:.1f} px" for name, pixels in trial.apart.items()))
         print(
-            "\n| real cameras, known and error from | joint | plain | 1 view | 2 views | 4 views |\n|---|---|---|---|---|---|"
+            "\n| real cameras, known and error from | joint | plain | 1 view | 2 views | those that agree | all 4 |\n"
+            "|---|---|---|---|---|---|---|"
         )
         for name, truth in (("the triangulation", trial.truth), ("its nearest chains", trial.steady)):
             found = [trial.solve(cameras, truth) for cameras in sets]

@@ -265,6 +265,48 @@ def test_no_elbow_in_the_trunk(arm):
     assert all(arm.criterion(row, [image], margin=0.0)[0] == 0.0 for row in angles)  # J10's criterion knows no trunk
 
 
+def test_a_view_that_is_content_changes_no_step(arm):
+    camera, pose = front_camera(0.4)
+    v, u = np.mgrid[:120, :160]
+    narrow = ik.Silhouette((np.abs(u - 40) < 4) & (np.abs(v - 70) < 35), camera=camera, world_from_camera=pose)
+    content = ik.Silhouette(np.ones((120, 160)), camera=camera, world_from_camera=pose)
+    goal = {"l_hand": shoulder(arm) + np.array([0.3, 0.05, -0.2])}
+    one = ik.solve(arm, goal, images=[narrow], margin=0.0, steps=4)
+    two = ik.solve(arm, goal, images=[narrow, content], margin=0.0, steps=4)
+    assert one.h > 0.1 and two.images == 2
+    assert two.h == pytest.approx(0.5 * one.h, rel=1e-6)
+    assert two.angles == pytest.approx(one.angles, abs=1e-9)
+
+
+def test_no_bone_in_a_limb_beside_the_chain():
+    body = voodoo.Body.human(1.75, model="papers")
+    legs = {side: ik.Chain(body, limbs=(f"{side}_thigh", f"{side}_calf")) for side in "lr"}
+    camera, pose = front_camera(-0.4)
+    everything = ik.Silhouette(np.ones((120, 160)), camera=camera, world_from_camera=pose)
+    right = np.array([0.5, 0.0, 0.0, 0.9])
+    poses, sites = legs["r"].forward(right)
+    # The left leg as it was, with its knee where the right one is.
+    angles = ik.solve(legs["l"], {"l_knee": sites["r_knee"]}, start=[0.5, 0.0, 0.0, 0.9], steps=60).angles
+    alone = legs["l"].criterion(angles, [everything])[0]
+    h, gradient = legs["l"].criterion(angles, [everything], others=poses)
+    assert alone == 0.0 and h > 0.5
+    numeric = [
+        (legs["l"].criterion(angles + step, [everything], others=poses)[0]
+         - legs["l"].criterion(angles - step, [everything], others=poses)[0]) / 2e-6
+        for step in np.eye(4) * 1e-6
+    ]  # fmt: skip
+    assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-3)
+    ankle = legs["l"].forward(angles)[1]["l_ankle"]
+    found = ik.Follower(legs["l"], start=angles).step({"l_ankle": ankle}, images=[everything], others=poses)
+    assert found.residuals[0] < 1e-6 and found.h < 0.5 * h
+    with pytest.raises(voodoo.BodyError, match="not on the chain, found"):
+        ik.solve(legs["l"], {}, others={"l_calf": np.eye(4)})
+    with pytest.raises(voodoo.BodyError, match="l_fin"):
+        ik.solve(legs["l"], {}, others={"l_fin": np.eye(4)})
+    with pytest.raises(voodoo.MeasurementError, match="others"):
+        ik.solve(legs["l"], {}, others={"r_calf": np.ones((4, 4))})
+
+
 def test_batch_equals_single(arm):
     rng = np.random.default_rng(3)
     goals = shoulder(arm) + rng.uniform(-0.4, 0.4, (20, 1, 3))
@@ -302,12 +344,43 @@ def test_follower_starts_from_the_last_posture(arm):
         (lambda arm: ik.Target.on_ray("l_hand", origin=(0, 0, 0), direction=(0, 0, 0)), "direction"),
         (lambda arm: ik.Chain(arm.body, limbs=("l_forearm", "r_forearm")), "hang together"),
         (lambda arm: ik.Chain(arm.body, root="loose"), "root"),
+        (lambda arm: ik.Chain(arm.body, limbs="l_forearm"), "list of names"),
+        (lambda arm: ik.solve("arm", {}), "chain: expected"),
+        (lambda arm: ik.solve(arm, "l_hand"), "targets: expected"),
+        (lambda arm: ik.solve(arm, ik.Target.at("l_hand", (0, 0, 0))), "targets: expected"),
+        (lambda arm: ik.solve(arm, [("l_hand", (0, 0, 0))]), "list of Target"),
+        (lambda arm: ik.solve(arm, {3: (0, 0, 0)}), "names of sites"),
+        (lambda arm: ik.solve(arm, {}, start="rest"), "angles: expected numbers"),
+        (lambda arm: ik.solve(arm, {}, world_from_base="here"), "world_from_base: expected numbers"),
+        (lambda arm: ik.solve(arm, {}, images=np.ones((120, 160))), "list of ik.Silhouette"),
+        (lambda arm: ik.solve_many(arm, ["l_hand"], np.zeros((2, 1, 3)), images=[None]), "list of ik.Silhouette"),
+        (lambda arm: arm.criterion(arm.rest(), [3]), "list of ik.Silhouette"),
+        (lambda arm: ik.solve(arm, {}, options={"steps": 3}), "ik.Options"),
+        (lambda arm: ik.solve(arm, {}, others=["l_calf"]), "others: expected"),
+        (lambda arm: ik.Options(bones=(("l_elbow", "l_hand"),)), "site, site, radius"),
+        (lambda arm: ik.Options(bones=(("l_elbow", "l_hand", float("nan")),)), "radius of at least 0"),
+        (lambda arm: ik.Target.at("l_hand", (0, 0, 0), weight="heavy"), "weight"),
+        (lambda arm: ik.Silhouette(np.ones((120, 160)), camera=None, world_from_camera=np.eye(4)), "camera"),
+        (
+            lambda arm: ik.Silhouette(
+                np.full((120, 160), np.nan), camera=front_camera()[0], world_from_camera=np.eye(4)
+            ),
+            "finite",
+        ),
         (lambda arm: ik.Silhouette(np.zeros((3, 3)), camera=front_camera()[0], world_from_camera=np.eye(4)), "mask"),
     ],
 )
 def test_bad_input_is_named(arm, call, words):
     with pytest.raises(voodoo.VoodooError, match=words):
         call(arm)
+
+
+def test_the_example_of_the_documentation_runs():
+    text = (EXAMPLES.parent / "docs" / "ik.md").read_text(encoding="utf-8")
+    camera, pose = front_camera()
+    names = {"mask": np.ones((120, 160)), "camera": camera, "pose": pose, "hand": (0.3, 0.2, 0.1), "thorax": np.eye(4)}
+    exec(text.split("```python\n")[1].split("```")[0], names)
+    assert names["posture"].images == 1 and len(names["posture"].angles) == 7
 
 
 def test_joint_angles_of_an_estimate(tmp_path):

@@ -1,6 +1,8 @@
 """Inverse kinematics through a recording, and `voodoo ik`."""
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,9 @@ from voodoo.ik_recording import KNOWN, Positions, follow
 from voodoo.recordings.sample import sample_path
 from voodoo.results import Track
 from voodoo.running import start_tracker
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from test_exports import read_bvh
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +145,40 @@ def test_command_line(tmp_path, recording):
     assert again.exit_code == 0, again.output
     # Alone, from far away, a few frames end in a valley; nearly all reach what the first run reached.
     assert np.quantile(Track.load(tmp_path / "again.npz").residual, 0.9) < 1e-4
+
+
+def test_command_line_writes_what_animation_and_opensim_read(tmp_path, recording):
+    out = {suffix: tmp_path / f"pose.{suffix}" for suffix in ("npz", "bvh", "trc")}
+    result = run(sample_path(), "--pictures", "none", *(word for file in out.values() for word in ("--out", file)))
+    assert result.exit_code == 0, result.output
+    track = Track.load(out["npz"])
+    # The reader shares no code with the writer; centimetres, X left, Y up, Z forward.
+    places, _ = read_bvh(out["bvh"])
+    for bone, site in (("l_forearm", "l_elbow"), ("r_calf", "r_knee"), ("l_hand", "l_wrist"), ("head", "skullbase")):
+        error = places[bone][:, [2, 0, 1]] / 100.0 - track.joints[:, track.joint_names.index(site)]
+        assert np.abs(error).max() < 1e-4, bone
+    # The bend of an elbow in the file is the joint angle of the posture.
+    ways = [places[far] - places[near] for near, far in (("l_upperarm", "l_forearm"), ("l_forearm", "l_hand"))]
+    first, second = (way / np.linalg.norm(way, axis=1, keepdims=True) for way in ways)
+    bend = np.arccos(np.clip((first * second).sum(axis=1), -1.0, 1.0))
+    flexion = track.angles[:, track.angle_names.index("l_elbow_flexion")]
+    assert np.ptp(flexion) > 0.3
+    assert np.abs(np.diff(bend) - np.diff(flexion)).max() < 0.1 and np.corrcoef(bend, flexion)[0, 1] > 0.99
+    table = np.loadtxt(out["trc"], skiprows=6, delimiter="\t")
+    wrist = 2 + 3 * track.joint_names.index("l_wrist")
+    expected = track.joints[:, track.joint_names.index("l_wrist")]
+    assert table[:, wrist : wrist + 3] == pytest.approx(expected[:, [1, 2, 0]], abs=1e-6)
+
+
+def test_command_line_takes_other_bodies(tmp_path):
+    body = tmp_path / "body.toml"
+    body.write_text(voodoo.Body.human(1.6, model="papers").to_toml())
+    out = tmp_path / "pose.npz"
+    result = run(sample_path(), "--pictures", "none", "--body", body, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert set(Track.load(out).limb_names) == set(voodoo.Body.human(1.6, model="papers").limb_names)
+    both = run(sample_path(), "--body", body, "--height", "1.7")
+    assert both.exit_code != 0 and "not both" in both.stderr
 
 
 def test_command_line_refuses_bad_input(tmp_path):

@@ -11,6 +11,8 @@ import ik_limbs
 import ik_pose2sim
 import ik_tables
 
+from voodoo.views import CameraView
+
 
 def means(found, truth):
     errors = ik_limbs.errors(found, truth)
@@ -21,20 +23,35 @@ def means(found, truth):
 def test_images_halve_the_error_of_the_inner_joints(voodoo_data, name):
     sequence = ik_tables.rendered(voodoo_data / "rendered" / name)
     plain, one, two = (means(sequence.solve(views), sequence.truth) for views in (0, 1, 2))
-    assert (one < 0.5 * plain).all() and (one < 0.025).all()
-    # The second view of the walk is the thin model's; it hides the swinging arms before the trunk.
-    assert (two < (0.65 if name == "dev_05_walk" else 0.5) * plain).all() and (two < 0.025).all()
-    assert one.mean() < two.mean() + 0.005  # one view is nearly as good as two
+    for found in (one, two):
+        assert (found < 0.5 * plain).all() and (found < 0.025).all()
+    assert (two < one + 0.001).all()  # a second view does no harm
+    # One view is nearly as good as two, but for the puncher's knees, which move along its line of sight.
+    assert one[0] < two[0] + 0.006 and (name == "dev_03_punch" or one[1] < two[1] + 0.006)
+    # The second view shows the limbs along the true joints: their axes lie in its silhouettes.
+    for frame in range(0, len(sequence.side), 20):
+        view = CameraView(ik_tables.SIDE_CAMERA, sequence.side_pose(frame))
+        for joint, (_, first, last) in ik_limbs.LIMBS.items():
+            ends = np.stack([sequence.truth[site][frame] for site in (first, joint, last)])
+            along = np.concatenate([ends[:1] + (ends[1] - ends[0]) * share for share in (0.3, 0.6)]
+                                   + [ends[1:2] + (ends[2] - ends[1]) * share for share in (0.2, 0.5, 0.8)])  # fmt: skip
+            u, v = np.rint(view.project(along)[0]).astype(int).T
+            seen = (u >= 0) & (v >= 0) & (u < 320) & (v < 240)
+            assert (sequence.side[frame].distance[v[seen], u[seen]] < -1.0).all(), (frame, joint)
 
 
 def test_four_real_cameras(voodoo_data):
     if not (voodoo_data / "pose2sim" / "videos").is_dir():
         pytest.skip("the videos of Pose2Sim are not there")
     trial = ik_pose2sim.four_cameras(voodoo_data / "pose2sim")
-    plain, one, four = (
-        means(trial.solve(cameras, trial.steady), trial.steady) for cameras in ((), ("cam_01",), tuple(trial.views))
+    assert trial.agreeing == ("cam_01", "cam_02", "cam_04")
+    plain, one, two, agreeing = (
+        means(trial.solve(cameras, trial.steady), trial.steady)
+        for cameras in ((), ("cam_01",), ("cam_01", "cam_04"), trial.agreeing)
     )
-    assert one[0] < 0.5 * plain[0] and four[0] < 0.5 * plain[0] and max(one[0], four[0]) < 0.025
+    for found in (one, two, agreeing):
+        assert found[0] < 0.5 * plain[0] and (found < 0.025).all()
+    assert agreeing[1] < 0.65 * plain[1]  # knees are not halved, see docs/ik.md
     moved = [np.linalg.norm(trial.steady[name] - places, axis=1).mean() for name, places in trial.truth.items()]
     assert max(moved) < 0.02
     assert not any(view.empty for views, _ in trial.views.values() for view in views)

@@ -307,6 +307,7 @@ class Chain:
         segments: Sequence[tuple[str, str, float]] | None,
         depth: tuple[float, float],
         views: Sequence[View],
+        others: Sequence[tuple[str, npt.NDArray[np.float64]]],
     ) -> tuple[float, npt.NDArray[np.float64]]: ...
     def project(
         self, base: npt.ArrayLike, world_from_limb: Sequence[npt.NDArray[np.float64]], closest: bool
@@ -319,6 +320,7 @@ class Chain:
         segments: Sequence[tuple[str, str, float]] | None,
         depth: tuple[float, float],
         views: Sequence[View],
+        others: Sequence[tuple[str, npt.NDArray[np.float64]]],
         how: tuple[int, float, float, float, float, float],
     ) -> tuple[
         npt.NDArray[np.float64],

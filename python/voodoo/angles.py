@@ -8,10 +8,8 @@ Angles are radians, in the order of the body's limbs. The joint to a limb's pare
 
 The default human's joint frames: x is the axis of flexion (it points to the person's right at shoulder, elbow, hip and ankle, to
 the left at knee and spine, so that flexion is positive everywhere), z runs along the limb towards its far end, y completes them.
-Every angle is zero when the person stands upright with hanging arms. A rotation vector has no order of axes and
-no
-gimbal lock; for Euler angles after the ISB's recommendations turn it into a matrix first (scipy's
-Rotation.from_rotvec).
+Every angle is zero when the person stands upright with hanging arms. A rotation vector has no order of axes and no gimbal lock;
+for Euler angles after the ISB's recommendations turn it into a matrix first (scipy's Rotation.from_rotvec).
 """
 
 from __future__ import annotations

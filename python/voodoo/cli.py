@@ -26,7 +26,7 @@ from voodoo.overlay_inputs import Picture
 from voodoo.picture_writer import PictureWriter, save_picture
 from voodoo.recordings import LOADERS, Recording, open_recording, sample_path
 from voodoo.recordings.marker_files import MarkerMap
-from voodoo.results import Track, check_suffix
+from voodoo.results import Track
 from voodoo.running import HumanModel, Init, start_tracker, track
 from voodoo.sensors.front_end import INPUTS, FrontEndSettings
 from voodoo.view import Viewer
@@ -246,40 +246,56 @@ def ik_command(
         Path | None,
         typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
     ] = None,
+    body: _BodyOption = None,
+    height: _HeightOption = None,
+    model: _ModelOption = "full",
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Result, .csv or .npz; by default NAME_ik.csv in this folder.")
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME_ik.csv.",
+        ),
     ] = None,
     frame: _FrameOption = None,
     loader: _LoaderOption = None,
 ) -> None:
     """Find postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
-    The result has the columns of voodoo track and NAME_rad for every joint angle. Sites that are not among the known
-    ones are
-    compared with the reference, if it has them.
+    The .csv has the columns of voodoo track, its NAME_rad led by the six of the root; the other formats are those of voodoo
+    track, too. Sites that are not among the known ones are compared with the reference, if it has them.
 
     [bold]Examples[/bold]
 
     voodoo ik walk_bag/ --pictures none
 
-    voodoo ik walk_bag/ --targets pose.npz --sites l_hand,r_hand,head_center --out angles.csv
+    voodoo ik walk_bag/ --targets pose.npz --sites l_hand,r_hand,head_center --out angles.csv --out pose.bvh
     """
     from voodoo.ik_recording import KNOWN, Positions, follow
 
     with _clear_errors():
+        if body is not None and height is not None:
+            raise typer.BadParameter("give --body or --height, not both")
         source = _open(recording, loader, frame)
-        target = out if out is not None else Path(f"{source.name}_ik.csv")
-        check_suffix(target)
+        written = out or [Path(f"{source.name}_ik.csv")]
+        for file in written:
+            check_target(file)
         positions = Positions.of(source, None if targets is None else Track.load(targets))
-        tracker = start_tracker(source, init=None if init is None else Init.load(init))
+        tracker = start_tracker(
+            source,
+            init=None if init is None else Init.load(init),
+            body=None if body is None else voodoo.Body.load(body),
+            height=height,
+            model=model,
+        )
         known = KNOWN if sites is None else tuple(name.strip() for name in sites.split(","))
         how: Any = {"sites": known, "pictures": pictures, "warm": not alone}
         result, errors = follow(source, tracker, positions, **how)
-        result.save(target)
+        for file in written:
+            export(result, file, body=tracker.body, root_frame=source.root_frame)
         for name, values in errors.items():
             if np.isfinite(values).any():
                 typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
-        typer.echo(f"{len(result)} frames, {_states(result)}; wrote {target}")
+        typer.echo(f"{len(result)} frames, {_states(result)}; wrote {' and '.join(map(str, written))}")
 
 
 @app.command("eval")

@@ -8,8 +8,8 @@ use voodoo_core::body::HumanModel;
 use voodoo_core::chain::exp;
 use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::ik::{
-    Aim, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, View, bones, level_rows, log, project,
-    trunk,
+    Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, Trunk, View, bones, level_rows,
+    log, project, trunk,
 };
 use voodoo_core::normal::{LimbBlock, line};
 
@@ -66,7 +66,7 @@ proptest! {
     }
 
     #[test]
-    fn jacobian_is_the_derivative(angles in values(48, 1.2), site in 0..20_usize, kind in any::<bool>()) {
+    fn jacobian_is_the_derivative(angles in values(64, 1.2), site in 0..20_usize, kind in any::<bool>()) {
         let body = human();
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let angles = &angles[..model.freedoms()];
@@ -99,7 +99,7 @@ proptest! {
     }
 
     #[test]
-    fn criterion_gradient_is_the_derivative(angles in values(48, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
+    fn criterion_gradient_is_the_derivative(angles in values(64, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
         let body = human();
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let mut angles = angles[..model.freedoms()].to_vec();
@@ -113,8 +113,11 @@ proptest! {
         let view = View { distance: &image, thickness: &thickness, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
-        let trunk = trunk(&body, &model);
+        let mut trunk = trunk(&body, &model);
         prop_assert_eq!(trunk.len(), 2);
+        // A limb beside the chain, through the body's middle.
+        let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
+        trunk.push(Trunk::new(&body.limbs()[0].shape, Carrier::World(beside)));
         let criterion = Criterion { views: &[view, view], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
@@ -216,7 +219,7 @@ proptest! {
     }
 
     #[test]
-    fn projection_finds_the_angles_again(angles in values(48, 0.5)) {
+    fn projection_finds_the_angles_again(angles in values(64, 0.5)) {
         let body = human();
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let wanted: Vec<f64> = angles[..model.freedoms()].iter().zip(model.limits()).map(|(a, [l, h])| a.clamp(*l, *h)).collect();

@@ -69,6 +69,39 @@ proptest! {
     }
 
     #[test]
+    fn a_fit_puts_shoulders_on_clavicles(seed: u64, stature in 1.2..2.1_f64, rise in 0.0..0.5_f64) {
+        let mut noise = scene::Noise(seed);
+        let truth = Body::human(stature, HumanModel::Full).unwrap();
+        let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
+        let mut wanted = sites(&truth, &truth.rest_pose(root));
+        // Shrugged: both shoulders higher than at rest; the arms hang where they hung.
+        for name in ["l_shoulder", "r_shoulder"] {
+            wanted[truth.site_index(name).unwrap()] += root.rotation * Vec3::Z * (0.1 * rise * stature);
+        }
+        let named: Vec<(usize, Vec3)> = wanted.iter().copied().enumerate().collect();
+        let (body, found) = Body::human(1.75, HumanModel::Full).unwrap().fit(&named, true).unwrap();
+        prop_assert!(largest_distance(&sites(&body, &found), &wanted) < 1e-6);
+    }
+
+    #[test]
+    fn a_foreshortened_calf_is_as_long_as_its_pair(share in 0.5..0.74_f64, other in 0.77..1.0_f64) {
+        let truth = Body::human(1.7, HumanModel::Full).unwrap();
+        let measured = sites(&truth, &truth.rest_pose(Pose::identity()));
+        let fitted = |name: &str, share: f64| {
+            let (knee, ankle) = (truth.site_index("l_knee").unwrap(), truth.site_index(name).unwrap());
+            let mut named: Vec<(usize, Vec3)> = measured.iter().copied().enumerate().collect();
+            named[ankle].1 = named[knee].1.lerp(named[ankle].1, share);
+            named.retain(|(site, _)| !truth.sites()[*site].name.ends_with("toe"));
+            let (body, _) = truth.fit(&named, true).unwrap();
+            let length = |name: &str| body.limbs()[body.limb_index(name).unwrap()].shape.length();
+            length("l_calf") / length("r_calf")
+        };
+        prop_assert!((fitted("l_ankle", share) - 1.0).abs() < 1e-6);
+        // What persons may differ by is believed.
+        prop_assert!((fitted("l_ankle", other) - other).abs() < 1e-2);
+    }
+
+    #[test]
     fn a_single_ray_draws_its_site_onto_itself(offset in [-0.06..0.06_f64, -0.06..0.06, -0.06..0.06], from: u64) {
         let poses = scene::standing(&human());
         let site = human().site_index("l_wrist").unwrap();

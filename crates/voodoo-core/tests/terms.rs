@@ -105,7 +105,7 @@ proptest! {
     }
 
     #[test]
-    fn outline(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 16)) {
+    fn outline(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 18)) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = random_pose(&body, &angles);
         // A point of each limb and the edge it is drawn to, fixed in the world.

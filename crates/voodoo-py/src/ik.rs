@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::geometry::{Pose, Vec3};
-use voodoo_core::ik::{self, Aim, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver};
+use voodoo_core::ik::{self, Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, Trunk};
 
 use crate::arrays::{frozen, matrix, pose};
 use crate::body::PyBody;
@@ -117,6 +117,21 @@ impl PyChain {
         }
     }
 
+    /// The trunk, and limbs of the body beside the chain with their world poses.
+    fn trunk(&self, py: Python<'_>, others: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<Trunk>> {
+        let mut found = ik::trunk(&self.body, &self.model);
+        for (name, world_from_limb) in others {
+            let limb = self.body.limb_index(name).map_err(|error| error.into_py(py))?;
+            if self.model.part_of(limb).is_some() {
+                let message = format!("others: expected limbs that are not on the chain, found {name:?}");
+                return Err(exception(py, "BodyError", message));
+            }
+            let carrier = Carrier::World(pose("others", Some(world_from_limb))?);
+            found.push(Trunk::new(&self.body.limbs()[limb].shape, carrier));
+        }
+        Ok(found)
+    }
+
     fn poses_of(&self, world_from_limb: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose>> {
         world_from_limb.iter().map(|value| pose("world_from_limb", Some(value))).collect()
     }
@@ -216,12 +231,13 @@ impl PyChain {
         segments: Option<Vec<SegmentParts>>,
         depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
+        others: Vec<(String, Bound<'py, PyAny>)>,
     ) -> PyResult<(f64, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
         let segments = self.bones(py, segments, depth.0)?;
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let trunk = ik::trunk(&self.body, &self.model);
+        let trunk = self.trunk(py, &others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
         let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
             &self.model,
@@ -258,6 +274,7 @@ impl PyChain {
         segments: Option<Vec<SegmentParts>>,
         depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
+        others: Vec<(String, Bound<'py, PyAny>)>,
         how: OptionParts,
     ) -> PyResult<Solved<'py>> {
         let py = base.py();
@@ -269,7 +286,7 @@ impl PyChain {
         ordered.sort_by_key(|goal| goal.level);
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let trunk = ik::trunk(&self.body, &self.model);
+        let trunk = self.trunk(py, &others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let mut solver = Solver::default();
         let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &options(how), &mut angles);

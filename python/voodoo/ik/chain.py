@@ -11,8 +11,8 @@ import numpy.typing as npt
 from voodoo import _core
 from voodoo.body import Body
 from voodoo.errors import MeasurementError
-from voodoo.ik.image import Silhouette
-from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, named, vector
+from voodoo.ik.image import Silhouette, seen_views
+from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, vector
 
 
 class Chain:
@@ -29,8 +29,10 @@ class Chain:
 
         Raises:
             BodyError: an unknown limb, or limbs that do not hang together.
-            MeasurementError: another word for root.
+            MeasurementError: another word for root, or a single name for limbs.
         """
+        if isinstance(limbs, str):
+            raise MeasurementError(f"limbs: expected a list of names, found {limbs!r}")
         root = root if root is not None else ("fixed" if limbs else "free")
         if root not in ("free", "fixed"):
             raise MeasurementError(f'root: expected "free" or "fixed", found {root!r}')
@@ -103,11 +105,17 @@ class Chain:
         margin: float = 1.1,
         thin: float = 1.7,
         bones: Sequence[Bone] | None = None,
+        others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> tuple[float, FloatArray]:
         """The image criterion h [px] and its gradient (n,) (J10 eq. 5, 8); see `solve` for the arguments."""
-        views = [image.core for image in images if not image.empty]
+        views = seen_views(images)
         return self._core.criterion(
-            base_pose(world_from_base), vector(angles), listed_bones(bones), (margin, thin), views
+            base_pose(world_from_base),
+            vector(angles),
+            listed_bones(bones),
+            (margin, thin),
+            views,
+            listed_poses(others),
         )
 
     def __repr__(self) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +11,7 @@ import numpy.typing as npt
 from voodoo import _core
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
+from voodoo.ik.values import numbers
 
 _UNDISTORTED = 0.5
 _MIDDLE = 0.3
@@ -30,11 +33,15 @@ class Silhouette:
         Raises:
             MeasurementError: the mask has not the camera's size, or the pose is not rigid.
         """
+        if not isinstance(camera, Camera):
+            raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
         person = np.asarray(mask)
         if person.shape != (camera.height, camera.width):
             raise MeasurementError(
                 f"mask: expected shape {(camera.height, camera.width)} of its camera, found {person.shape}"
             )
+        if person.dtype.kind not in "buif" or not np.isfinite(person).all():
+            raise MeasurementError(f"mask: expected true and false, or finite numbers, found {person.dtype} or NaN")
         person = (person != 0).astype(np.uint8)
         if camera.distorted:
             person = _undistorted(person, camera)
@@ -45,7 +52,7 @@ class Silhouette:
         self.thickness.setflags(write=False)
         # A picture without the person says nothing; it takes no part.
         self.empty = not person.any()
-        pose = np.asarray(world_from_camera, dtype=np.float64)
+        pose = numbers("world_from_camera", world_from_camera)
         if pose.shape != (4, 4) or not np.isfinite(pose).all():
             raise MeasurementError(f"world_from_camera: expected a rigid 4x4 transform, found {world_from_camera!r}")
         intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
@@ -64,6 +71,17 @@ class Silhouette:
         """Size, and whether there is anyone in it."""
         height, width = self.distance.shape
         return f"Silhouette({width}x{height}, {'empty' if self.empty else 'a person'})"
+
+
+def seen_views(images: Sequence[Silhouette]) -> list[_core.View]:
+    """The silhouettes with someone in them, as the core takes them.
+
+    Raises:
+        MeasurementError: something else than silhouettes.
+    """
+    if not isinstance(images, Sequence) or not all(isinstance(image, Silhouette) for image in images):
+        raise MeasurementError(f"images: expected a list of ik.Silhouette, found {images!r}")
+    return [image.core for image in images if not image.empty]
 
 
 def signed_distance(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from voodoo.errors import MeasurementError
-from voodoo.ik.values import Bone
+from voodoo.ik.values import Bone, listed_bones
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +60,7 @@ class Options:
             value = getattr(self, name)
             if not (isinstance(value, (int, float)) and low <= value <= high):
                 raise MeasurementError(f"{name}: expected {low:g} to {high:g}, found {value!r}")
+        listed_bones(self.bones)
 
     def parts(self) -> tuple[int, float, float, float, float, float]:
         """The options as the core takes them."""
@@ -74,6 +75,8 @@ def chosen_options(options: Options | None, changes: Mapping[str, Any]) -> Optio
     """
     if options is not None and changes:
         raise MeasurementError(f"options: expected options or single fields, found both: {', '.join(changes)}")
+    if options is not None and not isinstance(options, Options):
+        raise MeasurementError(f"options: expected ik.Options, found {options!r}")
     if options is not None:
         return options
     try:

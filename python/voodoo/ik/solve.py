@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,11 @@ import numpy.typing as npt
 from voodoo.body import Body
 from voodoo.errors import MeasurementError
 from voodoo.ik.chain import Chain
-from voodoo.ik.image import Silhouette
+from voodoo.ik.image import Silhouette, seen_views
 from voodoo.ik.options import Options, chosen_options
 from voodoo.ik.posture import Posture, Postures
 from voodoo.ik.targets import Target, Targets, target_parts
-from voodoo.ik.values import FloatArray, base_pose, listed_bones, named, vector
+from voodoo.ik.values import FloatArray, base_pose, listed_bones, listed_poses, named, vector
 
 
 def solve(
@@ -25,6 +25,7 @@ def solve(
     images: Sequence[Silhouette] = (),
     start: npt.ArrayLike | Posture | None = None,
     world_from_base: npt.ArrayLike | None = None,
+    others: Mapping[str, npt.ArrayLike] | None = None,
     options: Options | None = None,
     **changes: Any,  # noqa: ANN401 - the fields of Options
 ) -> Posture:
@@ -40,16 +41,18 @@ def solve(
         start: angles (n,) or a posture to start from; None: at rest.
         world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
             chosen limbs; None: identity.
+        others: limbs of the body that are not on the chain, as far as they are known: name -> rigid (4, 4) pose, e.g.
+            `world_from_limb` of the posture of the other leg. With images no bone of the chain shall lie in them.
         options: see Options.
         **changes: single fields of Options, e.g. `steps=30, margin=0.0`.
 
     Raises:
-        BodyError: a site that is not on the chain.
+        BodyError: a site that is not on the chain, or another limb that is, or is not in the body.
         MeasurementError: a number that cannot be used; it says which.
     """
-    chain = chain if isinstance(chain, Chain) else Chain(chain)
+    chain = _chain(chain)
     options = chosen_options(options, changes)
-    views = [image.core for image in images if not image.empty]
+    views = seen_views(images)
     begin = start.angles if isinstance(start, Posture) else chain.rest() if start is None else start
     angles, poses, sites, residuals, steps, converged, h = chain.core.solve(
         base_pose(world_from_base),
@@ -58,6 +61,7 @@ def solve(
         listed_bones(options.bones),
         (options.margin, options.thin),
         views,
+        listed_poses(others),
         options.parts(),
     )
     return Posture(
@@ -110,7 +114,7 @@ def solve_many(
         raise MeasurementError(f"starts: expected finite numbers ({n},) or (N, {n}), found shape {begin.shape}")
     begin = np.ascontiguousarray(np.broadcast_to(begin, (len(places), n)))
     goals = [Target.at(site, (0.0, 0.0, 0.0)).parts() for site in sites]
-    views = [image.core for image in images if not image.empty]
+    views = seen_views(images)
     found = chain.core.solve_many(
         base_pose(world_from_base),
         begin,
@@ -123,6 +127,12 @@ def solve_many(
     )
     angles, joints, h, steps, tried, converged = found
     return Postures(angles, joints, h, steps, tried, converged != 0.0)
+
+
+def _chain(chain: Chain | Body) -> Chain:
+    if not isinstance(chain, (Chain, Body)):
+        raise MeasurementError(f"chain: expected an ik.Chain or a voodoo.Body, found {chain!r}")
+    return chain if isinstance(chain, Chain) else Chain(chain)
 
 
 class Follower:
@@ -139,7 +149,7 @@ class Follower:
         Raises:
             MeasurementError: an option or an angle that cannot be used.
         """
-        self.chain = chain if isinstance(chain, Chain) else Chain(chain)
+        self.chain = _chain(chain)
         self.options = chosen_options(None, changes)
         begin = start.angles if isinstance(start, Posture) else self.chain.rest() if start is None else start
         self.angles: FloatArray = np.array(vector(begin))
@@ -151,6 +161,7 @@ class Follower:
         *,
         images: Sequence[Silhouette] = (),
         world_from_base: npt.ArrayLike | None = None,
+        others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> Posture:
         """The next posture; see `solve`. A refused call leaves the follower where it was."""
         posture = solve(
@@ -159,6 +170,7 @@ class Follower:
             images=images,
             start=self.angles,
             world_from_base=world_from_base,
+            others=others,
             options=self.options,
         )
         self.angles = posture.angles

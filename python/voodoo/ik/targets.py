@@ -44,7 +44,7 @@ class Target:
             raise MeasurementError(f"target {self.site}: kind: expected position or line, found {self.kind!r}")
         if len(self.values) != 6 or not all(map(math.isfinite, self.values)):
             raise MeasurementError(f"target {self.site}: expected finite metres, found {self.values}")
-        if not (math.isfinite(self.weight) and self.weight > 0.0):
+        if not (isinstance(self.weight, (int, float)) and math.isfinite(self.weight) and self.weight > 0.0):
             raise MeasurementError(f"target {self.site}: weight: expected a number above zero, found {self.weight!r}")
         if isinstance(self.priority, bool) or not isinstance(self.priority, int) or self.priority < 0:
             raise MeasurementError(f"target {self.site}: priority: expected 0, 1, ..., found {self.priority!r}")
@@ -87,12 +87,16 @@ def target_parts(targets: Targets) -> list[Parts]:
     """Targets as the core takes them; a mapping holds positions.
 
     Raises:
-        MeasurementError: a position is not three finite numbers.
+        MeasurementError: neither, or a position is not three finite numbers.
     """
     if not isinstance(targets, Mapping):
+        if not isinstance(targets, Sequence) or not all(isinstance(target, Target) for target in targets):
+            raise MeasurementError(f"targets: expected site -> position (3,), or a list of Target, found {targets!r}")
         return [target.parts() for target in targets]
     parts: list[Parts] = []
     for site, position in targets.items():
+        if not isinstance(site, str):
+            raise MeasurementError(f"targets: expected names of sites, found {site!r}")
         x, y, z = three(f"target {site}: position", position)
         if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
             raise MeasurementError(f"target {site}: expected finite metres, found {position!r}")

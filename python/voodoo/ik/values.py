@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -20,8 +21,23 @@ _IDENTITY = np.eye(4)
 
 
 def listed_bones(bones: Sequence[Bone] | None) -> list[Bone] | None:
-    """Bones with plain floats."""
-    return None if bones is None else [(first, second, float(radius)) for first, second, radius in bones]
+    """Bones with plain floats.
+
+    Raises:
+        MeasurementError: not two sites and a radius of at least zero.
+    """
+    if bones is None:
+        return None
+    found: list[Bone] = []
+    for bone in bones:
+        try:
+            first, second, radius = bone
+            found.append((str(first), str(second), float(radius)))
+        except (TypeError, ValueError):
+            raise MeasurementError(f"bones: expected (site, site, radius), found {bone!r}") from None
+        if not 0.0 <= found[-1][2] < math.inf:
+            raise MeasurementError(f"bones: expected a radius of at least 0 m, found {radius!r}")
+    return found
 
 
 def named(names: Sequence[str], values: FloatArray) -> MappingProxyType[str, FloatArray]:
@@ -29,14 +45,47 @@ def named(names: Sequence[str], values: FloatArray) -> MappingProxyType[str, Flo
     return MappingProxyType(dict(zip(names, values, strict=True)))
 
 
+def listed_poses(poses: Mapping[str, npt.ArrayLike] | None) -> list[tuple[str, FloatArray]]:
+    """Name and pose (4, 4) of limbs; the core checks them.
+
+    Raises:
+        MeasurementError: not a mapping, or poses that are not numbers.
+    """
+    if poses is None:
+        return []
+    if not isinstance(poses, Mapping):
+        raise MeasurementError(f"others: expected limb name -> pose (4, 4), found {poses!r}")
+    return [(name, numbers("others", pose)) for name, pose in poses.items()]
+
+
 def base_pose(pose: npt.ArrayLike | None) -> FloatArray:
-    """A pose (4, 4), identity for None; the core checks it."""
-    return _IDENTITY if pose is None else np.asarray(pose, dtype=np.float64)
+    """A pose (4, 4), identity for None; the core checks it.
+
+    Raises:
+        MeasurementError: not numbers.
+    """
+    return _IDENTITY if pose is None else numbers("world_from_base", pose)
 
 
 def vector(values: npt.ArrayLike) -> FloatArray:
-    """Numbers in a row; the core checks them."""
-    return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)
+    """Angles in a row; the core checks them.
+
+    Raises:
+        MeasurementError: not numbers.
+    """
+    return np.ascontiguousarray(numbers("angles", values)).reshape(-1)
+
+
+def numbers(what: str, values: npt.ArrayLike) -> FloatArray:
+    """An array.
+
+    Raises:
+        MeasurementError: not numbers; it names `what`.
+    """
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MeasurementError(f"{what}: expected numbers, found {values!r}") from None
 
 
 def three(what: str, values: Vector) -> tuple[float, float, float]:

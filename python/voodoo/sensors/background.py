@@ -72,7 +72,8 @@ class StillBackground:
         pictures: some tens spread over a recording, (H, W, 3) BGR uint8.
         occupied: for each picture, (H, W) where the person may be; None: anywhere, so that the person must leave every place in
             more than half of the pictures.
-        threshold: least difference of the foreground in any colour, 0 to 255.
+        threshold: least difference of the foreground in any colour, 0 to 255, or
+        chroma: in colour alone, whatever the light (CIE 1976 a*, b*): skin in the shade is as dark as a dark floor, but redder.
         smallest: regions of less area are specks [px].
 
     Raises:
@@ -86,14 +87,16 @@ class StillBackground:
         *,
         occupied: Sequence[Mask] | None = None,
         threshold: float = 30.0,
+        chroma: float = 8.0,
         smallest: int = 100,
     ) -> None:
         """Learn the background; see the class."""
         if not pictures:
             raise MeasurementError("pictures: expected some, found none")
-        if not (0.0 < threshold < 255.0 and smallest > 0):
+        if not (0.0 < threshold < 255.0 and chroma > 0.0 and smallest > 0):
             raise MeasurementError(
-                f"background: expected threshold 0 to 255 and smallest > 0, found {threshold!r}, {smallest!r}"
+                f"background: expected threshold 0 to 255, chroma and smallest > 0, found {threshold!r}, {chroma!r}, "
+                f"{smallest!r}"
             )
         for picture in pictures:
             _check(picture, pictures[0].shape)
@@ -111,7 +114,8 @@ class StillBackground:
             raise MeasurementError("occupied: expected pixels where the person is not in some picture, found none")
         hidden = self.unknown.astype(np.uint8)
         self._background = cv2.inpaint(np.nan_to_num(median).astype(np.uint8), hidden, _INPAINT_PX, cv2.INPAINT_TELEA)
-        self._shape, self._threshold, self._smallest = pictures[0].shape, threshold, smallest
+        self._colours = _colours(np.asarray(self._background, dtype=np.uint8))
+        self._shape, self._threshold, self._chroma, self._smallest = pictures[0].shape, threshold, chroma, smallest
 
     def mask(self, picture: ByteImage) -> Mask:
         """(H, W): True where the picture differs from the background.
@@ -120,8 +124,12 @@ class StillBackground:
             MeasurementError: another type or size than the background's.
         """
         _check(picture, self._shape)
-        difference = cv2.absdiff(_smooth(picture), self._background).max(axis=2)
-        return _large((difference > self._threshold).astype(np.uint8), self._smallest)
+        smooth = _smooth(picture)
+        differs = cv2.absdiff(smooth, self._background).max(axis=2) > self._threshold
+        # A low threshold: smoothing carries vivid colours a pixel beyond their border.
+        colourful = np.linalg.norm(_colours(smooth) - self._colours, axis=2) > self._chroma
+        differs |= cv2.erode(colourful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
+        return _large(differs.astype(np.uint8), self._smallest)
 
 
 def _check(image: ByteImage, shape: tuple[int, ...] | None) -> None:
@@ -133,6 +141,11 @@ def _check(image: ByteImage, shape: tuple[int, ...] | None) -> None:
 
 def _smooth(picture: ByteImage) -> ByteImage:
     return np.asarray(cv2.GaussianBlur(picture, (0, 0), _SMOOTH_PX), dtype=np.uint8)
+
+
+def _colours(picture: ByteImage) -> npt.NDArray[np.float32]:
+    """(H, W, 2): a* and b* of CIE 1976, without the lightness."""
+    return cv2.cvtColor(picture.astype(np.float32) / np.float32(255.0), cv2.COLOR_BGR2LAB)[..., 1:]
 
 
 def _large(mask: ByteImage, smallest: int) -> Mask:

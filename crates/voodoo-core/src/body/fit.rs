@@ -12,6 +12,8 @@ const BENT: f64 = 0.3;
 const STEADY: f64 = 2.5;
 /// A limb whose joint turns by less than this about any axis carries its landmarks for its parent: a clavicle for the chest.
 const RIGID: f64 = 1.0;
+/// Nobody's limb is shorter than its pair by more than this share: it was foreshortened, and is as long as its pair.
+const UNLIKE: f64 = 0.75;
 /// Weight and lever (metres) of the prior orientation against landmarks of weight one.
 const PRIOR_WEIGHT: f64 = 0.01;
 const PRIOR_LEVER: f64 = 0.1;
@@ -61,6 +63,9 @@ impl Body {
                 body.stretch_limb(limb, &pairs, &pose);
                 body.align_hinge(limb, &poses);
             }
+        }
+        if fit_sizes {
+            body.even_out();
         }
         // The last limbs may have stretched after their parents were placed; every joint is closed once more.
         body.close_joints(&mut poses);
@@ -244,6 +249,17 @@ impl Body {
                 .find(|(known, _)| (*known - position).length() < 1e-9)
                 .map_or(position * stretch, |(_, measured)| *measured)
         });
+    }
+
+    fn even_out(&mut self) {
+        for pair in self.pairs() {
+            let length = |limb: &usize| self.limbs[*limb].shape.length();
+            let longest = pair.iter().map(length).fold(0.0, f64::max);
+            let factors: Vec<f64> = pair.iter().map(|limb| longest / length(limb)).collect();
+            for (limb, factor) in pair.iter().zip(factors).filter(|(_, factor)| factor * UNLIKE > 1.0) {
+                self.change_length(*limb, factor);
+            }
+        }
     }
 
     /// Turns the hinge on a limb so that its measured pose is one the hinge can take: nobody's elbow or knee axis is quite

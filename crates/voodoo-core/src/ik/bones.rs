@@ -2,7 +2,7 @@
 
 use super::image::Segment;
 use super::model::Model;
-use super::trunk::Trunk;
+use super::trunk::{Carrier, Trunk};
 use crate::body::Body;
 use crate::geometry::Vec3;
 
@@ -43,16 +43,10 @@ pub fn trunk(body: &Body, model: &Model) -> Vec<Trunk> {
     let mut found = Vec::new();
     let base =
         model.parts().first().and_then(|part| body.limbs()[part.limb].parent.as_ref().map(|(parent, _)| *parent));
-    let parts = model.parts().iter().enumerate().map(|(index, part)| (Some(index), part.limb));
-    for (part, limb) in base.map(|limb| (None, limb)).into_iter().chain(parts) {
+    let parts = model.parts().iter().enumerate().map(|(index, part)| (Carrier::Part(index), part.limb));
+    for (carrier, limb) in base.map(|limb| (Carrier::Base, limb)).into_iter().chain(parts) {
         if branches(body, limb) {
-            let shape = &body.limbs()[limb].shape;
-            found.push(Trunk {
-                part,
-                length: shape.length(),
-                a: [shape.a0(), shape.a1()],
-                b: [shape.b0(), shape.b1()],
-            });
+            found.push(Trunk::new(&body.limbs()[limb].shape, carrier));
         }
     }
     found

@@ -1,7 +1,7 @@
 //! The image criterion (J10 eq. 5-8): how far the projected limbs lie outside the silhouettes.
 
 use super::model::{Kinematics, Model};
-use super::trunk::Trunk;
+use super::trunk::{Carrier, Trunk};
 use crate::geometry::{Mat3, Pose, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
@@ -52,13 +52,13 @@ pub struct Criterion<'a> {
     pub segments: &'a [Segment],
     /// Up to how many radii the silhouette is the limb itself, in whose middle the bone shall lie; 0: nowhere.
     pub thin: f64,
-    /// What the bones cannot lie in.
+    /// What the bones cannot lie in: the trunk, and limbs beside the chain.
     pub trunk: &'a [Trunk],
 }
 
 impl Criterion<'_> {
-    /// Mean length of the projected bones, pixels, if they lay across the line of sight: what `h` can change by at most per radian,
-    /// about.
+    /// What `h` changes by at most per radian, about, if one of the views sees the bones outside: their mean projected length, pixels,
+    /// if they lay across the line of sight, over the number of views. So a view that is content changes no step.
     pub fn reach(&self, at: &Kinematics) -> f64 {
         let mut sum = 0.0;
         for segment in self.segments {
@@ -68,7 +68,8 @@ impl Criterion<'_> {
                 sum += view.intrinsics[0] * (ends[1] - ends[0]).length() / z.max(NEAREST);
             }
         }
-        sum / (self.views.len() * self.segments.len()).max(1) as f64
+        let views = self.views.len();
+        sum / (views * views * self.segments.len()).max(1) as f64
     }
 
     /// The criterion, and its gradient by all unknowns into `gradient` (J10 eq. 7, 8). Samples no camera sees count zero.
@@ -146,7 +147,7 @@ impl Criterion<'_> {
                     let force = scale * (slope - depth / z * nearer);
                     forces[0] += (1.0 - t) * force;
                     forces[1] += t * force;
-                    if let Some(part) = trunk.part {
+                    if let Carrier::Part(part) = trunk.carrier {
                         pull(model, at, part, x, -share * scale * slope, gradient);
                     }
                 }

@@ -20,5 +20,5 @@ pub use image::{Criterion, SAMPLES, Segment, View};
 pub use model::{Column, Kinematics, Model, Part, Root, Turn};
 pub use project::{project, read};
 pub use solver::{Options, Report, Solver};
-pub use trunk::Trunk;
+pub use trunk::{Carrier, Trunk};
 pub use twist::log;

@@ -1,16 +1,29 @@
-//! The trunk, in which no bone can lie: silhouettes cannot tell, since an arm in the trunk is content before and behind it.
+//! The trunk and other limbs, in which no bone can lie: silhouettes cannot tell, since an arm in the trunk is content before and
+//! behind it, and a leg in the other one, too.
 
 use super::model::Kinematics;
 use crate::geometry::{Pose, Vec3};
+use crate::shape::TaperedEllipticCylinder;
 
 /// A bone keeps this share of its radius off the trunk: flesh gives way, and the model's limbs are stiffer than a back.
 const CLEARANCE: f64 = 0.5;
 
+/// What carries a limb that no bone can lie in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Carrier {
+    /// It is the base of the chain.
+    Base,
+    /// It is a part of the chain.
+    Part(usize),
+    /// It is no part of the chain and has this pose in the world.
+    World(Pose),
+}
+
 /// A limb no bone can lie in: a tapered elliptic cylinder along z of its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trunk {
-    /// Its part; `None`: it is the base.
-    pub part: Option<usize>,
+    /// What carries it.
+    pub carrier: Carrier,
     /// Length, metres.
     pub length: f64,
     /// Semi-axes along x at both ends.
@@ -20,9 +33,18 @@ pub struct Trunk {
 }
 
 impl Trunk {
+    /// A limb's shape somewhere.
+    pub fn new(shape: &TaperedEllipticCylinder, carrier: Carrier) -> Self {
+        Self { carrier, length: shape.length(), a: [shape.a0(), shape.a1()], b: [shape.b0(), shape.b1()] }
+    }
+
     /// Its pose.
     pub(super) fn pose(&self, at: &Kinematics) -> Pose {
-        self.part.map_or(at.base, |part| at.poses[part])
+        match self.carrier {
+            Carrier::Base => at.base,
+            Carrier::Part(part) => at.poses[part],
+            Carrier::World(pose) => pose,
+        }
     }
 
     /// How deep a point with flesh of a radius around it lies inside, metres (about: by the level of the ellipse), and the
