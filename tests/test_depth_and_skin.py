@@ -9,7 +9,7 @@ from voodoo import Camera, MeasurementError
 from voodoo.sensors.assignment import assign
 from voodoo.sensors.depth import BodyView, DepthFilter, body_view
 from voodoo.sensors.skin import SkinSettings, SkinTracker
-from voodoo.sensors.skin_regions import candidates
+from voodoo.sensors.skin_regions import candidates, joined
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 # at the origin of a world whose z points up, looking along x
@@ -297,6 +297,59 @@ def test_body_view_is_where_the_body_is():
     assert mask.shape == (240, 320)
     assert mask[62:178, 122:158].all()
     assert not mask[:, :110].any() and not mask[:, 175:].any()
+
+
+@pytest.mark.parametrize("gap", [0, 6])
+def test_a_hand_ends_where_a_table_behind_it_begins(gap):
+    """Also when the depth camera sees nothing between them, as in the shadow of structured light."""
+    depth = np.full((240, 320), 4.5, np.float32)
+    depth[110:130, 100:140] = Z + 0.3  # a table of skin's colour, within the box around the body
+    depth[100:121, 100:112] = Z  # the hand before it
+    depth[110:121, 112 : 112 + gap] = 0.0
+    depth[121 : 121 + gap, 100:112] = 0.0
+    view = body_view(
+        depth,
+        depth_camera=CAMERA,
+        world_from_depth=POSE,
+        metres_per_unit=1.0,
+        color_camera=CAMERA,
+        world_from_color=POSE,
+        joints=[at((120, 60)), at((160, 180)), at((140, 120))],
+    )
+    skin = np.zeros((240, 320), bool)
+    skin[100:121, 100:112] = True
+    skin[110:130, 100:140] = True
+    assert len(candidates(skin, palm_px=5.4)[0]) != 2  # one region, in colour alone
+    found, regions = candidates(skin & view.mask, palm_px=5.4)
+    hand = next(item for item in found if regions[105, 105] == item.region)
+    assert regions[125, 130] not in (0, hand.region)
+    assert np.linalg.norm(np.subtract(hand.pixel, (105.5, 110.0))) < 3.0
+
+
+def test_what_a_shadow_parts_is_one_hand_and_arms_stay_apart():
+    mask = np.zeros((240, 320), bool)
+    mask[100:108, 100:108] = mask[110:118, 100:108] = True  # palm and fingers
+    mask[100:150, 200:208] = mask[100:150, 210:218] = True  # two forearms
+    _, regions = candidates(joined(mask, palm_px=5.4), palm_px=5.4)
+    assert regions[104, 104] == regions[114, 104] != 0
+    assert regions[120, 204] != regions[120, 214]
+
+
+def test_a_far_hand_is_no_speck():
+    """A hand is as large as it is at its own depth, not at that of the nearest site: it keeps its name beyond the gate."""
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    far = 1.6 * Z
+    body = BodyView(np.ones((240, 320), bool), grid, np.where(grid[:, 0] < 140, far, Z))
+    joints = Pose(head, left, right).joints
+    joints["l_hand"] = at(left, far)
+    for step in range(6):
+        moved = (left[0] - 4 * step, left[1] - 4 * step)
+        image = picture(head, right, right, seed=step)
+        cv2.circle(image, moved, 4, SKIN, -1)
+        skin.observe(image, CAMERA, POSE, joints, body=body)
+        assert pixel_error(skin, "l_hand", moved) < 2.0
 
 
 def test_the_front_end_runs_on_the_bundled_recording():

@@ -9,6 +9,7 @@ import voodoo
 from voodoo import Camera, MeasurementError, RecordingError
 from voodoo.keypoints import LAYOUTS, KeypointSensor, nearest_person, read_openpose_json, site_pixels, window_depth
 from voodoo.sensors.gating import SiteGate
+from voodoo.sensors.occlusion import body_before
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5, (-0.1, 0.02, 0.0, 0.0))
 # 3 m in front of the person, 1 m high, looking along world y
@@ -128,6 +129,23 @@ def test_registered_depth_gives_points_behind_the_surface():
     assert (report.points, report.rays) == (("l_wrist",), ("r_wrist",))
     with pytest.raises(MeasurementError, match="480, 640"):
         sensor.add(frame, rows, predicted=joints, depth=depth[:100])
+
+
+def test_what_the_body_hides_is_a_guess():
+    track = tracker()
+    joints = dict(track.estimate.joints)
+    names = ("l_hip", "r_hip", "l_wrist")
+    beside = (3.0, 0.0, 0.9)  # at the person's left
+    left, right, wrist = body_before([joints[name] for name in names], beside, track.distance)
+    assert left < 0.12 < 0.20 < right  # the pelvis lies before the other hip
+    assert wrist < 0.05
+    before = dict(zip(names, (left, right, wrist), strict=True))
+    _, rays, _ = KeypointSensor("coco17", CAMERA, POSE).observe(
+        keypoints_of(joints, "coco17"), stamp=0.0, predicted=joints, before=before
+    )
+    sigma = {ray.site: ray.sigma for ray in rays}
+    assert sigma["r_hip"] > 1.3 * sigma["l_hip"]
+    assert sigma["l_wrist"] == sigma["r_wrist"]
 
 
 def test_window_depth_takes_the_near_surface_and_ignores_holes():

@@ -2,7 +2,7 @@
 
 Each row: site, {keypoint index: share}, spread [m]. A site is the sum of its keypoints times their shares; the spread
 is how far the network's idea of the joint lies from ours (a hip keypoint sits on the skin, a neck keypoint between
-the shoulders).
+the shoulders, ears below the middle of the head).
 Sites that would only repeat keypoints used already (a neck that a network computes from its two shoulders) are left
 out: they would count one error twice.
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-_JOINT_SPREAD = {"shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.03}
+_JOINT_SPREAD = {"shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.05}
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def _body_25(start: Mapping[str, int], *, toe: int) -> dict[str, int]:
 
 def _ears(left: int, right: int) -> Part:
     # The middle of the ears is the middle of the head, from every side.
-    return Part("head_center", {left: 0.5, right: 0.5}, 0.03)
+    return Part("head_center", {left: 0.5, right: 0.5}, 0.06)
 
 
 def _palm(side: str, wrist: int, little: int, index: int) -> Part:
@@ -82,8 +82,8 @@ LAYOUTS: dict[str, Layout] = {
         (
             *_parts({**_COCO_LEFT, "toe": 19}, {**_COCO_RIGHT, "toe": 22}),
             _ears(3, 4),
-            Part("skullbase", {17: 1.0}, 0.04),
-            Part("skull_tip", {18: 1.0}, 0.04),
+            Part("skullbase", {17: 1.0}, 0.05),
+            Part("skull_tip", {18: 1.0}, 0.05),
         ),
     ),
     # MediaPipe: 33 landmarks; ears 7 and 8; knuckles of little and index finger from 17
@@ -105,7 +105,7 @@ LAYOUTS: dict[str, Layout] = {
         (
             *_parts({**_COCO_LEFT, "toe": 20}, {**_COCO_RIGHT, "toe": 21}),
             _ears(3, 4),
-            Part("skull_tip", {17: 1.0}, 0.04),
+            Part("skull_tip", {17: 1.0}, 0.05),
             Part("vc7", {18: 1.0}, 0.05),
         ),
     ),
@@ -119,7 +119,7 @@ LAYOUTS: dict[str, Layout] = {
             ),
             Part("humanoid_root", {0: 1.0}, 0.04),
             Part("vc7", {8: 1.0}, 0.05),
-            Part("skull_tip", {10: 1.0}, 0.04),
+            Part("skull_tip", {10: 1.0}, 0.05),
         ),
     ),
 }

@@ -39,6 +39,8 @@ BEHIND_SURFACE_M: dict[str, float] = {
 }  # fmt: skip
 """How far behind the visible surface a site lies along the ray [m]: half the depth of the limb there, for an adult
 (means of ANSUR II: head breadth 0.15 and length 0.19, chest depth 0.25, knee breadth 0.11, wrist breadth 0.06...)."""
+GUESSED = 0.4
+"""Standard deviation of a site behind so many metres of the person's own body, beyond half a limb: the network guesses it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +177,7 @@ class KeypointSensor:
         gate: SiteGate | None = None,
         depth: DepthArray | None = None,
         metres_per_unit: float = 0.001,
+        before: Mapping[str, float] | None = None,
     ) -> tuple[KeypointReport, list[SiteRay], dict[str, tuple[FloatArray, float]]]:
         """What the keypoints of one person say: rays, and with depth points.
 
@@ -189,6 +192,8 @@ class KeypointSensor:
             gate: drops what is too far from the prediction; None takes everything.
             depth: (H, W) uint16 or float32.
             metres_per_unit: of `depth`.
+            before: site name -> how much of the person's body lies between it and the camera [m], see
+                `voodoo.sensors.occlusion`; None: not known. Networks are as sure of what they guess as of what they see.
 
         Returns:
             The report, the rays, and site name -> (position (3,) in the world, standard deviation) [m].
@@ -221,6 +226,8 @@ class KeypointSensor:
                     points[item.site] = (point, max(sigma, POINT_SIGMA_M))
                     continue
             if gate is None or gate.accepts_ray(item.site, site, origin, direction, stamp, self.source):
+                hidden = (before or {}).get(item.site, 0.0) - _behind_surface(item.site)
+                sigma = math.hypot(sigma, GUESSED * max(hidden, 0.0))
                 rays.append(SiteRay(item.site, origin, direction, sigma, self.source))
             else:
                 dropped.append(item.site)
@@ -238,8 +245,11 @@ class KeypointSensor:
         if z is None:
             return None
         cosine = float(direction @ pose[:3, 2])
-        behind = BEHIND_SURFACE_M[item.site.removeprefix("l_").removeprefix("r_")]
-        return np.asarray(pose[:3, 3] + direction * (z / cosine + behind))
+        return np.asarray(pose[:3, 3] + direction * (z / cosine + _behind_surface(item.site)))
+
+
+def _behind_surface(site: str) -> float:
+    return BEHIND_SURFACE_M[site.removeprefix("l_").removeprefix("r_")]
 
 
 def window_depth(

@@ -19,6 +19,10 @@ from voodoo.sensors.pixels import FloatArray
 
 JUMP_M = 0.12
 """A region is at most this far from where its motion would have it, from one picture to the next."""
+UNKNOWN_M = 0.24
+"""The same for a region that was seen once: nothing is known about its motion."""
+NEAR = 0.5
+"""What is within this share of the possible motion went on as expected."""
 FORGET_S = 0.25
 """A region that was not seen for so long has lost its name."""
 FASTEST = 8.0
@@ -108,7 +112,12 @@ class Blobs:
         """The blob of each sight of a picture, new ones included; those that were not seen for long are dropped."""
         cost = _apart(self.items, sights, stamp)
         seen: list[Blob | None] = [None] * len(sights)
-        for row, column in assign(cost, gate=1.0):
+        pairs = assign(cost, gate=1.0)
+        kept = {sights[column].region for row, column in pairs if self.items[row].label and cost[row, column] < NEAR}
+        for row, column in pairs:
+            # What reappears far from where it was going, as a part of a region that has a name, is that one's.
+            if cost[row, column] >= NEAR and sights[column].region in kept:
+                self.items[row].label = None
             self.items[row].move(sights[column], stamp)
             seen[column] = self.items[row]
         found = [Blob(sight, stamp) if blob is None else blob for blob, sight in zip(seen, sights, strict=True)]
@@ -241,4 +250,4 @@ def _apart(blobs: Sequence[Blob], sights: Sequence[Sight], stamp: float) -> Floa
 
 
 def _limit(blob: Blob, stamp: float) -> float:
-    return JUMP_M + UNSEEN_SPEED * max(stamp - blob.stamp - 1.0 / 30.0, 0.0)
+    return (JUMP_M if blob.count > 1 else UNKNOWN_M) + UNSEEN_SPEED * max(stamp - blob.stamp - 1.0 / 30.0, 0.0)

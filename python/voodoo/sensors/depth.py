@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -18,6 +18,8 @@ from voodoo.sensors.pixels import FloatArray, in_sensor
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 
 
+_EDGE_M = 0.10
+"""Surfaces that differ by more than this in depth do not touch."""
 _STANDS = 1e-3
 """A pose whose entries change by less is that of a camera that stands."""
 _BEHIND = (0.05, 0.02)
@@ -249,7 +251,36 @@ def body_view(
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
     grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
     beyond = _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
-    return BodyView(grown | beyond, pixels, in_color[:, 2], still)
+    cut = _behind_edges(pixels, in_color[:, 2], mask.shape)
+    return BodyView((grown | beyond) & ~cut, pixels, in_color[:, 2], still)
+
+
+def _behind_edges(pixels: FloatArray, depths: npt.NDArray[Any], shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
+    """(H, W): True in a line on the far side of the edges between surfaces: a hand's region ends where a table behind it
+    begins.
+
+    Args:
+        pixels: (N, 2) of the points in the colour image, inside it; between them the nearest one counts.
+        depths: (N,) [m].
+        shape: of the colour image.
+    """
+    edges = np.zeros(shape, dtype=np.bool_)
+    if not len(depths):
+        return edges
+    u, v = np.rint(pixels.T).astype(np.intp)
+    left, top = u.min(), v.min()
+    z = np.full((v.max() - top + 1, u.max() - left + 1), np.inf, dtype=np.float32)
+    np.minimum.at(z, (v - top, u - left), depths.astype(np.float32))
+    _, nearest = cv2.distanceTransformWithLabels(
+        np.isinf(z).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    known = np.isfinite(z)
+    of_label = np.zeros(int(nearest.max()) + 1, dtype=np.float32)
+    of_label[nearest[known]] = z[known]
+    z = of_label[nearest]
+    front = cv2.erode(z, np.ones((3, 3), np.uint8))
+    edges[top : top + len(z), left : left + z.shape[1]] = z > front + _EDGE_M
+    return edges
 
 
 def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high: FloatArray) -> tuple[slice, slice]:

@@ -33,6 +33,7 @@ from voodoo.sensors.model import (
     RangeNoise,
     SensorModel,
 )
+from voodoo.sensors.occlusion import body_before
 from voodoo.sensors.pixels import FloatArray, in_sensor
 from voodoo.sensors.rays import SiteRay, add_rays, agreed
 from voodoo.sensors.skin import SkinSettings, SkinTracker
@@ -281,8 +282,15 @@ class FrontEnd:
         with_depth: dict[str, Any] = {}
         if registered is not None:
             with_depth = {"depth": registered.image, "metres_per_unit": registered.metres_per_unit}
+        joints = self.tracker.estimate.joints
+        hidden = body_before(list(joints.values()), item.root_from_sensor[:3, 3], self.tracker.distance)
         report, rays, points = sensor.observe(
-            person, stamp=frame.stamp, predicted=predicted, gate=self._gate, **with_depth
+            person,
+            stamp=frame.stamp,
+            predicted=predicted,
+            gate=self._gate,
+            before=dict(zip(joints, hidden.tolist(), strict=True)),
+            **with_depth,
         )
         self.reports[item.sensor] = report
         self.rays += rays

@@ -35,7 +35,7 @@ from voodoo.sensors.model import PixelNoise
 from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
-from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates
+from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates, joined
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
@@ -46,6 +46,8 @@ SPECK = 0.7
 """A smaller share of a palm is a speck."""
 BARE_M = 0.08
 """What is nearer to the bare limbs than this may be theirs."""
+STANDS_OUT_M = 0.02
+"""A hand before trunk or legs stands out from them by as much; a stripe of a shirt does not."""
 BARE = ("head", "neck", "upperarm", "forearm", "hand")
 """Endings of the names of limbs that show skin."""
 ON_LIMB_M, OFF_LIMB_M = 0.03, 0.06
@@ -174,21 +176,25 @@ class SkinTracker:
             skin &= self._static < 0.5
         # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
         skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
+        focal = math.sqrt(camera.fx * camera.fy)
+        nearest = min((z for _, z in places.values()), default=1.0)
+        palm_px = PALM_M * focal / nearest
+        skin = joined(skin, palm_px=palm_px)
+        if body is not None:
+            skin &= body.mask
         self._skin = skin
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
         self._stamp = stamp
         if not places or not self.settled:
             return []
-        focal = math.sqrt(camera.fx * camera.fy)
-        nearest = min(z for _, z in places.values())
-        self.candidates, labels = candidates(skin, palm_px=PALM_M * focal / nearest)
+        self.candidates, labels = candidates(skin, palm_px=palm_px)
         if not self.candidates:
             return []
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
         axis = pose[:3, 2]
         regions = None if body is None else body.sample(labels)
-        sights = []
+        sights, speck = [], []
         for item, direction in zip(self.candidates, directions, strict=True):
             looked = None
             if body is not None and regions is not None:
@@ -197,6 +203,7 @@ class SkinTracker:
             z, still = (nearest, False) if looked is None else looked
             place = origin + direction * (z / float(direction @ axis))
             sights.append(Sight(direction, place, looked is not None, item.hand, item.region, still))
+            speck.append(item.area < SPECK * math.pi * (PALM_M * focal / z) ** 2)
         seen = self.blobs.follow(sights, stamp)
         sites = list(places)
         distance = np.array(
@@ -211,11 +218,9 @@ class SkinTracker:
             ]
         )
         limbs = {} if surface is None else surface(np.array([sight.place for sight in sights]))
-        palm = math.pi * (PALM_M * focal / nearest) ** 2
-        allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, palm=palm)
+        allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, specks=speck)
         # A speck far from where the hand is expected is what is left of another region.
-        speck = np.array([item.area < SPECK * palm for item in self.candidates])
-        allowed[(distance > self.settings.gate) & speck] = 0.0
+        allowed[(distance > self.settings.gate) & np.array(speck)] = 0.0
         found = self.blobs.name(
             seen,
             distance,
@@ -256,7 +261,7 @@ class SkinTracker:
         limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
         lost: Collection[str],
         *,
-        palm: float,
+        specks: list[bool],
     ) -> FloatArray:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
@@ -267,11 +272,10 @@ class SkinTracker:
         owned = {blob.sight.region for blob in seen if blob.label is not None}
         away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
         outside = away > self.settings.unexplained
-        whole = [item.area > SPECK * palm for item in self.candidates]
-        free = np.array([a and b.deep and b.region not in owned for a, b in zip(whole, sights, strict=True)])
+        free = np.array([not a and b.deep and b.region not in owned for a, b in zip(specks, sights, strict=True)])
         scene = np.array([sight.still for sight in sights]) & outside
         bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]
-        dressed = (np.min(bare, axis=0) if bare else away) > BARE_M
+        dressed = ((np.min(bare, axis=0) if bare else away) > BARE_M) & (away > STANDS_OUT_M)
         far = np.array([free & (outside | (dressed if site in lost else False)) for site in sites])
         allowed = np.where(scene, 0.0, 1.0 + far)
         for row, site in enumerate(sites):
@@ -286,7 +290,11 @@ class SkinTracker:
                 allowed[row] *= [not sight.deep or d < reach for sight, d in zip(sights, distance, strict=True)]
             elbow = predicted.get(f"{side}_elbow")
             if elbow is not None:
-                allowed[row] *= _hand_ends(sights, None if site in lost else predicted[site], elbow)
+                ends = np.array(_hand_ends(sights, predicted[site], elbow))
+                if site in lost:
+                    # Nothing speaks for where the hand is expected, but it may be there all the same.
+                    ends |= _hand_ends(sights, None, elbow)
+                allowed[row] *= ends
         return allowed
 
     def learn(

@@ -38,6 +38,29 @@ class Candidate:
     hand: bool = True
 
 
+def joined(skin: Mask, *, palm_px: float) -> Mask:
+    """The mask (H, W) with gaps of two pixels closed between regions no longer than half a hand: a shadow between the fingers
+    and the palm does not make two hands of one. Arms that lie near each other stay apart.
+
+    Args:
+        skin: True where the colour is skin's.
+        palm_px: radius of a palm in the image [px].
+    """
+    pixels = skin.view(np.uint8)
+    x, y, w, h = cv2.boundingRect(pixels)
+    if not (w and h):
+        return skin
+    window = (slice(y, y + h), slice(x, x + w))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(pixels[window], connectivity=8)
+    size = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    small = size <= 0.5 * LONGEST_HAND * palm_px
+    small[0] = False
+    closed = cv2.morphologyEx(small[labels].view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    result = skin.copy()
+    result[window] |= closed.astype(bool)
+    return result
+
+
 def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
     """Where in a skin mask (H, W) a head or a hand may be.
 
