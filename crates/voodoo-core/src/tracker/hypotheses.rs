@@ -16,8 +16,6 @@ const SUSPICIOUS: f64 = 25.0;
 const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
 const REFUTED: f64 = 0.2;
-/// What lies beyond its hinge is suspect as well when so many times more points lie open near the chain than it explains.
-const MISSED: f64 = 1.5;
 /// Either share is of this many patches at least, and has to last for so many frames.
 const LEAST: f64 = 20.0;
 const PATIENCE: usize = 3;
@@ -142,7 +140,7 @@ impl Tracker {
             self.idle[index] = 0;
             return 0;
         }
-        if self.suspect(chain, views, work, open) == [false; 2] {
+        if self.suspect(chain, views, work) == [false; 2] {
             self.idle[index] = 0;
             return 0;
         }
@@ -205,7 +203,7 @@ impl Tracker {
     }
 
     /// Whether the frame speaks against a chain where it is: against all of it, and against what lies beyond its hinge.
-    fn suspect(&self, chain: &TwoBone, views: Views, work: &mut Hypotheses, open: f64) -> [bool; 2] {
+    fn suspect(&self, chain: &TwoBone, views: Views, work: &mut Hypotheses) -> [bool; 2] {
         let Hypotheses { own, own_weight, others, best, .. } = work;
         own.clear();
         own_weight.clear();
@@ -236,7 +234,7 @@ impl Tracker {
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
         });
-        let lower = against(chain.lower, alone(upper)) || open > MISSED * alone(upper);
+        let lower = against(chain.lower, alone(upper));
         [against(chain.upper, alone(0)), lower]
     }
 
@@ -270,7 +268,7 @@ impl Tracker {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
             // What is as suspect as before is not worth a jump.
             let strain = self.strain(&self.chains[index], &self.poses);
-            if strain <= strained && !self.suspect(&self.chains[index], views, work, 0.0)[0] {
+            if strain <= strained && !self.suspect(&self.chains[index], views, work)[0] {
                 return REFINE;
             }
         }
