@@ -5,6 +5,7 @@ mod scene;
 
 use proptest::prelude::*;
 use voodoo_core::body::{HumanModel, Joint};
+use voodoo_core::chain::{hinge_axis, joint_turn, place};
 use voodoo_core::config::SolverKind;
 use voodoo_core::frame::{Cloud, Frame, PositionRelation, RayRelation, Scope};
 use voodoo_core::geometry::{Pose, Quat, Vec3};
@@ -81,6 +82,35 @@ proptest! {
         let named: Vec<(usize, Vec3)> = wanted.iter().copied().enumerate().collect();
         let (body, found) = Body::human(1.75, HumanModel::Full).unwrap().fit(&named, true).unwrap();
         prop_assert!(largest_distance(&sites(&body, &found), &wanted) < 1e-6);
+    }
+
+    #[test]
+    fn a_bent_arm_shows_the_axis_of_its_elbow(seed: u64, flexion in 0.5..2.2_f64, model in 0..2) {
+        let mut noise = scene::Noise(seed);
+        let model = [HumanModel::Papers, HumanModel::Full][model as usize];
+        let truth = Body::human(1.7, model).unwrap();
+        let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
+        let mut poses = truth.rest_pose(root);
+        let index = |name: &str| truth.limb_index(name).unwrap();
+        let (upper, fore) = (index("r_upperarm"), index("r_forearm"));
+        let joint = |limb: usize| &truth.limbs()[limb].parent.as_ref().unwrap().1;
+        // The arm is lifted and turned about itself, then bent.
+        let turn = Quat::from_scaled_axis(noise.vector(1.0));
+        let parent = truth.limbs()[upper].parent.as_ref().unwrap().0;
+        poses[upper] = place(joint(upper), &poses[parent], turn);
+        let bend = Quat::from_axis_angle(hinge_axis(joint(fore)), flexion);
+        poses[fore] = place(joint(fore), &poses[upper], bend);
+        for limb in fore + 1..poses.len() {
+            if let Some((parent, joint)) = &truth.limbs()[limb].parent && *parent == fore {
+                poses[limb] = place(joint, &poses[fore], Quat::IDENTITY);
+            }
+        }
+        let named: Vec<(usize, Vec3)> = sites(&truth, &poses).into_iter().enumerate().collect();
+        let (body, found) = Body::human(1.75, model).unwrap().fit(&named, true).unwrap();
+        let Some((_, elbow)) = &body.limbs()[fore].parent else { unreachable!() };
+        let found = joint_turn(elbow, &found[upper], &found[fore]);
+        let off = found.angle_between(bend);
+        prop_assert!(off < 0.1, "bent by {found:?}, {off} rad off {flexion}");
     }
 
     #[test]

@@ -8,6 +8,8 @@ use crate::rigid::Moments;
 
 /// A hinge bent by less than this does not tell its axis; radians.
 const BENT: f64 = 0.3;
+/// A landmark this share of a limb's length from its joint shows where the limb points.
+const FAR_END: f64 = 0.5;
 /// A joint whose every range is narrower than this (radians) belongs to the trunk: spine and neck, not shoulder and hip.
 const STEADY: f64 = 2.5;
 /// A limb whose joint turns by less than this about any axis carries its landmarks for its parent: a clavicle for the chest.
@@ -206,11 +208,13 @@ impl Body {
                 continue;
             }
             let (start, bend) = (measured(&own.name)?, measured(&joint.name)?);
-            let end = self
-                .sites()
-                .iter()
-                .filter(|site| site.limb == index && site.name != joint.name)
-                .find_map(|site| measured(&site.name))?;
+            // The far end of the child is a site of its own, or the joint of what hangs on it.
+            let away = |local: &Vec3| (*local - joint.limb_from_joint.translation).length();
+            let landmarks = self.known_landmarks(index, positions).into_iter();
+            let (local, end) = landmarks.max_by(|a, b| away(&a.0).total_cmp(&away(&b.0)))?;
+            if away(&local) < FAR_END * child.shape.length() {
+                return None;
+            }
             let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
             return (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()));
         }
