@@ -7,7 +7,7 @@ import pytest
 import voodoo
 from voodoo import Camera, MeasurementError
 from voodoo.sensors.assignment import assign
-from voodoo.sensors.depth import BodyView, DepthFilter, body_view
+from voodoo.sensors.depth import BodyView, DepthFilter, StillDepth, body_view
 from voodoo.sensors.skin import SkinSettings, SkinTracker
 from voodoo.sensors.skin_regions import candidates, joined
 
@@ -350,6 +350,76 @@ def test_a_far_hand_is_no_speck():
         cv2.circle(image, moved, 4, SKIN, -1)
         skin.observe(image, CAMERA, POSE, joints, body=body)
         assert pixel_error(skin, "l_hand", moved) < 2.0
+
+
+def test_a_hand_before_a_door_is_not_the_door():
+    """The door has had skin's colour for seconds where no hand was; the hand stands before it."""
+    skin = SkinTracker()
+    door = (60, 60, 130, 230)
+    learnt(skin, frames=60, door=door)
+    head, left, right = (160, 60), (85, 180), (210, 120)
+    joints = Pose(head, left, right).joints
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    of_hand = np.hypot(*(grid - left).T) < 7
+    mask = of_hand.reshape(240, 320) | (np.arange(320) > 130)
+    depths = np.where(of_hand | (grid[:, 0] > 130), Z, Z + 1.0)
+    image = picture(head, left, right, door=door, seed=99)
+    found = {}
+    for before in (None, of_hand.reshape(240, 320)):
+        body = BodyView(mask, grid, depths, before=before)
+        rays = skin.observe(image, CAMERA, POSE, joints, body=body)
+        found[before is None] = {ray.site for ray in rays}
+    assert found[True] == {"head_center", "r_hand"}
+    assert found[False] == {"head_center", "l_hand", "r_hand"}
+
+
+def test_what_stands_before_the_scene_is_known_by_what_was_seen_there():
+    """Neither a still scene nor its noise stands before itself; a hand that came does, and stays so when it rests."""
+    chance = np.random.default_rng(3)
+    scene = StillDepth()
+    seen = []
+    for step in range(20):
+        image = (3.0 + chance.normal(0.0, 0.01, (60, 80))).astype(np.float32)
+        if step >= 8:
+            image[20:30, 30:40] = 2.5
+        seen.append(scene.see(image, POSE))
+    assert seen[0] is None
+    still, before = seen[-1]
+    assert before[21:29, 31:39].all() and not still[21:29, 31:39].any()
+    outside = np.ones((60, 80), bool)
+    outside[19:31, 29:41] = False
+    assert not before[outside].any() and still[outside].mean() > 0.95
+
+
+def test_a_forearm_as_long_as_a_hand_across_its_box_offers_its_tips():
+    """What counts is the length along the region, however it lies: a hand turned by 45 degrees stays one."""
+    for angle in (0.0, 45.0, 90.0):
+        for length, hand in ((3.6, True), (5.4, False)):  # in radii of a palm, 1.6 wide
+            image = np.zeros((240, 320), np.uint8)
+            box = cv2.boxPoints(((160.0, 120.0), (length * 10.0, 16.0), angle))
+            cv2.fillPoly(image, [np.round(box).astype(np.int32)], 1)
+            found, _ = candidates(image.astype(bool), palm_px=10.0)
+            assert found[0].hand == hand
+            assert (len(found) > 1) != hand
+
+
+def test_a_hand_is_a_forearm_away_from_an_elbow_that_is_seen():
+    """With the hand in the shade, the middle of what is left of a bare forearm is near the expected hand, and is not it."""
+    head, left, right = (160, 60), (110, 120), (210, 120)
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
+    found = {}
+    for held in ((), ("l_hand",)):
+        skin = SkinTracker()
+        learnt(skin)
+        joints = Pose(head, left, right).joints
+        joints["l_hand"] = at(left, Z + 0.04)
+        joints["l_elbow"] = at((left[0] + 12, left[1] - 24), Z + 0.04)  # 23 cm above the hand
+        piece = (left[0] + 6, left[1] - 12)
+        rays = skin.observe(picture(head, piece, right, seed=7), CAMERA, POSE, joints, body=body, held=held)
+        found[held] = {ray.site for ray in rays}
+    assert found[()] == {"head_center", "l_hand", "r_hand"}
+    assert found["l_hand",] == {"head_center", "r_hand"}
 
 
 def test_the_front_end_runs_on_the_bundled_recording():

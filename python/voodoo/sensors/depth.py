@@ -109,12 +109,14 @@ class BodyView:
         pixels: (N, 2) of the points in the picture.
         depths: (N,) of the points along the colour camera's optical axis [m].
         still: (N,) whether nothing behind a point was ever seen there: it may be the scene. None: not known.
+        before: (H, W) of the picture: True where something is before what was seen there once. None: not known.
     """
 
     mask: npt.NDArray[np.bool_]
     pixels: FloatArray
     depths: FloatArray
     still: npt.NDArray[np.bool_] | None = None
+    before: npt.NDArray[np.bool_] | None = None
 
     def look_at(
         self, pixel: tuple[float, float], radius: float, *, among: npt.NDArray[np.bool_] | None = None
@@ -164,11 +166,14 @@ class StillDepth:
         self._pose: FloatArray | None = None
         self._last: deque[npt.NDArray[np.float32]] = deque(maxlen=_STAYS)
 
-    def see(self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray) -> npt.NDArray[np.bool_] | None:
+    def see(
+        self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray
+    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]] | None:
         """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew.
 
         Returns:
-            (H, W): True where the image shows what may be the scene; None as long as too little was seen.
+            (H, W): True where the image shows what may be the scene; (H, W): True where it shows something before what
+            was seen there once. None as long as too little was seen.
         """
         moved = self._pose is None or not np.allclose(self._pose, world_from_sensor, atol=_STANDS)
         if self._farthest is None or moved or self._farthest.shape != z.shape:
@@ -180,7 +185,8 @@ class StillDepth:
             # At the edges of things every camera sees now the one, now the other.
             behind = cv2.erode(self._farthest, np.ones((3, 3), np.uint8))
             near, stayed = (low + share * z for low, share in (_BEHIND, _STAYED))
-            still = np.asarray((behind - z < near) & (np.abs(z - self._last[0]) < stayed))
+            before = np.asarray(behind - z >= near)
+            still = (np.asarray(~before & (np.abs(z - self._last[0]) < stayed)), before)
         self._last.append(z)
         return still
 
@@ -222,9 +228,11 @@ def body_view(
         rows, columns = (slice(-(-span.start // step) * step, span.stop) for span in (rows, columns))
         standing = scene.see(whole, world_from_depth)
         if standing is not None:
-            standing = standing[
-                rows.start // step : -(-rows.stop // step), columns.start // step : -(-columns.stop // step)
-            ]
+            window = (
+                slice(rows.start // step, -(-rows.stop // step)),
+                slice(columns.start // step, -(-columns.stop // step)),
+            )
+            standing = (standing[0][window], standing[1][window])
     z = depth[rows, columns][::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
     rays = depth_camera.rays()[rows, columns][::step, ::step]
     valid = np.isfinite(z) & (z > 0.0)
@@ -236,7 +244,7 @@ def body_view(
         place = turn[0] * x + turn[1] * y + turn[2] * z + shift
         near &= (place > low[axis]) & (place < high[axis])
     x, y, z = x[near], y[near], z[near]
-    still = None if standing is None else standing[valid][near]
+    still, moved = (None, None) if standing is None else (item[valid][near] for item in standing)
     color_from_depth = np.linalg.inv(world_from_color) @ world_from_depth
     in_color = np.column_stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in color_from_depth[:3]])
     mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
@@ -245,14 +253,20 @@ def body_view(
     # NaN, where the colour camera cannot see, is inside of nothing.
     inside = (u >= 0) & (v >= 0) & (u < color_camera.width) & (v < color_camera.height)
     pixels, in_color = pixels[inside], in_color[inside]
-    still = None if still is None else still[inside]
+    still, moved = (None if item is None else item[inside] for item in (still, moved))
     mask[v[inside].astype(np.intp), u[inside].astype(np.intp)] = 1
     # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
-    grown = np.asarray(cv2.dilate(mask, np.ones((size, size), np.uint8)), dtype=bool)
+    around = np.ones((size, size), np.uint8)
+    grown = np.asarray(cv2.dilate(mask, around), dtype=bool)
+    before = None
+    if moved is not None:
+        front = np.zeros_like(mask)
+        front[v[inside][moved].astype(np.intp), u[inside][moved].astype(np.intp)] = 1
+        before = np.asarray(cv2.dilate(front, around), dtype=bool)
     beyond = _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
     cut = _behind_edges(pixels, in_color[:, 2], mask.shape)
-    return BodyView((grown | beyond) & ~cut, pixels, in_color[:, 2], still)
+    return BodyView((grown | beyond) & ~cut, pixels, in_color[:, 2], still, None if before is None else before & ~cut)
 
 
 def _behind_edges(pixels: FloatArray, depths: npt.NDArray[Any], shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:

@@ -242,15 +242,17 @@ class FrontEnd:
             stamp=item.stamp,
             body=body,
             surface=self._limb_distances,
-            lost=self._lost(skin.settings.sites) if depth is not None else (),
+            lost=self._hands(skin.settings.sites, "forearm", measured=False) if depth is not None else (),
+            held=self._hands(skin.settings.sites, "upperarm", measured=True) if depth is not None else (),
             source=item.sensor,
         )
         self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
 
-    def _lost(self, sites: Iterable[str]) -> set[str]:
-        """Hands whose forearm was not measured in the last frame."""
+    def _hands(self, sites: Iterable[str], limb: str, *, measured: bool) -> set[str]:
+        """Hands whose forearm or upper arm was, or was not, measured in the last frame."""
         status = self.tracker.estimate.limb_status
-        return {site for site in sites if status.get(f"{site[:2]}forearm", "measured") != "measured"}
+        known = {site: status.get(f"{site[:2]}{limb}") for site in sites}
+        return {site for site, value in known.items() if value is not None and (value == "measured") == measured}
 
     def _limb_distances(self, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
         return dict(zip(self.tracker.estimate.world_from_limb, self.tracker.limb_distances(places), strict=True))

@@ -50,6 +50,8 @@ STANDS_OUT_M = 0.02
 """A hand before trunk or legs stands out from them by as much; a stripe of a shirt does not."""
 BARE = ("head", "neck", "upperarm", "forearm", "hand")
 """Endings of the names of limbs that show skin."""
+NEAREST_HAND, FARTHEST_HAND_M = 0.6, 0.10
+"""A hand is no nearer to an elbow that is seen than this share of its forearm, and not this much farther."""
 ON_LIMB_M, OFF_LIMB_M = 0.03, 0.06
 """What is no farther than this from a limb, and this much farther from another, is of the first."""
 FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
@@ -119,6 +121,7 @@ class SkinTracker:
         self._colours: tuple[ByteImage, Colours] | None = None
         self._pictures = 0
         self._body: Mask | None = None
+        self._before: Mask | None = None
         self._static: npt.NDArray[np.float32] | None = None
         self._learnt = 0
 
@@ -143,6 +146,7 @@ class SkinTracker:
         body: BodyView | None = None,
         surface: Surface | None = None,
         lost: Collection[str] = (),
+        held: Collection[str] = (),
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -158,6 +162,7 @@ class SkinTracker:
             surface: distances of places (N, 3) from each limb's surface, limb name -> (N,) [m]; see
                 `Tracker.limb_distances`.
             lost: sites whose limb the other sensors do not show where the body has it.
+            held: sites whose upper arm they do show there: its hand is a forearm away from that elbow.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -172,8 +177,11 @@ class SkinTracker:
         self._body = None if body is None else body.mask
         if body is not None:
             skin &= body.mask
+        self._before = None if body is None else body.before
         if self._static is not None and self._static.shape == skin.shape:
-            skin &= self._static < 0.5
+            there = self._static < 0.5
+            # A hand before a wooden door is not the door.
+            skin &= there if self._before is None else there | self._before
         # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
         skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
         focal = math.sqrt(camera.fx * camera.fy)
@@ -218,7 +226,7 @@ class SkinTracker:
             ]
         )
         limbs = {} if surface is None else surface(np.array([sight.place for sight in sights]))
-        allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, specks=speck)
+        allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, held, specks=speck)
         # A speck far from where the hand is expected is what is left of another region.
         allowed[(distance > self.settings.gate) & np.array(speck)] = 0.0
         found = self.blobs.name(
@@ -260,6 +268,7 @@ class SkinTracker:
         predicted: Mapping[str, FloatArray],
         limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
         lost: Collection[str],
+        held: Collection[str],
         *,
         specks: list[bool],
     ) -> FloatArray:
@@ -289,6 +298,12 @@ class SkinTracker:
                 distance = [float(np.linalg.norm(sight.place - shoulder)) for sight in sights]
                 allowed[row] *= [not sight.deep or d < reach for sight, d in zip(sights, distance, strict=True)]
             elbow = predicted.get(f"{side}_elbow")
+            if elbow is not None and site in held:
+                # What is much nearer is the forearm's middle, with the hand in the shade or cut off.
+                apart = [float(np.linalg.norm(self._inside(site, sight) - elbow)) for sight in sights]
+                forearm = float(np.linalg.norm(predicted[site] - elbow))
+                least, most = NEAREST_HAND * forearm, forearm + FARTHEST_HAND_M
+                allowed[row] *= [not sight.deep or least < d < most for sight, d in zip(sights, apart, strict=True)]
             if elbow is not None:
                 ends = np.array(_hand_ends(sights, predicted[site], elbow))
                 if site in lost:
@@ -342,7 +357,7 @@ class SkinTracker:
         self._pictures += 1
         away = near == 0
         if self._seen is not None:
-            self._learn_static(self._seen, away, rate_hz)
+            self._learn_static(self._seen, away if self._before is None else away & ~self._before, rate_hz)
         # Light does not change from picture to picture; learning is the dearest part.
         if self.settled and self._pictures % self.settings.learn_every:
             return

@@ -17,8 +17,8 @@ Labels = npt.NDArray[np.int32]
 
 PALM_M, FACE_M = 0.045, 0.085
 """Radii of a palm and of a face."""
-LONGEST_HAND = 6.0
-"""A hand with stretched fingers in radii of its palm, measured across the box around it."""
+LONGEST_HAND = 4.6
+"""A hand with stretched fingers in radii of its palm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def joined(skin: Mask, *, palm_px: float) -> Mask:
     window = (slice(y, y + h), slice(x, x + w))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(pixels[window], connectivity=8)
     size = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
-    small = size <= 0.5 * LONGEST_HAND * palm_px
+    small = size <= 3.0 * palm_px
     small[0] = False
     closed = cv2.morphologyEx(small[labels].view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     result = skin.copy()
@@ -89,14 +89,20 @@ def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
         left, top, width, height, area = (int(value) for value in stats[region])
         if not smallest <= area <= largest:
             continue
-        extent = math.hypot(width, height)
         middle = (float(centres[region][0]) + x, float(centres[region][1]) + y)
-        found.append(Candidate(middle, region, area, hand=extent <= LONGEST_HAND * palm_px))
-        if extent > LONGEST_HAND * palm_px:
-            mask = labels[top : top + height, left : left + width] == region
+        mask = labels[top : top + height, left : left + width] == region
+        hand = math.hypot(width, height) <= LONGEST_HAND * palm_px or _length(mask) <= LONGEST_HAND * palm_px
+        found.append(Candidate(middle, region, area, hand=hand))
+        if not hand:
             for u, v in _tips(mask, palm_px):
                 found.append(Candidate((u + left + x, v + top + y), region, area))
     return found, regions
+
+
+def _length(mask: Mask) -> float:
+    """The longer side of the narrowest box around a region, however turned."""
+    _, sides, _ = cv2.minAreaRect(np.argwhere(mask).astype(np.float32))
+    return float(max(sides)) + 1.0
 
 
 def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
