@@ -302,7 +302,7 @@ class SkinTracker:
                 # What is much nearer is the forearm's middle, with the hand in the shade or cut off.
                 apart = [float(np.linalg.norm(self._inside(site, sight) - elbow)) for sight in sights]
                 forearm = float(np.linalg.norm(predicted[site] - elbow))
-                least, most = NEAREST_HAND * forearm, forearm + FARTHEST_HAND_M
+                least, most = NEAREST_HAND * forearm, math.inf if site in lost else forearm + FARTHEST_HAND_M
                 allowed[row] *= [not sight.deep or least < d < most for sight, d in zip(sights, apart, strict=True)]
             if elbow is not None:
                 ends = np.array(_hand_ends(sights, predicted[site], elbow))
