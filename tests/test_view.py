@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import voodoo
+from voodoo import view
 from voodoo.errors import VoodooError
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
 from voodoo.view import Viewer, bands, limb_mesh, nearest_limb
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def steps():
     recording = open_recording(sample_path())
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
@@ -24,7 +25,10 @@ def steps():
     return tracker, front_end, [recorded for recorded, _ in zip(paired(recording), range(4), strict=False)]
 
 
-def test_file_holds_everything(tmp_path, steps):
+@pytest.mark.parametrize("most", [40_000, 5_000])
+def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
+    """Also the silhouette of images with more pixels than are shown as points."""
+    monkeypatch.setattr(view, "_MOST_POINTS", most)
     pytest.importorskip("rerun", reason="Rerun is not installed (pip install voodoo[view])")
     tracker, front_end, frames = steps
     path = tmp_path / "track.rrd"

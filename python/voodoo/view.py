@@ -6,6 +6,7 @@ Rerun is an optional extra: `pip install voodoo[view]`.
 from __future__ import annotations
 
 import colorsys
+import math
 import os
 import sys
 from pathlib import Path
@@ -179,19 +180,24 @@ class Viewer:
         elif isinstance(item, DepthImage):
             path = self._log_camera(item)
             self._stream.log(f"{path}/picture", rr.DepthImage(item.image, meter=1.0 / item.metres_per_unit))
-            z = item.image.astype(np.float32) * np.float32(item.metres_per_unit)
+            # Of a large image every n-th row and column.
+            step = math.ceil(math.sqrt(item.image.size / _MOST_POINTS))
+            z = item.image[::step, ::step].astype(np.float32) * np.float32(item.metres_per_unit)
             valid = np.isfinite(z) & (z > 0.0)
-            points = np.column_stack([item.camera.rays()[valid] * z[valid, None], z[valid]])
+            points = np.column_stack([item.camera.rays()[::step, ::step][valid] * z[valid, None], z[valid]])
             limbs = self._log_points(
                 f"world/points/{_entity(item.sensor)}", points, item.root_from_sensor, estimate, body
             )
             self._log_model(path, item, estimate, body)
-            if limbs is not None:
-                silhouette = np.zeros(item.image.shape, dtype=np.uint8)
-                silhouette[valid] = np.where(limbs == len(body.limbs), 0, limbs + 1)
-                self._stream.log(f"{path}/picture/silhouette", rr.SegmentationImage(silhouette, opacity=0.5))
+            silhouette = np.zeros(z.shape, dtype=np.uint8)
+            silhouette[valid] = np.where(limbs == len(body.limbs), 0, limbs + 1)
+            height, width = item.image.shape
+            silhouette = silhouette.repeat(step, axis=0).repeat(step, axis=1)[:height, :width]
+            self._stream.log(f"{path}/picture/silhouette", rr.SegmentationImage(silhouette, opacity=0.5))
         elif isinstance(item, PointCloud):
-            self._log_points(f"world/points/{_entity(item.sensor)}", item.points, item.root_from_sensor, estimate, body)
+            path = f"world/points/{_entity(item.sensor)}"
+            some = item.points[:: max(len(item.points) // _MOST_POINTS, 1)]
+            self._log_points(path, some, item.root_from_sensor, estimate, body)
         elif isinstance(item, LaserScan):
             pose = item.root_from_sensor
             points = item.points() @ pose[:3, :3].T + pose[:3, 3]
@@ -229,14 +235,13 @@ class Viewer:
 
     def _log_points(
         self, path: str, points: npt.NDArray[Any], pose: FloatArray, estimate: Estimate, body: Body
-    ) -> npt.NDArray[np.intp] | None:
-        """Show points; the limb of each, None where there are so many that only some are shown."""
-        step = max(len(points) // _MOST_POINTS, 1)
-        world = np.asarray(points[::step], dtype=np.float64) @ pose[:3, :3].T + pose[:3, 3]
+    ) -> npt.NDArray[np.intp]:
+        """Show points (N, 3); the limb of each (N,)."""
+        world = np.asarray(points, dtype=np.float64) @ pose[:3, :3].T + pose[:3, 3]
         colours = np.array([*limb_colours(body).values(), _BACKGROUND], dtype=np.uint8)
         limbs = nearest_limb(world, estimate, body)
         self._stream.log(path, self._rr.Points3D(world, radii=0.006, colors=colours[limbs]))
-        return limbs if step == 1 else None
+        return limbs
 
     def _log_front_end(self, front_end: FrontEnd, estimate: Estimate) -> None:
         strips, colours, labels = [], [], []
