@@ -208,13 +208,15 @@ impl Body {
                 continue;
             }
             let (start, bend) = (measured(&own.name)?, measured(&joint.name)?);
-            // The far end of the child is a site of its own, or the joint of what hangs on it.
-            let away = |local: &Vec3| (*local - joint.limb_from_joint.translation).length();
-            let landmarks = self.known_landmarks(index, positions).into_iter();
-            let (local, end) = landmarks.max_by(|a, b| away(&a.0).total_cmp(&away(&b.0)))?;
-            if away(&local) < FAR_END * child.shape.length() {
-                return None;
-            }
+            let own = |site: &&crate::body::Site| site.limb == index && site.name != joint.name;
+            let end = self.sites().iter().filter(own).find_map(|site| measured(&site.name));
+            // Without a site of its own, the joint of what hangs on the child shows where it points: a hand's wrist.
+            let end = end.or_else(|| {
+                let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
+                let landmarks = self.known_landmarks(index, positions).into_iter();
+                let far = landmarks.filter(|(local, _)| away(*local) > FAR_END * child.shape.length());
+                far.max_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, position)| position)
+            })?;
             let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
             return (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()));
         }
