@@ -26,6 +26,7 @@ pub mod ik;
 pub mod normal;
 pub mod outline;
 pub mod predict;
+pub mod proof;
 pub mod recover;
 mod relate;
 pub mod render;

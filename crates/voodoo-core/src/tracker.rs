@@ -229,6 +229,7 @@ impl Tracker {
         if self.config.recovery && self.solver.starts_from_prediction() {
             self.search(frame);
         }
+        self.admit_doubt();
         Ok(&self.estimate)
     }
 
