@@ -31,6 +31,7 @@ pub mod recover;
 mod relate;
 pub mod render;
 pub mod rigid;
+pub mod roundness;
 pub mod shape;
 mod simd;
 pub mod solver;

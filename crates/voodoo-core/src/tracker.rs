@@ -176,7 +176,7 @@ impl Tracker {
         self.report(f64::NAN, 0);
         // The caller vouches for a pose that was set.
         self.estimate.status = Status::Tracking;
-        self.judgement.clear();
+        self.judgement.vouch();
         self.estimate.limb_status.clear();
         self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
     }

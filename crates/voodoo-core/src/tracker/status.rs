@@ -15,6 +15,7 @@ use crate::frame::Frame;
 use crate::geometry::Points;
 use crate::proof::{Proof, prove};
 use crate::render::Outline;
+use crate::roundness::roundness;
 use crate::view::Views;
 
 /// Candidates that are looked at, about.
@@ -33,6 +34,9 @@ const PROVEN: [f64; 2] = [0.14, 0.05];
 const FEW: f64 = 5.0;
 /// Share of the past frames in what is said about a limb: evidence flickers.
 const MEMORY: f64 = 0.6;
+/// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
+const FLAT: f64 = 0.2;
+const SLOW_MEMORY: f64 = 0.9;
 /// Share of the limbs of a tracked body that are measured at least.
 const TRACKED: f64 = 0.75;
 /// A site this far from its measurement does not support its limb, metres.
@@ -65,11 +69,25 @@ pub(super) struct Judgement {
     clouds: Vec<f64>,
     outlines: Vec<Outline>,
     proofs: Vec<Proof>,
+    /// Roundness of what is seen where the body is thought to be.
+    round: Option<f64>,
 }
 
 impl Judgement {
     pub(super) fn clear(&mut self) {
         self.limbs.clear();
+    }
+
+    /// A pose that somebody vouches for is taken to be on a body until many frames say otherwise.
+    pub(super) fn vouch(&mut self) {
+        self.limbs.clear();
+        self.round = Some(1.0);
+    }
+
+    /// Nothing speaks for a new place but what is seen now.
+    pub(super) fn begin(&mut self) {
+        self.limbs.clear();
+        self.round = None;
     }
 }
 
@@ -166,6 +184,13 @@ impl Tracker {
             statuses[limb] = work.limbs[limb].proven_status(statuses[limb]);
         }
         hang(statuses);
+        if let Some(now) = roundness(views, &self.body, &self.poses) {
+            work.round = Some(work.round.map_or(now, |before| SLOW_MEMORY * before + (1.0 - SLOW_MEMORY) * now));
+        }
+        if work.round.is_some_and(|round| round < FLAT) {
+            self.estimate.status = Status::Lost;
+            statuses.fill(LimbStatus::Lost);
+        }
         self.judgement = work;
     }
 
