@@ -28,7 +28,7 @@ const CONTRADICTED: f64 = 0.3;
 /// A limb of which a smaller share shows is hidden.
 const SHOWN: f64 = 0.35;
 /// A limb of an arm or leg is measured when what speaks for it less what speaks against it is this at least, of the whole limb
-/// and of its outer part: one in twenty good ones is doubted so on the rendered recordings.
+/// and of its outer part: about one in twenty good ones is doubted so on the rendered recordings.
 const PROVEN: [f64; 2] = [0.14, 0.05];
 /// Without a depth image, points on a limb that make it measured.
 const FEW: f64 = 5.0;
