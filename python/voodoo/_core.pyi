@@ -201,7 +201,8 @@ class Estimate:
         """Time of the frame [s]; NaN after a reset."""
     @property
     def status(self) -> str:
-        """tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured)."""
+        """tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured,
+        or what is seen there is flat)."""
     @property
     def steps(self) -> int:
         """ICP steps used."""
@@ -231,8 +232,9 @@ class Estimate:
         """Pose (4, 4) of every limb."""
     @property
     def limb_status(self) -> Mapping[str, str]:
-        """What the frame says about every limb: "measured", "inferred" (hidden or out of view: carried by joints and
-        prediction) or "lost" (it should show where it is, and does not)."""
+        """What the frame says about every limb: "measured", "inferred" (hidden, out of view, or nothing seen that another
+        limb would not explain as well: carried by joints and prediction) or "lost" (it should show where it is, and does
+        not)."""
     @property
     def limb_points(self) -> Mapping[str, int]:
         """Matched points of every limb."""

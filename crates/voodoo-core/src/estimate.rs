@@ -9,7 +9,7 @@ pub enum Status {
     Tracking,
     /// More than a quarter of the limbs are not measured.
     Degraded,
-    /// Hardly anything measured supports the pose.
+    /// Hardly anything measured supports the pose, or what is seen there is flat.
     #[default]
     Lost,
 }
@@ -19,7 +19,8 @@ pub enum Status {
 pub enum LimbStatus {
     /// Measurements support it.
     Measured,
-    /// Hidden, or out of view: carried by its joints and the prediction.
+    /// Hidden, out of view, or nothing seen that another limb would not explain as well: carried by its joints and the
+    /// prediction.
     Inferred,
     /// It should show where it is, and does not.
     #[default]

@@ -168,7 +168,7 @@ impl Rendering {
 
 /// A limb as one camera sees it.
 #[derive(Clone, Copy, Debug)]
-struct Outline {
+pub struct Outline {
     shape: TaperedEllipticCylinder,
     /// The camera's centre and axes in the limb frame.
     origin: Vec3,
@@ -183,7 +183,8 @@ struct Outline {
 }
 
 impl Outline {
-    fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
+    /// The outline of a limb of this shape for a camera in this place.
+    pub fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();
         let mut corners = Some([[0.0; 2]; 8]);
         let (mut low, mut high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
@@ -217,6 +218,21 @@ impl Outline {
             low,
             high,
         }
+    }
+
+    /// Depth at which the ray through `(x / z, y / z)` meets the limb, metres; NaN where it does not.
+    pub fn depth_at(&self, x: f64, y: f64) -> f64 {
+        if !(x >= self.low[0] && x <= self.high[0] && y >= self.low[1] && y <= self.high[1]) {
+            return f64::NAN;
+        }
+        let (depth, unsure) = if self.plain { self.meet_plain(x, y) } else { (f64::NAN, true) };
+        if unsure { self.meet_exactly(x, y) } else { depth }
+    }
+
+    fn meet_exactly(&self, x: f64, y: f64) -> f64 {
+        let direction = self.axes[0] * x + self.axes[1] * y + self.axes[2];
+        let hit = self.shape.cast_ray(self.origin, direction, f64::INFINITY);
+        hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
     }
 
     /// Columns of a row of a camera without distortion that the limb can cover.
@@ -287,11 +303,7 @@ impl Outline {
     /// Depths at which rays meet the limb, NaN where they do not.
     #[inline(always)]
     fn meet(&self, x: &[f64; LANES], y: &[f64; LANES]) -> [f64; LANES] {
-        let exact = |lane: usize| {
-            let direction = self.axes[0] * x[lane] + self.axes[1] * y[lane] + self.axes[2];
-            let hit = self.shape.cast_ray(self.origin, direction, f64::INFINITY);
-            hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
-        };
+        let exact = |lane: usize| self.meet_exactly(x[lane], y[lane]);
         if !self.plain {
             return std::array::from_fn(exact);
         }

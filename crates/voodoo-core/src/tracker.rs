@@ -181,7 +181,7 @@ impl Tracker {
         self.report(f64::NAN, 0);
         // The caller vouches for a pose that was set.
         self.estimate.status = Status::Tracking;
-        self.judgement.clear();
+        self.judgement.vouch();
         self.estimate.limb_status.clear();
         self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
     }
@@ -235,6 +235,7 @@ impl Tracker {
         if self.config.recovery && self.solver.starts_from_prediction() {
             self.search(frame);
         }
+        self.admit_doubt();
         Ok(&self.estimate)
     }
 

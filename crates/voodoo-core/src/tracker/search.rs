@@ -237,7 +237,7 @@ impl Tracker {
         self.candidates.gather(frame, self.origin, &bounds, &self.backgrounds, &self.config);
         self.match_all(frame, self.config.max_steps);
         self.report(frame.stamp, steps);
-        self.judgement.clear();
+        self.judgement.begin();
         self.judge(frame);
     }
 

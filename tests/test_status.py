@@ -1,0 +1,106 @@
+"""What the tracker says of itself: seen limbs are measured; misplaced and hidden ones, and bodies put on furniture, are not."""
+
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo import metrics
+from voodoo.ik import Chain
+from voodoo.rendering import render_depth
+from voodoo.virtual import CAMERA, METRES_PER_UNIT, VirtualSequence
+
+WALL_M, NOISE_M = 3.6, 0.004
+HELD = {"gate_start": 0.001, "gate_end": 0.001, "hypotheses": False, "outline": False, "recovery": False}
+"""Matches within a millimetre only, and no other corrections: the body stays where it was put, and is judged there."""
+LIMBS = ("upperarm", "forearm", "hand", "thigh", "calf", "foot")
+OUT = {"l_shoulder_ry": -0.9, "r_shoulder_ry": 0.9}
+DOWN = {"l_shoulder_ry": -0.15, "r_shoulder_ry": 0.15}
+
+
+@pytest.fixture(scope="module")
+def body():
+    return voodoo.Body.human(height=1.78, model="full")
+
+
+def posture(body, **angles):
+    """Poses and joints of a person 2.4 m before the camera, facing it."""
+    chain = Chain(body)
+    values = np.zeros(len(chain.angle_names))
+    for name, value in angles.items():
+        values[chain.angle_names.index(name)] = value
+    base = np.array([[-1.0, 0.0, 0.0, 2.4], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.86], [0.0, 0.0, 0.0, 1.0]])
+    return chain.forward(values, world_from_base=base)
+
+
+def estimates(tracker, depth, frames):
+    """What the tracker makes of one still scene, frame by frame."""
+    world_from_sensor = VirtualSequence(body=tracker.body).world_from_sensor
+    rng = np.random.default_rng(3)
+    for index in range(frames):
+        image = np.rint((depth + rng.normal(0.0, NOISE_M, depth.shape)) / METRES_PER_UNIT).astype(np.uint16)
+        frame = voodoo.Frame(stamp=index / 30)
+        frame.add_depth(image, camera=CAMERA, metres_per_unit=METRES_PER_UNIT, world_from_sensor=world_from_sensor)
+        yield tracker.step(frame)
+
+
+def judged(body, true, believed):
+    """The estimate of a tracker held at `believed` that is shown `true` once, and the errors of its joints [m]."""
+    world_from_sensor = VirtualSequence(body=body).world_from_sensor
+    seen = render_depth(body, true[0], camera=CAMERA, world_from_sensor=world_from_sensor).depth
+    tracker = voodoo.Tracker(body, config=voodoo.Config(**HELD))
+    tracker.reset_pose(believed[0])
+    (estimate,) = estimates(tracker, np.where(seen > 0.0, seen, WALL_M), 1)
+    return estimate, {name: np.linalg.norm(estimate.joints[name] - true[1][name]) for name in metrics.JOINTS}
+
+
+@pytest.mark.parametrize("arms", [OUT, DOWN, {"l_shoulder_rx": 0.9, "l_elbow_flexion": 1.0, "r_shoulder_ry": 0.9}])
+def test_what_is_seen_where_it_is_is_measured(body, arms):
+    true = posture(body, **arms)
+    estimate, errors = judged(body, true, true)
+    assert max(errors.values()) < 0.02
+    limbs = [f"{side}_{limb}" for side in "lr" for limb in LIMBS]
+    assert {estimate.limb_status[limb] for limb in limbs} == {"measured"} and estimate.status == "tracking"
+
+
+def test_an_arm_on_the_trunk_is_not_measured(body):
+    true = posture(body, **DOWN)
+    believed = posture(body, l_shoulder_rx=0.3, l_shoulder_rz=0.8, l_elbow_flexion=2.0, r_shoulder_ry=0.15)
+    estimate, errors = judged(body, true, believed)
+    assert errors["l_elbow"] > 0.1 and errors["l_wrist"] > 0.3
+    for limb in ("upperarm", "forearm", "hand"):
+        assert estimate.limb_status[f"l_{limb}"] != "measured"
+        assert estimate.limb_status[f"r_{limb}"] == "measured"
+
+
+@pytest.mark.parametrize("angles", [(-0.6, 0.1, 1.3, 1.6), (-0.5, 0.2, 0.6, 0.6)])
+def test_an_arm_behind_the_trunk_is_inferred(body, angles):
+    names = ("l_shoulder_rx", "l_shoulder_ry", "l_shoulder_rz", "l_elbow_flexion")
+    true = posture(body, **dict(zip(names, angles, strict=True)), r_shoulder_ry=0.9)
+    estimate, errors = judged(body, true, true)
+    assert max(errors.values()) < 0.02
+    assert estimate.limb_status["l_forearm"] == estimate.limb_status["l_hand"] == "inferred"
+    assert estimate.limb_status["r_forearm"] == "measured"
+
+
+@pytest.mark.parametrize(
+    "turn", [{"l_shoulder_rx": -0.45}, {"l_shoulder_rx": 0.45}, {"l_shoulder_ry": -1.35}, {"l_shoulder_ry": -0.45}]
+)
+def test_an_elbow_off_by_twelve_centimetres_is_not_measured(body, turn):
+    """Forwards, backwards, up and down: in depth the arm covers the pixels it should, and no camera sees past it."""
+    estimate, errors = judged(body, posture(body, **OUT), posture(body, **(OUT | turn)))
+    assert 0.12 < errors["l_elbow"] < 0.16
+    assert estimate.limb_status["l_upperarm"] != "measured" and estimate.limb_status["l_forearm"] != "measured"
+    assert estimate.limb_status["r_upperarm"] == "measured"
+
+
+@pytest.mark.parametrize("width", [0.45, 0.7])
+def test_a_cupboard_of_a_persons_size_is_no_body(body, width):
+    """A track started on it, which the search must not start on it again either."""
+    across = (np.arange(CAMERA.width) - CAMERA.cx) / CAMERA.fx * 2.3
+    height = 1.0 - (np.arange(CAMERA.height) - CAMERA.cy) / CAMERA.fy * 2.3
+    cupboard = (np.abs(across) < width / 2)[None, :] & ((height > 0.0) & (height < 1.75))[:, None]
+    tracker = voodoo.Tracker(body)
+    tracker.reset_pose(posture(body, **DOWN)[0])
+    status = [str(estimate.status) for estimate in estimates(tracker, np.where(cupboard, 2.3, WALL_M), 40)]
+    assert status[20:] == ["lost"] * 20
+    assert set(tracker.estimate.limb_status.values()) == {"lost"}
