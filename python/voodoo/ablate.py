@@ -66,7 +66,9 @@ def variants(base: voodoo.Config) -> list[Variant]:
     ]
     changes += [("solver", word) for word in voodoo.Config.words("solver") if word != values["solver"]]
     # No prediction; and motion so free that its penalty weighs nothing.
-    changes += [(key, off) for key, off in (("prediction", 0.0), ("motion_scale", 100.0)) if values[key] != off]
+    changes += [
+        (key, off) for key, off in (("prediction", 0.0), ("motion_scale", 100.0), ("calm", 0.0)) if values[key] != off
+    ]
     changed = [Variant(f"{key} = {_toml(value)}", voodoo.Config(**{**values, key: value})) for key, value in changes]
     return [Variant(UNCHANGED, base), *changed]
 

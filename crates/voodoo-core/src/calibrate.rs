@@ -1,7 +1,8 @@
-//! Girths from the first frame: the named joints fix pose and lengths, the points around them how thick each limb is and
-//! where its surface lies about the line of its joints.
+//! Girths. In the first frame the named joints fix pose and lengths, the points around them how thick each limb is and where
+//! its surface lies about the line of its joints. Later frames show sides that were hidden then (a trunk behind hanging
+//! arms): two edges across a limb tell how wide it is, wherever it is.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Pose, Vec3};
@@ -17,6 +18,10 @@ const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
 /// Scatter of an edge of the outline: about a pixel.
 const EDGE_SIGMA: f64 = 0.01;
+/// Edges of following frames err alike: this many frames tell as much as one.
+const ALIKE: f64 = 10.0;
+/// So many frames are remembered: clothes move.
+const REMEMBERED: f64 = 100.0;
 /// Fewer matched points than this tell nothing.
 const ENOUGH: usize = 15;
 
@@ -54,13 +59,9 @@ pub fn girth_step(
     let mut h = SMatrix::<f64, 5, 5>::zeros();
     let mut g = SVector::<f64, 5>::zeros();
     let row = |foot: Vec3, n: Vec3| {
-        let t = (foot.z / shape.length()).clamp(0.0, 1.0);
-        let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
-        let (a, b) = (n.x * foot.x, n.y * foot.y);
-        let taper = a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1());
-        SVector::from([n.x, n.y, a, b, taper])
+        let girth = girth_row(shape, foot, n);
+        SVector::from([n.x, n.y, girth.x, girth.y, girth.z])
     };
-    let kernel = |distance: f64| 1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2));
     for index in 0..matches.weight.len() {
         if matches.weight[index] <= 0.0 {
             continue;
@@ -90,6 +91,73 @@ pub fn girth_step(
     let step = h.cholesky()?.solve(&g);
     let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
     step.iter().all(|value| value.is_finite()).then(|| GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors })
+}
+
+/// How far the surface at `foot` moves along `n` (limb frame) with the three relative changes of girth.
+fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
+    let t = (foot.z / shape.length()).clamp(0.0, 1.0);
+    let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
+    let (a, b) = (n.x * foot.x, n.y * foot.y);
+    Vector3::new(a, b, a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1()))
+}
+
+/// Cauchy's weight of a distance, metres.
+fn kernel(distance: f64) -> f64 {
+    1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
+}
+
+/// What is known about the girth of one limb since it was fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Girth {
+    information: Matrix3<f64>,
+    total: GirthFit,
+}
+
+impl Default for Girth {
+    fn default() -> Self {
+        Self { information: Matrix3::identity() / (GIRTH_SIGMA * GIRTH_SIGMA), total: GirthFit::default() }
+    }
+}
+
+impl Girth {
+    /// Factors of the semi-axes after one more frame: a Kalman filter of the three relative changes. `sides` are the edges on
+    /// both sides of the limb at one place each; their sum does not depend on where the limb's axis is. The thickness along
+    /// the line of sight stays: the surface there is where it was seen.
+    pub fn follow(
+        &mut self,
+        shape: &TaperedEllipticCylinder,
+        sides: impl Iterator<Item = [Edge; 2]>,
+    ) -> Option<[f64; 4]> {
+        let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());
+        let mut thickness = Vector3::zeros();
+        for [left, right] in sides {
+            let row = girth_row(shape, left.foot, left.side) + girth_row(shape, right.foot, right.side);
+            let wider = left.seen - left.rim + right.seen - right.rim;
+            let weight = kernel(0.5 * wider) / (2.0 * EDGE_SIGMA * EDGE_SIGMA * ALIKE);
+            h += weight * row * row.transpose();
+            g += weight * wider * row;
+            let ahead = Vec3::new(-left.side.y, left.side.x, 0.0);
+            let t = left.foot.z / shape.length();
+            let a = shape.a0() + t * (shape.a1() - shape.a0());
+            let b = shape.b0() + t * (shape.b1() - shape.b0());
+            let depth = (a * ahead.x).hypot(b * ahead.y);
+            let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, left.foot.z);
+            thickness += girth_row(shape, front, ahead);
+        }
+        h += thickness * thickness.transpose() / (EDGE_SIGMA * EDGE_SIGMA);
+        if h.trace() <= 0.0 {
+            return None;
+        }
+        self.information = self.information * (1.0 - 1.0 / REMEMBERED) + h;
+        let step = self.information.cholesky()?.solve(&g);
+        if !step.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let step = GirthFit { shift: Vec3::ZERO, factors: [0, 1, 2].map(|index: usize| 1.0 + step[index]) };
+        let (total, step) = self.total.then(&step);
+        self.total = total;
+        Some(step.axes())
+    }
 }
 
 impl GirthFit {

@@ -260,6 +260,9 @@ config! {
     /// Multiplies the standard deviations of all unexpected motion: the one strength of the jitter penalty (R07 eq. 18, 26).
     /// Smaller is smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
+    /// A motion that hardly differs from the expected one is held tighter by this factor of information, as noise; 0: as any
+    /// other. Greater is calmer at rest and later in slow turns.
+    calm: f64 = 30.0, "", 0.0 ..= 10000.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones.
     hypotheses: bool = true, "";
     /// Look for a lost body in everything that is not background (whole-body solvers).

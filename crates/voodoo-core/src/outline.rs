@@ -189,6 +189,16 @@ impl Outline {
         }
     }
 
+    /// The edges on both sides of a limb, place by place where both were found.
+    pub fn sides(&self, limb: usize) -> impl Iterator<Item = [Edge; 2]> {
+        self.edges.windows(2).filter_map(move |pair| {
+            let [one, other] = pair else { return None };
+            // Both sides of a place are looked for one after the other, in opposite directions.
+            let opposite = one.limb == limb && other.limb == limb && one.edge.side == -other.edge.side;
+            (opposite && one.edge.foot.z == other.edge.foot.z).then_some([one.edge, other.edge])
+        })
+    }
+
     /// The rims at `poses` and the edges that were found, as pairs.
     pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<EdgePair>) {
         pairs.clear();

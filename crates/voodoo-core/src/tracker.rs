@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::associate::Assignment;
 use crate::background::Backgrounds;
 use crate::body::{Body, Pair};
+use crate::calibrate::Girth;
 use crate::candidates::{Candidates, body_box, shifted};
 use crate::config::Config;
 use crate::correspondence::{Correspondences, LimbMatches};
@@ -56,6 +57,8 @@ pub struct Tracker {
     measured: Vec<f64>,
     hypotheses: Hypotheses,
     search: Search,
+    /// What is known about the girths since the first frame fitted them; empty when they were given.
+    girths: Vec<Girth>,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
     pairs: Vec<Pair>,
     stretched: Vec<f64>,
@@ -100,6 +103,7 @@ impl Tracker {
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
             search: Search::default(),
+            girths: Vec::new(),
             pairs: Vec::new(),
             stretched: Vec::new(),
             change: Vec::new(),
@@ -167,6 +171,7 @@ impl Tracker {
         self.previous.clear();
         self.started = true;
         self.girths_open = false;
+        self.girths.clear();
         self.pairs.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
@@ -222,6 +227,7 @@ impl Tracker {
         if !self.pairs.is_empty() && self.estimate.status != Status::Lost {
             self.refine_lengths(pace);
         }
+        self.refine_girths();
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);

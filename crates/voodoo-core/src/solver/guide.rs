@@ -76,7 +76,7 @@ impl Guide {
         let information = LED / (heaviest * config.point_sigma * config.point_sigma);
         let terms: [&dyn Term; 3] = [
             &Sites { correspondences, information, scale: SCALE },
-            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas },
+            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, calm: 0.0 },
             &Limits { sigma: LIMIT_SIGMA },
         ];
         for term in terms {

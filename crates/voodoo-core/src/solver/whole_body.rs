@@ -17,6 +17,10 @@ const OVERLAP_SIGMA: f64 = 0.03;
 const FREE_SHARE: f64 = 0.3;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
+/// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
+const ROUGH: f64 = 0.5;
+/// From this step on, what is left of a deviation from the prediction may be noise: before, the body has to find its points.
+const CALM_FROM: usize = 3;
 /// From this step on, only every second one assigns points and looks for edges.
 const RENEWED: usize = 2;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
@@ -124,13 +128,18 @@ impl WholeBody {
         }
         let root =
             [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
+        // After the last step only lengths are asked for: a pose held tightly would let them bear every deviation.
+        let calm = (CALM_FROM..config.max_steps).contains(&problem.step);
+        // Points that lie closer to the body than they are trusted to are not at rest by chance: what they show is motion.
+        let scatter = correspondences.mean_squared_distance().unwrap_or(0.0) * information / (ROUGH * ROUGH);
+        let calm = if calm { config.calm * scatter.min(1.0) } else { 0.0 };
         self.normal.clear(poses.len());
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
         let terms: [&dyn Term; 4] = [
             &Surface { correspondences, information, slide: SLIDE, scale },
             &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE) },
             &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
-            &Prior { predicted, root, joints: &self.joint_sigmas },
+            &Prior { predicted, root, joints: &self.joint_sigmas, calm },
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);

@@ -1,9 +1,17 @@
 //! Prediction and smoothness (R07 eq. 16-18, 26): the root's twist and every joint's turn are drawn to the predicted ones.
+//!
+//! R07's penalty is quadratic: what is strong enough for a body at rest makes a fast one late. Here a second well lies in the
+//! middle of the first: a deviation that is small against what is expected is taken for noise and held tightly, a greater one
+//! leaves the well and feels the wide one only.
 
 use super::Term;
+use super::surface::geman_mcclure;
 use crate::body::Body;
 use crate::geometry::{Pose, Quat, Vec3};
 use crate::normal::Normal;
+
+/// Width of the inner well in standard deviations of the outer one.
+const WELL: f64 = 0.6;
 
 /// Deviation from a predicted pose.
 #[derive(Debug)]
@@ -14,30 +22,42 @@ pub struct Prior<'a> {
     pub root: [f64; 2],
     /// Standard deviation of each joint's turn, radians.
     pub joints: &'a [f64],
+    /// Information of the inner well as a multiple of the outer one's; 0: no inner well.
+    pub calm: f64,
+}
+
+impl Prior<'_> {
+    /// Cost and weight of a deviation `r` under the information of `sigma`.
+    fn hold(&self, r: f64, sigma: f64) -> (f64, f64) {
+        let information = 1.0 / (sigma * sigma);
+        let (rho, kernel) = geman_mcclure(r, WELL * sigma);
+        (information * (r * r + self.calm * rho), information * (1.0 + self.calm * kernel))
+    }
 }
 
 impl Term for Prior<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
         // Root: rotation and position apart, so that the lever to the working origin does not matter.
-        let [turn, shift] = self.root.map(|sigma| 1.0 / (sigma * sigma));
         let r = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
         let d = poses[0].translation - self.predicted[0].translation;
+        let (turn_cost, turn) = self.hold(r.length(), self.root[0]);
+        let (shift_cost, shift) = self.hold(d.length(), self.root[1]);
+        normal.cost += turn_cost + shift_cost;
         let block = &mut normal.limbs[0];
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
             block.h[(i, i)] += turn;
             block.g[i] += turn * r[i];
             block.add_row(shift, &crate::normal::line(poses[0].translation, axis), d[i]);
         }
-        normal.cost += turn * r.length_squared() + shift * d.length_squared();
         for (index, limb) in body.limbs().iter().enumerate() {
             let Some((parent, _)) = &limb.parent else { continue };
-            let weight = 1.0 / (self.joints[index] * self.joints[index]);
             let relative = |poses: &[Pose]| poses[*parent].rotation.inverse() * poses[index].rotation;
             // Deviation in the parent's frame, then in world axes: its derivative by the relative turn is one.
             let turn = (relative(poses) * relative(self.predicted).inverse()).to_scaled_axis_shortest();
             let r = poses[*parent].rotation * turn;
+            let (cost, weight) = self.hold(r.length(), self.joints[index]);
             normal.joints[index].add_turn(weight, r);
-            normal.cost += weight * r.length_squared();
+            normal.cost += cost;
         }
     }
 }

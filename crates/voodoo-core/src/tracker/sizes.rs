@@ -1,7 +1,8 @@
 //! Sizes of the body: girths from the first frame, lengths from those that follow.
 
 use super::Tracker;
-use crate::calibrate::{GirthFit, girth_step};
+use crate::calibrate::{Girth, GirthFit, girth_step};
+use crate::estimate::LimbStatus;
 use crate::frame::Frame;
 use crate::geometry::Vec3;
 use crate::outline::edges;
@@ -18,6 +19,7 @@ const LENGTH_STEP: f64 = 0.02;
 impl Tracker {
     /// Fits the girths to the first frame after a reset, whose pose is known.
     pub(super) fn fit_girths(&mut self, frame: &Frame) {
+        self.girths = vec![Girth::default(); self.poses.len()];
         let mut totals = vec![GirthFit::default(); self.poses.len()];
         let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
         let mut seen = Vec::new();
@@ -50,6 +52,19 @@ impl Tracker {
                     pose.translation += pose.rotation * step.shift;
                     *total = sum;
                 }
+            }
+        }
+    }
+
+    /// Draws the girths to what the outline of this frame shows of both sides of each limb.
+    pub(super) fn refine_girths(&mut self) {
+        for (limb, girth) in self.girths.iter_mut().enumerate() {
+            if self.estimate.limb_status.get(limb) != Some(&LimbStatus::Measured) {
+                continue;
+            }
+            let shape = self.body.limbs()[limb].shape;
+            if let Some(axes) = girth.follow(&shape, self.outline.sides(limb)) {
+                self.body.change_girth(limb, Vec3::ZERO, axes);
             }
         }
     }
