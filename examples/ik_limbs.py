@@ -127,6 +127,7 @@ def errors(found: Mapping[str, np.ndarray], truth: Truth) -> dict[str, np.ndarra
 
 
 def row(name: str, joint: str, variants: Sequence[Mapping[str, np.ndarray]]) -> str:
-    """A row of the table: mean error [mm] over both sides, for each way to solve."""
-    means = [1e3 * np.mean([error[f"{side}_{joint}"] for side in "lr"]) for error in variants]
+    """A row of the table: mean error [mm] over both sides (of "elbow", "knee", or "both"), for each way to solve."""
+    joints = [name for name in LIMBS if joint in ("both", name[2:])]
+    means = [1e3 * np.mean([error[name] for name in joints]) for error in variants]
     return f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |"

@@ -148,7 +148,7 @@ def main() -> None:
             continue
         sequence = rendered(arguments.data / "rendered" / name)
         found = [sequence.solve(views) for views in (0, 1, 2)]
-        for joint in ("elbow", "knee"):
+        for joint in ("elbow", "knee", "both"):
             print(row(name, joint, [errors(one, sequence.truth) for one in found]))
         tiles = []
         for frame in np.linspace(10, len(sequence.depths) - 1, 4).astype(int):
@@ -170,7 +170,7 @@ def main() -> None:
             for joint in LIMBS:
                 means = [1e3 * errors(one, truth)[joint].mean() for one in found]
                 print(f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")
-            for joint in ("elbow", "knee"):
+            for joint in ("elbow", "knee", "both"):
                 print(row(name, joint, [errors(one, truth) for one in found]))
         moved = {name: np.linalg.norm(trial.steady[name] - trial.truth[name], axis=1) for name in trial.truth}
         print("\nmoved, mean mm: " + ", ".join(f"{n} {1e3 * d.mean():.1f}" for n, d in moved.items() if d.any()))

@@ -278,6 +278,17 @@ def test_a_view_that_is_content_changes_no_step(arm):
     assert two.angles == pytest.approx(one.angles, abs=1e-9)
 
 
+def test_a_criterion_that_no_longer_falls_ends_the_search(arm):
+    camera, pose = front_camera(0.4)
+    v, u = np.mgrid[:120, :160]
+    narrow = ik.Silhouette((np.abs(u - 40) < 2) & (np.abs(v - 70) < 35), camera=camera, world_from_camera=pose)
+    goal = {"l_hand": shoulder(arm) + np.array([0.3, 0.05, -0.2])}
+    found = ik.solve(arm, goal, images=[narrow], steps=5000)
+    assert found.h > 1.0 and found.converged and found.steps < 30 and found.residuals[0] < 1e-6
+    # There was nothing left to gain.
+    assert ik.solve(arm, goal, images=[narrow], start=found, steps=5000).h > 0.97 * found.h
+
+
 def test_no_bone_in_a_limb_beside_the_chain():
     body = voodoo.Body.human(1.75, model="papers")
     legs = {side: ik.Chain(body, limbs=(f"{side}_thigh", f"{side}_calf")) for side in "lr"}

@@ -75,6 +75,19 @@ def test_follow_reaches_what_is_known_and_tells_the_rest(some):
     assert track.residual[3] == pytest.approx(np.sqrt(np.mean(apart**2)), abs=1e-6)
 
 
+def test_wrists_stand_in_for_hands_that_nobody_measured(some):
+    reference = some.reference
+    kept = [i for i, name in enumerate(reference.names) if name not in ("l_hand", "r_hand", "head_center")]
+    positions = Positions(
+        reference.stamps, tuple(reference.names[i] for i in kept), np.ascontiguousarray(reference.positions[:, kept])
+    )
+    _, errors = follow(some, start_tracker(some), positions, pictures="none")
+    assert not {"l_wrist", "r_wrist", "skullbase"} & set(errors) and {"l_elbow", "r_elbow"} <= set(errors)
+    # What is asked for is what is known.
+    _, errors = follow(some, start_tracker(some), positions, pictures="none", sites=KNOWN)
+    assert {"l_wrist", "r_wrist", "skullbase"} <= set(errors)
+
+
 def test_pictures_change_the_posture_and_nothing_known(some):
     tracker = start_tracker(some)
     plain, _ = follow(some, tracker, Positions.of(some), pictures="none")

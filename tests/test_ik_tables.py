@@ -51,7 +51,10 @@ def test_four_real_cameras(voodoo_data):
     )
     for found in (one, two, agreeing):
         assert found[0] < 0.5 * plain[0] and (found < 0.025).all()
-    assert agreeing[1] < 0.65 * plain[1]  # knees are not halved, see docs/ik.md
+    # The mean over all inner joints is halved; knees by themselves are not, see docs/ik.md.
+    for found in (two, agreeing):
+        assert found.mean() < 0.5 * plain.mean()
+    assert agreeing[1] < 0.65 * plain[1]
     moved = [np.linalg.norm(trial.steady[name] - places, axis=1).mean() for name, places in trial.truth.items()]
     assert max(moved) < 0.02
     assert not any(view.empty for views, _ in trial.views.values() for view in views)

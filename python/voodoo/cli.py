@@ -234,7 +234,9 @@ def ik_command(
     ] = None,
     sites: Annotated[
         str | None,
-        typer.Option(metavar="NAME,...", help="The sites that are known: by default head, trunk, hands, ankles."),
+        typer.Option(
+            metavar="NAME,...", help="The sites that are known: by default head, trunk, hands (or wrists), ankles."
+        ),
     ] = None,
     pictures: Annotated[
         str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), or none (plain).")
@@ -268,9 +270,9 @@ def ik_command(
 
     voodoo ik walk_bag/ --pictures none
 
-    voodoo ik walk_bag/ --targets pose.npz --sites l_hand,r_hand,head_center --out angles.csv --out pose.bvh
+    voodoo ik walk_bag/ --targets pose.npz --sites head_center,l_shoulder,r_shoulder,l_hip,r_hip,l_hand --out pose.bvh
     """
-    from voodoo.ik_recording import KNOWN, Positions, follow
+    from voodoo.ik_recording import Positions, follow
 
     with _clear_errors():
         if body is not None and height is not None:
@@ -287,7 +289,7 @@ def ik_command(
             height=height,
             model=model,
         )
-        known = KNOWN if sites is None else tuple(name.strip() for name in sites.split(","))
+        known = None if sites is None else tuple(name.strip() for name in sites.split(","))
         how: Any = {"sites": known, "pictures": pictures, "warm": not alone}
         result, errors = follow(source, tracker, positions, **how)
         for file in written:

@@ -24,6 +24,8 @@ Pictures: TypeAlias = Literal["depth", "color", "none"]
 
 KNOWN = ("head_center", "l_shoulder", "r_shoulder", "l_hand", "r_hand", "l_hip", "r_hip", "l_ankle", "r_ankle")
 """What J10 takes for known, and the trunk that carries its chains."""
+_STAND_INS = {"head_center": "skullbase", "l_hand": "l_wrist", "r_hand": "r_wrist"}
+"""Taken for known where these are not: keypoint networks know wrists, not hands."""
 _SAME_TIME_S = 0.02
 _LEARN = 41
 _REACHED_M = 0.05
@@ -67,7 +69,7 @@ def follow(
     tracker: voodoo.Tracker,
     positions: Positions,
     *,
-    sites: Sequence[str] = KNOWN,
+    sites: Sequence[str] | None = None,
     pictures: Pictures = "depth",
     options: Options | None = None,
     warm: bool = True,
@@ -78,7 +80,8 @@ def follow(
         recording: read while solving.
         tracker: at the first pose, see voodoo.running.start_tracker; gives body and start.
         positions: of the known sites.
-        sites: which ones are taken for known; those that `positions` lack are left out.
+        sites: which ones are taken for known; those that `positions` lack are left out. None: head, trunk, hands and ankles;
+            wrists and skullbase where hands and head are lacking.
         pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known sites and the
             last posture, or stands before the still scene; "color" by the difference from the still background; "none":
             plain inverse kinematics.
@@ -96,14 +99,17 @@ def follow(
     if pictures not in ("depth", "color", "none"):
         raise VoodooError(f'pictures: expected "depth", "color" or "none", found {pictures!r}')
     chain = Chain(tracker.body)
-    known = [name for name in sites if name in positions.names and name in chain.site_names]
+    there = [name for name in positions.names if name in chain.site_names]
+    if sites is None:
+        sites = [name if name in there else _STAND_INS.get(name, name) for name in KNOWN]
+    known = [name for name in sites if name in there]
     if not known:
         raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
     options = Options() if options is None else options
     start = chain.project(tracker.estimate.world_from_limb)
     follower = Follower(chain, start=start, **{name: getattr(options, name) for name in Options.__dataclass_fields__})
     scenes = {} if pictures == "none" else _scenes(recording, positions, known, pictures)
-    others = [name for name in positions.names if name in chain.site_names and name not in known]
+    others = [name for name in there if name not in known]
     postures: list[Posture] = []
     stamps, rows = [], []
     last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}

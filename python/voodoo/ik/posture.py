@@ -23,7 +23,7 @@ class Posture:
         residuals: distance of every target, in the order they were given [m].
         h: image criterion [px] (J10 eq. 5); 0 without images.
         steps: steps used.
-        converged: the angles came to rest; what residual is left cannot be removed from here.
+        converged: the angles, or the image criterion, came to rest; what residual is left cannot be removed from here.
         images: silhouettes that took part; empty ones do not.
     """
 

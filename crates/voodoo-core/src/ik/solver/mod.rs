@@ -15,6 +15,9 @@ use crate::geometry::Pose;
 const SETTLED: f64 = 1e-10;
 /// Turn that leaves a stationary pose with a residual, radians.
 const NUDGE: f64 = 0.05;
+/// The image is at rest when the criterion falls by less than this share in so many steps, one after the other.
+const LEAST_FALL: f64 = 1e-3;
+const PATIENCE: usize = 3;
 
 /// How to solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +50,7 @@ pub struct Report {
     pub steps: usize,
     /// Postures tried, refused ones included.
     pub tried: usize,
-    /// Whether the angles came to rest (or the only level was reached).
+    /// Whether the angles or the image criterion came to rest (or the only level was reached).
     pub converged: bool,
     /// Image criterion at the end, pixels; 0 without images.
     pub h: f64,
@@ -142,6 +145,7 @@ impl Solver {
         let image = phase == count;
         let active = if image { count } else { phase + 1 };
         let mut nudged = false;
+        let mut idle = 0;
         let mut rest = false;
         for step in 0..options.steps {
             let reached = self.cost[..active].iter().all(|cost| cost.sqrt() < options.tolerance);
@@ -150,8 +154,10 @@ impl Solver {
                 break;
             }
             report.steps += 1;
+            let before = self.h;
             let moved = self.step(problem, active, image, slack, angles);
-            if moved >= options.still {
+            idle = if image && before - self.h < LEAST_FALL * before { idle + 1 } else { 0 };
+            if moved >= options.still && idle < PATIENCE {
                 continue;
             }
             let stuck = !image && self.cost[phase].sqrt() > options.tolerance;
