@@ -15,6 +15,8 @@ const ASLANT: f64 = 0.5;
 const EDGE_REACH: f64 = 0.08;
 /// The same beyond a free limb's tip.
 const TIP_REACH: f64 = 0.20;
+/// An edge with a limb that is not joined to its own this near may be that limb's, metres: it tells nothing of girths.
+const APART: f32 = 0.05;
 /// Edges are approached in strides of about this length, metres, of so many half pixels at most.
 const STRIDE: f64 = 0.008;
 const MOST_STEPS: f64 = 4.0;
@@ -134,6 +136,7 @@ pub struct Outline {
     distance: Vec<f32>,
     least: Vec<f32>,
     closest: Vec<usize>,
+    strangers: Vec<f32>,
 }
 
 /// The edge of a limb, and where it stands in the working frame.
@@ -142,6 +145,8 @@ struct Found {
     limb: usize,
     edge: Edge,
     target: Vec3,
+    /// Distance of the edge to the nearest limb that is not joined to its own, metres.
+    stranger: f32,
 }
 
 impl Outline {
@@ -159,26 +164,30 @@ impl Outline {
                 edges(&view, part, pose, |edge| {
                     self.places.push(edge.place.to_array().map(|value| value as f32));
                     let target = *pose * (edge.foot + edge.side * (edge.seen - edge.rim));
-                    self.edges.push(Found { limb, edge, target });
+                    self.edges.push(Found { limb, edge, target, stranger: f32::INFINITY });
                 });
             }
         }
         self.find_closest(body, poses);
         let mut closest = self.closest.iter();
-        self.edges.retain(|found| {
+        let mut strangers = self.strangers.iter();
+        self.edges.retain_mut(|found| {
             let closest = closest.next();
+            found.stranger = strangers.next().copied().unwrap_or(f32::INFINITY);
             // Beyond the rim, the edge may be another limb's.
             found.edge.seen <= found.edge.rim || closest == Some(&found.limb)
         });
     }
 
-    /// The limb that is nearest to each place.
+    /// The limb that is nearest to each place, and how near the nearest is that is not joined to the edge's own.
     fn find_closest(&mut self, body: &Body, poses: &[Pose]) {
         let count = self.places.len();
         self.least.clear();
         self.least.resize(count, f32::INFINITY);
         self.closest.clear();
         self.closest.resize(count, 0);
+        self.strangers.clear();
+        self.strangers.resize(count, f32::INFINITY);
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
             limb.shape.approximate_distances(pose, &self.places, &mut self.distance);
             for ((least, closest), distance) in self.least.iter_mut().zip(&mut self.closest).zip(&self.distance) {
@@ -186,13 +195,21 @@ impl Outline {
                     (*least, *closest) = (*distance, index);
                 }
             }
+            for ((found, stranger), distance) in self.edges.iter().zip(&mut self.strangers).zip(&self.distance) {
+                if found.limb != index && !body.adjacent(found.limb, index) {
+                    *stranger = stranger.min(*distance);
+                }
+            }
         }
     }
 
-    /// The edges on both sides of a limb, place by place where both were found.
+    /// The edges on both sides of a limb, place by place where both were found apart from other limbs.
     pub fn sides(&self, limb: usize) -> impl Iterator<Item = [Edge; 2]> {
         self.edges.windows(2).filter_map(move |pair| {
             let [one, other] = pair else { return None };
+            if one.stranger.min(other.stranger) < APART {
+                return None;
+            }
             // Both sides of a place are looked for one after the other, in opposite directions.
             let opposite = one.limb == limb && other.limb == limb && one.edge.side == -other.edge.side;
             (opposite && one.edge.foot.z == other.edge.foot.z).then_some([one.edge, other.edge])
@@ -202,7 +219,7 @@ impl Outline {
     /// The rims at `poses` and the edges that were found, as pairs.
     pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<EdgePair>) {
         pairs.clear();
-        pairs.extend(self.edges.iter().map(|Found { limb, edge, target }| {
+        pairs.extend(self.edges.iter().map(|Found { limb, edge, target, .. }| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
             EdgePair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
         }));
