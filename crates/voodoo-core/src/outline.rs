@@ -15,7 +15,7 @@ const ASLANT: f64 = 0.5;
 const EDGE_REACH: f64 = 0.08;
 /// The same beyond a free limb's tip.
 const TIP_REACH: f64 = 0.20;
-/// An edge with a limb that is not joined to its own this near may be that limb's, metres: it tells nothing of girths.
+/// An edge with another limb this near may be that limb's, metres: it tells nothing of girths.
 const APART: f32 = 0.05;
 /// Edges are approached in strides of about this length, metres, of so many half pixels at most.
 const STRIDE: f64 = 0.008;
@@ -145,7 +145,7 @@ struct Found {
     limb: usize,
     edge: Edge,
     target: Vec3,
-    /// Distance of the edge to the nearest limb that is not joined to its own, metres.
+    /// Distance of the edge to the nearest other limb, metres.
     stranger: f32,
 }
 
@@ -179,7 +179,7 @@ impl Outline {
         });
     }
 
-    /// The limb that is nearest to each place, and how near the nearest is that is not joined to the edge's own.
+    /// The limb that is nearest to each place, and how near the nearest is that is not the edge's own.
     fn find_closest(&mut self, body: &Body, poses: &[Pose]) {
         let count = self.places.len();
         self.least.clear();
@@ -196,7 +196,7 @@ impl Outline {
                 }
             }
             for ((found, stranger), distance) in self.edges.iter().zip(&mut self.strangers).zip(&self.distance) {
-                if found.limb != index && !body.adjacent(found.limb, index) {
+                if found.limb != index {
                     *stranger = stranger.min(*distance);
                 }
             }

@@ -12,6 +12,8 @@ use crate::normal::Normal;
 
 /// Width of the inner well in standard deviations of the outer one.
 const WELL: f64 = 0.6;
+/// Share of it that holds the root: what all limbs agree on is less likely noise.
+const ROOT: f64 = 0.2;
 
 /// Deviation from a predicted pose.
 #[derive(Debug)]
@@ -26,13 +28,11 @@ pub struct Prior<'a> {
     pub calm: f64,
 }
 
-impl Prior<'_> {
-    /// Cost and weight of a deviation `r` under the information of `sigma`.
-    fn hold(&self, r: f64, sigma: f64) -> (f64, f64) {
-        let information = 1.0 / (sigma * sigma);
-        let (rho, kernel) = geman_mcclure(r, WELL * sigma);
-        (information * (r * r + self.calm * rho), information * (1.0 + self.calm * kernel))
-    }
+/// Cost and weight of a deviation `r` in the two wells of `sigma`.
+fn hold(calm: f64, r: f64, sigma: f64) -> (f64, f64) {
+    let information = 1.0 / (sigma * sigma);
+    let (rho, kernel) = geman_mcclure(r, WELL * sigma);
+    (information * (r * r + calm * rho), information * (1.0 + calm * kernel))
 }
 
 impl Term for Prior<'_> {
@@ -40,8 +40,8 @@ impl Term for Prior<'_> {
         // Root: rotation and position apart, so that the lever to the working origin does not matter.
         let r = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
         let d = poses[0].translation - self.predicted[0].translation;
-        let (turn_cost, turn) = self.hold(r.length(), self.root[0]);
-        let (shift_cost, shift) = self.hold(d.length(), self.root[1]);
+        let (turn_cost, turn) = hold(ROOT * self.calm, r.length(), self.root[0]);
+        let (shift_cost, shift) = hold(ROOT * self.calm, d.length(), self.root[1]);
         normal.cost += turn_cost + shift_cost;
         let block = &mut normal.limbs[0];
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
@@ -55,7 +55,7 @@ impl Term for Prior<'_> {
             // Deviation in the parent's frame, then in world axes: its derivative by the relative turn is one.
             let turn = (relative(poses) * relative(self.predicted).inverse()).to_scaled_axis_shortest();
             let r = poses[*parent].rotation * turn;
-            let (cost, weight) = self.hold(r.length(), self.joints[index]);
+            let (cost, weight) = hold(self.calm, r.length(), self.joints[index]);
             normal.joints[index].add_turn(weight, r);
             normal.cost += cost;
         }
