@@ -227,7 +227,9 @@ impl Tracker {
         if !self.pairs.is_empty() && self.estimate.status != Status::Lost {
             self.refine_lengths(pace);
         }
-        self.refine_girths();
+        if self.solver.starts_from_prediction() {
+            self.refine_girths();
+        }
         self.interval = self.stamp.map(|stamp| frame.stamp - stamp);
         self.stamp = Some(frame.stamp);
         self.report(frame.stamp, steps);
