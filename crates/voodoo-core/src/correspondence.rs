@@ -122,6 +122,21 @@ impl Correspondences {
         self.limbs[limb].total_weight() + sites
     }
 
+    /// Mean squared distance of the surface points that fit, metres squared: Geman-McClure's weights of `scale` leave out those
+    /// that belong to something else.
+    pub fn scatter(&self, scale: f64) -> Option<f64> {
+        let (mut weight, mut sum) = (0.0, 0.0);
+        for limb in &self.limbs {
+            for (share, distance) in limb.weight.iter().zip(&limb.surface.signed_distance) {
+                let square = f64::from(*distance * *distance);
+                let fits = f64::from(*share) / (1.0 + square / (scale * scale)).powi(2);
+                weight += fits;
+                sum += fits * square;
+            }
+        }
+        (weight > 0.0).then(|| sum / weight)
+    }
+
     /// Weighted mean of the squared distances of all measured pairs (K06 III-B step 2), `None` without any.
     pub fn mean_squared_distance(&self) -> Option<f64> {
         let (mut weight, mut sum) = (0.0, 0.0);

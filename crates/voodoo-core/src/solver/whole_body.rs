@@ -18,7 +18,7 @@ const FREE_SHARE: f64 = 0.3;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
-const ROUGH: f64 = 0.5;
+const ROUGH: f64 = 0.35;
 /// From this step on, what is left of a deviation from the prediction may be noise: before, the body has to find its points.
 const CALM_FROM: usize = 3;
 /// From this step on, only every second one assigns points and looks for edges.
@@ -131,8 +131,8 @@ impl WholeBody {
         // After the last step only lengths are asked for: a pose held tightly would let them bear every deviation.
         let calm = (CALM_FROM..config.max_steps).contains(&problem.step);
         // Points that lie closer to the body than they are trusted to are not at rest by chance: what they show is motion.
-        let scatter = correspondences.mean_squared_distance().unwrap_or(0.0) * information / (ROUGH * ROUGH);
-        let calm = if calm { config.calm * scatter.min(1.0) } else { 0.0 };
+        let scatter = if calm { correspondences.scatter(config.kernel_end).unwrap_or(0.0) } else { 0.0 };
+        let calm = config.calm * (scatter * information / (ROUGH * ROUGH)).min(1.0);
         self.normal.clear(poses.len());
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
         let terms: [&dyn Term; 4] = [
