@@ -120,6 +120,18 @@ def test_broken_frames_lose_nobody_and_the_penalty_calms(body):
     assert jitters[0] < 0.5 * jitters[1]
 
 
+def test_calm_steadies_a_body_that_does_not_fit_well(body):
+    """Rough surfaces make a standing body tremble; what deviates little from the prediction is held as noise."""
+    source = sequence(body, speed=0.05, frames=40, noise_m=0.03)
+    trembling = []
+    for calm in (voodoo.Config().calm, 0.0):
+        tracker = voodoo.Tracker(body, config=voodoo.Config(calm=calm))
+        errors, angles, _, _ = follow(list(source), source, tracker)
+        assert errors.mean() < 0.01
+        trembling.append(np.var(np.diff(angles, n=2, axis=0), axis=0).mean())
+    assert trembling[0] < 0.7 * trembling[1]
+
+
 def test_rectangles_lose_nobody_with_a_narrow_kernel(body):
     """What appears beside the body draws its limbs; a kernel that starts narrow does not let it (docs/virtual.md)."""
     source = sequence(body, speed=3.0)

@@ -178,3 +178,45 @@ impl GirthFit {
         (total, done)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Edges of a limb seen along x whose rims lie `wider` beyond the shape's and whose axis is off by `aside`.
+    fn sides(shape: &TaperedEllipticCylinder, wider: f64, aside: f64) -> Vec<[Edge; 2]> {
+        let edge = |t: f64, sign: f64| {
+            let rim = shape.b0() + t * (shape.b1() - shape.b0());
+            let foot = Vec3::new(0.0, sign * rim, t * shape.length());
+            Edge { side: Vec3::Y * sign, rim, foot, seen: rim + wider + sign * aside, place: Vec3::ZERO }
+        };
+        [0.2, 0.35, 0.5, 0.65, 0.8].map(|t| [edge(t, 1.0), edge(t, -1.0)]).to_vec()
+    }
+
+    #[test]
+    fn girths_follow_the_outline_and_keep_their_thickness() {
+        let truth = 0.20;
+        let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
+        let mut girth = Girth::default();
+        let mut after_one = 0.0;
+        for frame in 0..60 {
+            let seen = sides(&shape, truth - 0.5 * (shape.b0() + shape.b1()), 0.02);
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen.into_iter()).unwrap();
+            let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
+            shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
+            if frame == 0 {
+                after_one = 0.5 * (shape.b0() + shape.b1());
+            }
+        }
+        assert!(after_one < 0.199, "one frame does not decide: {after_one}");
+        let (a, b) = (0.5 * (shape.a0() + shape.a1()), 0.5 * (shape.b0() + shape.b1()));
+        assert!((b - truth).abs() < 0.003, "width {b}");
+        assert!((a - 0.1).abs() < 0.003, "thickness {a}");
+    }
+
+    #[test]
+    fn girths_without_edges_stay() {
+        let shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
+        assert_eq!(Girth::default().follow(&shape, std::iter::empty()), None);
+    }
+}
