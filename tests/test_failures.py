@@ -1,0 +1,34 @@
+"""Pictures of lost joints, as examples/failures.py makes them."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+
+import voodoo
+from voodoo import running
+
+ROOT = Path(__file__).resolve().parent.parent
+BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
+
+
+def load():
+    spec = importlib.util.spec_from_file_location("failures", ROOT / "examples" / "failures.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_only_what_is_lost_gets_a_picture(monkeypatch):
+    failures = load()
+    assert failures.worst(voodoo.open_recording(BUNDLED, use=("depth",))) is None
+
+    def blind(recording, **how):
+        """A tracker whose body cannot move: it stays where it started."""
+        still = voodoo.Config(gate_start=0.001, gate_end=0.001, hypotheses=False, recovery=False, outline=False)
+        return running.start_tracker(recording, config=still, **how)
+
+    monkeypatch.setattr(failures, "start_tracker", blind)
+    picture = failures.worst(voodoo.open_recording(BUNDLED, use=("depth",)))
+    assert picture.shape == (failures.HEIGHT, failures.WIDTH, 3)
+    assert (picture == np.array(failures.MAGENTA)).all(axis=2).any(), "the reference is drawn"
