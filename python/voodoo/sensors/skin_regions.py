@@ -99,20 +99,6 @@ def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
         if not hand:
             found += [Candidate((u + left + x, v + top + y), region, area) for u, v in _tips(mask, palm_px)]
     return found, regions
-    count, labels, stats, centres = cv2.connectedComponentsWithStats(pixels[y : y + h, x : x + w], connectivity=8)
-    regions[y : y + h, x : x + w] = labels
-    for region in range(1, count):
-        left, top, width, height, area = (int(value) for value in stats[region])
-        if not smallest <= area <= largest:
-            continue
-        middle = (float(centres[region][0]) + x, float(centres[region][1]) + y)
-        mask = labels[top : top + height, left : left + width] == region
-        hand = math.hypot(width, height) <= LONGEST_HAND * palm_px or _length(mask) <= LONGEST_HAND * palm_px
-        found.append(Candidate(middle, region, area, hand=hand))
-        if not hand:
-            for u, v in _tips(mask, palm_px):
-                found.append(Candidate((u + left + x, v + top + y), region, area))
-    return found, regions
 
 
 def _length(mask: Mask) -> float:
