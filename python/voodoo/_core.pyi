@@ -281,6 +281,7 @@ class View:
         cls,
         distance: npt.NDArray[np.float32],
         thickness: npt.NDArray[np.float32],
+        border: float,
         intrinsics: tuple[float, float, float, float],
         camera_from_world: npt.ArrayLike,
     ) -> View: ...

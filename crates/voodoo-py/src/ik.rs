@@ -25,6 +25,7 @@ type OptionParts = (usize, f64, f64, f64, f64, f64);
 pub struct PyView {
     distance: Vec<f32>,
     thickness: Vec<f32>,
+    border: f64,
     width: usize,
     height: usize,
     intrinsics: [f64; 4],
@@ -37,6 +38,7 @@ impl PyView {
     fn new(
         distance: PyReadonlyArray2<'_, f32>,
         thickness: PyReadonlyArray2<'_, f32>,
+        border: f64,
         intrinsics: [f64; 4],
         camera_from_world: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
@@ -48,6 +50,7 @@ impl PyView {
         Ok(Self {
             distance: distance.as_slice()?.to_vec(),
             thickness: thickness.as_slice()?.to_vec(),
+            border,
             width,
             height,
             intrinsics,
@@ -61,6 +64,7 @@ impl PyView {
         ik::View {
             distance: &self.distance,
             thickness: &self.thickness,
+            border: self.border,
             width: self.width,
             height: self.height,
             intrinsics: self.intrinsics,

@@ -17,21 +17,26 @@ _UNDISTORTED = 0.5
 _MIDDLE = 0.3
 """A pixel is a middle if a step of a pixel to any side gains less than all but this; smaller gains more middles."""
 _SUBPIXEL_BITS = 4
+_WIDEST = 1000.0
 
 
 class Silhouette:
     """The person's outline in one calibrated picture, as its Euclidean distance transform (J10 section 3)."""
 
-    def __init__(self, mask: npt.ArrayLike, *, camera: Camera, world_from_camera: npt.ArrayLike) -> None:
+    def __init__(
+        self, mask: npt.ArrayLike, *, camera: Camera, world_from_camera: npt.ArrayLike, border: float = 1.0
+    ) -> None:
         """Transform a mask; lens distortion is taken out of it first.
 
         Args:
             mask: (height, width), true (or not 0) where the person is.
             camera: its calibration.
             world_from_camera: rigid (4, 4) pose of the optical frame.
+            border: how far the outline may be from where the camera should see it [px], by its own error and by that of the
+                calibration: bones need not lie deep inside, or in the middle, more exactly than that.
 
         Raises:
-            MeasurementError: the mask has not the camera's size, or the pose is not rigid.
+            MeasurementError: the border is no number of pixels, the mask has not the camera's size, or the pose is not rigid.
         """
         if not isinstance(camera, Camera):
             raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
@@ -45,7 +50,10 @@ class Silhouette:
         person = (person != 0).astype(np.uint8)
         if camera.distorted:
             person = _undistorted(person, camera)
+        if not (isinstance(border, (int, float)) and 0.0 <= border <= _WIDEST):
+            raise MeasurementError(f"border: expected 0 to {_WIDEST:g} pixels, found {border!r}")
         self.camera = camera
+        self.border = float(border)
         self.distance: npt.NDArray[np.float32] = signed_distance(person)
         self.distance.setflags(write=False)
         self.thickness: npt.NDArray[np.float32] = local_thickness(self.distance)
@@ -60,7 +68,7 @@ class Silhouette:
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, self.thickness, intrinsics, inverse)
+        self._core = _core.View(self.distance, self.thickness, self.border, intrinsics, inverse)
 
     @property
     def core(self) -> _core.View:

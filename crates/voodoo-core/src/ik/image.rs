@@ -6,10 +6,6 @@ use crate::geometry::{Mat3, Pose, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
 pub const SAMPLES: usize = 8;
-/// A silhouette's border is known to a pixel: that much less deep is deep enough.
-const BORDER: f64 = 1.0;
-/// The middle between two borders is known to half of that.
-const MIDDLE: f64 = 0.5;
 /// Points nearer to the camera plane than this, or behind it, are not seen; metres.
 const NEAREST: f64 = 0.05;
 
@@ -21,6 +17,9 @@ pub struct View<'a> {
     /// Of every pixel inside, the radius of the largest disc within the silhouette that covers it, pixels: half its local
     /// width. As many as distances, or none: then no bone is centred.
     pub thickness: &'a [f32],
+    /// How far its border may be from where it should be, pixels: that much less deep is deep enough. The middle between two
+    /// borders is known to half of that.
+    pub border: f64,
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -42,8 +41,9 @@ pub struct Segment {
     pub apart: f64,
 }
 
-/// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less a
-/// pixel or, where the silhouette is about as thin as the limb, half the silhouette's width less half a pixel.
+/// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less
+/// what the border is uncertain by or, where the silhouette is about as thin as the limb, half the silhouette's width less half
+/// of that.
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
@@ -183,14 +183,15 @@ impl View<'_> {
         let Some(at) = self.locate(fx * px + cx, fy * py + cy) else { return (0.0, Vec3::ZERO) };
         let [distance, mut du, mut dv] = at.sample(self.distance, self.width);
         let projected = fx * radius * inverse;
-        let mut depth = (projected - BORDER).max(0.0);
+        let mut depth = (projected - self.border).max(0.0);
         // The derivative of the depth by the distance from the camera plane.
         let mut closer = if depth > 0.0 { projected } else { 0.0 };
+        let middle = 0.5 * self.border;
         // No place is deeper than half the width: what is too deep to be thin need not be looked up.
-        if distance < 0.0 && -distance <= thin * projected && distance + thin * projected - MIDDLE > 0.0 {
+        if distance < 0.0 && -distance <= thin * projected && distance + thin * projected - middle > 0.0 {
             let [half, su, sv] = at.sample(self.thickness, self.width);
-            if half <= thin * projected && half - MIDDLE > depth {
-                depth = half - MIDDLE;
+            if half <= thin * projected && half - middle > depth {
+                depth = half - middle;
                 (du, dv, closer) = (du + su, dv + sv, 0.0);
             }
         }
