@@ -5,6 +5,10 @@ from pathlib import Path
 
 import pytest
 
+import voodoo
+from ik_cases import ARM, load_example
+from voodoo import ik
+
 
 @pytest.fixture(scope="session")
 def voodoo_data() -> Path:
@@ -14,3 +18,13 @@ def voodoo_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"measurement data not found at {folder}: set VOODOO_DATA to the folder that holds rendered/ etc.")
     return folder
+
+
+@pytest.fixture(scope="session")
+def virtual():
+    return load_example("ik_virtual")
+
+
+@pytest.fixture(scope="session")
+def arm():
+    return ik.Chain(voodoo.Body.human(1.75, model="papers"), limbs=ARM)

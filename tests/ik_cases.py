@@ -1,0 +1,37 @@
+"""What the tests of inverse kinematics share: a camera in front of the person, and small questions about chains."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import voodoo
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+ARM = ("l_upperarm", "l_forearm")
+
+
+def load_example(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def shoulder(arm):
+    return arm.forward(arm.rest())[1]["l_shoulder"]
+
+
+def within(chain, angles):
+    return bool((angles >= chain.limits[:, 0]).all() and (angles <= chain.limits[:, 1]).all())
+
+
+def front_camera(height=1.0):
+    """Looks along +x of the world from 3 m behind its origin: person in front of base_link."""
+    camera = voodoo.Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    pose[:3, 3] = (-3.0, 0.0, height)
+    return camera, pose
