@@ -37,17 +37,14 @@ def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **optio
     """Positions (F, 3) of elbows and knees, each a chain of two limbs on the trunk that ends at its known joint.
 
     Args:
-        truth: site -> positions (F, 3) [m]; the ten-limb body is sized by the frame whose limbs are as long as usual (the
-            first one, if the truth is exact).
+        truth: site -> positions (F, 3) [m]; the ten-limb body is sized by the first frame of `steady`.
         height: stature [m].
         silhouettes: None: plain inverse kinematics.
         **options: of ik.Options.
     """
     tracker = voodoo.Tracker(voodoo.Body.human(height=height, model="papers"))
-    frames = sorted({0, typical_frame(truth)}, reverse=True)
-    for frame in frames:
-        joints = {name: places[frame] for name, places in truth.items()}
-        estimate = tracker.reset(joints=joints, fit_sizes=frame == frames[0])
+    for sites, fit_sizes in ((steady(truth), True), (truth, False)):
+        estimate = tracker.reset(joints={name: places[0] for name, places in sites.items()}, fit_sizes=fit_sizes)
     torso = estimate.world_from_limb["torso"]
     local = {name: (np.linalg.inv(torso) @ [*places[0], 1.0])[:3] for name, places in truth.items()}
     trunk = [name for name in TRUNK if name in truth]
@@ -88,12 +85,6 @@ def limb_lengths(truth: Truth) -> dict[str, np.ndarray]:
     }
 
 
-def typical_frame(truth: Truth) -> int:
-    """The frame whose limbs are nearest to their median lengths; the first one if all are as near."""
-    lengths = np.concatenate(list(limb_lengths(truth).values()), axis=1).round(3)
-    return int(np.argmin(np.square(lengths - np.median(lengths, axis=0)).sum(axis=1)))
-
-
 def steady(truth: Truth) -> dict[str, np.ndarray]:
     """The truth with every arm and leg replaced by the nearest one (least squares over its three joints) of the median lengths.
 
@@ -118,6 +109,26 @@ def steady(truth: Truth) -> dict[str, np.ndarray]:
             step = rows.transpose(0, 2, 1) @ np.linalg.solve(rows @ rows.transpose(0, 2, 1), wanted)
             places = measured + step.reshape(-1, 3, 3)
         found.update({name: places[:, index] for index, name in enumerate(names)})
+    return found
+
+
+def nearest(truth: Truth) -> dict[str, np.ndarray]:
+    """Positions (F, 3) of elbows and knees as near to the truth as limbs of the median lengths between the known ends can
+    have them: what remains is beyond any inverse kinematics, since all it has to choose is the turn about the line between them.
+    """
+    found = {}
+    for joint, (_, first, last) in LIMBS.items():
+        upper, lower = np.median(limb_lengths(truth)[joint], axis=0)
+        start, way = truth[first], truth[last] - truth[first]
+        apart = np.linalg.norm(way, axis=1, keepdims=True)
+        way = way / apart
+        # What the limbs cannot span, or cannot fold to, they meet stretched or folded.
+        apart = np.clip(apart, abs(upper - lower), upper + lower)
+        along = (apart**2 + upper**2 - lower**2) / (2.0 * apart)
+        side = truth[joint] - start
+        side -= (side * way).sum(axis=1, keepdims=True) * way
+        side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
+        found[joint] = start + along * way + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * side
     return found
 
 

@@ -31,13 +31,24 @@ CORNERS = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
 @dataclass
 class Trial:
     """The published triangulation, the chains of constant limbs nearest to it, and of each camera its silhouettes (F) and its
-    pose (4, 4), and how far the 2-D keypoints of the known sites lie from the triangulation as it sees it (median, pixels)."""
+    pose (4, 4), and how far the 2-D keypoints of the known sites lie from the triangulation as it sees it: offsets (N, 2),
+    pixels."""
 
     truth: Truth
     steady: Truth
     height: float
     views: dict[str, tuple[list[ik.Silhouette], np.ndarray]]
-    apart: dict[str, float]
+    offsets: dict[str, np.ndarray]
+
+    @property
+    def apart(self) -> dict[str, float]:
+        """Camera -> median length of the offsets [px]."""
+        return {name: float(np.median(np.linalg.norm(offset, axis=1))) for name, offset in self.offsets.items()}
+
+    def border(self, camera: str) -> float:
+        """How far an outline is from where it should be in the smaller pictures [px]: a pixel of its own, and what the
+        calibration is off across a limb, the median of the offsets along either axis."""
+        return 1.0 + SCALE * float(np.median(np.abs(self.offsets[camera])))
 
     @property
     def agreeing(self) -> tuple[str, ...]:
@@ -65,14 +76,16 @@ def four_cameras(path: Path) -> Trial:
     known = {name: places for name, places in truth.items() if name not in LIMBS}
     # Twice: elbows and knees found with the first silhouettes tell better where the person is not, hence the background.
     for _ in range(2):
-        trial.views = {name: (cut_out(*seen, known, trial.height), seen[2]) for name, seen in pictures.items()}
+        trial.views = {
+            name: (cut_out(*seen, known, trial.height, trial.border(name)), seen[2]) for name, seen in pictures.items()
+        }
         known = {**known, **trial.solve(trial.agreeing, truth)}
     return trial
 
 
-def offsets(recording: Recording, truth: Truth) -> dict[str, float]:
-    """Camera -> median distance [px] of the known sites' keypoints from the truth as projected into it."""
-    found: dict[str, list[float]] = {}
+def offsets(recording: Recording, truth: Truth) -> dict[str, np.ndarray]:
+    """Camera -> offsets (N, 2) [px] of the known sites' keypoints from the truth as projected into it."""
+    found: dict[str, list[np.ndarray]] = {}
     for frame, recorded in enumerate(recording):
         for item in recorded.measurements:
             if not isinstance(item, KeypointImage) or not item.people:
@@ -82,12 +95,12 @@ def offsets(recording: Recording, truth: Truth) -> dict[str, float]:
                 u, v, sure = np.sum([share * item.people[0][index] for index, share in part.shares.items()], axis=0)
                 if part.site in truth and part.site not in LIMBS and sure > SURE:
                     pixel, _ = view.project(truth[part.site][frame][None])
-                    found.setdefault(item.sensor, []).append(float(np.hypot(*(pixel[0] - (u, v)))))
-    return {name: float(np.median(distances)) for name, distances in found.items()}
+                    found.setdefault(item.sensor, []).append(pixel[0] - (u, v))
+    return {name: np.array(rows) for name, rows in found.items()}
 
 
 def cut_out(
-    pictures: Sequence[np.ndarray], camera: voodoo.Camera, pose: np.ndarray, known: Truth, height: float
+    pictures: Sequence[np.ndarray], camera: voodoo.Camera, pose: np.ndarray, known: Truth, height: float, border: float
 ) -> list[ik.Silhouette]:
     """The person in all pictures of a camera: what differs from the background near the known sites, and the trunk."""
     frames = range(len(pictures))
@@ -100,7 +113,7 @@ def cut_out(
         corners, _ = CameraView(camera, pose).project(np.stack([places[site] for site in CORNERS]))
         cv2.fillPoly(trunk, [cv2.convexHull(np.rint(corners).astype(np.int32))], 1)
         mask = filled((background.mask(picture) & near) | (trunk != 0))
-        outlines.append(ik.Silhouette(mask, camera=camera, world_from_camera=pose))
+        outlines.append(ik.Silhouette(mask, camera=camera, world_from_camera=pose, border=border))
     return outlines
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from ik_limbs import LIMBS, Truth, errors, follow, row
+from ik_limbs import LIMBS, Truth, errors, follow, nearest, row
 from ik_pose2sim import four_cameras
 
 import voodoo
@@ -161,12 +161,13 @@ def main() -> None:
         trial = four_cameras(arguments.data / "pose2sim")
         sets = ((), ("cam_01",), ("cam_01", "cam_04"), trial.agreeing, tuple(trial.views))
         print("\n2-D keypoints off by: " + ", ".join(f"{name} {pixels:.1f} px" for name, pixels in trial.apart.items()))
+        print("borders (smaller pictures): " + ", ".join(f"{name} {trial.border(name):.1f} px" for name in trial.views))
         print(
-            "\n| real cameras, known and error from | joint | plain | 1 view | 2 views | those that agree | all 4 |\n"
-            "|---|---|---|---|---|---|---|"
+            "\n| real cameras, known and error from | joint | plain | 1 view | 2 views | those that agree | all 4 | best turn |\n"
+            "|---|---|---|---|---|---|---|---|"
         )
         for name, truth in (("the triangulation", trial.truth), ("its nearest chains", trial.steady)):
-            found = [trial.solve(cameras, truth) for cameras in sets]
+            found = [*(trial.solve(cameras, truth) for cameras in sets), nearest(truth)]
             for joint in LIMBS:
                 means = [1e3 * errors(one, truth)[joint].mean() for one in found]
                 print(f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")

@@ -45,16 +45,22 @@ def test_four_real_cameras(voodoo_data):
         pytest.skip("the videos of Pose2Sim are not there")
     trial = ik_pose2sim.four_cameras(voodoo_data / "pose2sim")
     assert trial.agreeing == ("cam_01", "cam_02", "cam_04")
-    plain, one, two, agreeing = (
+    # The worse a calibration, the less exactly its silhouettes are taken.
+    borders = {name: trial.border(name) for name in trial.apart}
+    assert all(1.0 < pixels < 6.0 for pixels in borders.values()) and max(borders, key=borders.get) == "cam_03"
+    plain, one, two, agreeing, four = (
         means(trial.solve(cameras, trial.steady), trial.steady)
-        for cameras in ((), ("cam_01",), ("cam_01", "cam_04"), trial.agreeing)
+        for cameras in ((), ("cam_01",), ("cam_01", "cam_04"), trial.agreeing, tuple(trial.views))
     )
-    for found in (one, two, agreeing):
+    for found in (one, two, agreeing, four):
         assert found[0] < 0.5 * plain[0] and (found < 0.025).all()
     # The mean over all inner joints is halved; knees by themselves are not, see docs/ik.md.
-    for found in (two, agreeing):
+    for found in (two, agreeing, four):
         assert found.mean() < 0.5 * plain.mean()
-    assert agreeing[1] < 0.65 * plain[1]
+    assert agreeing[1] < 0.6 * plain[1] and one.mean() < 0.6 * plain.mean()
+    # Against the triangulation itself no chain of constant limbs between its ends can halve it.
+    plain, best = (means(found, trial.truth) for found in (trial.solve((), trial.truth), ik_limbs.nearest(trial.truth)))
+    assert best.mean() > 0.5 * plain.mean()
     moved = [np.linalg.norm(trial.steady[name] - places, axis=1).mean() for name, places in trial.truth.items()]
     assert max(moved) < 0.02
     assert not any(view.empty for views, _ in trial.views.values() for view in views)
@@ -72,9 +78,26 @@ def test_chains_of_constant_limbs_nearest_to_a_truth():
     # Exact truth stays.
     for name, places in ik_limbs.steady(truth).items():
         assert np.allclose(places, truth[name], atol=1e-9)
-    assert ik_limbs.typical_frame(truth) == 0
+    # So do its inner joints, if only their turn about the line between the known ones can be chosen.
+    for joint, places in ik_limbs.nearest(truth).items():
+        assert np.allclose(places, truth[joint], atol=1e-9)
     noisy = {name: places + 0.02 * rng.normal(size=places.shape) for name, places in truth.items()}
     found, medians = ik_limbs.steady(noisy), ik_limbs.limb_lengths(noisy)
     for joint, lengths in ik_limbs.limb_lengths(found).items():
         assert np.allclose(lengths, np.median(medians[joint], axis=0), atol=1e-9)
     assert np.mean([np.linalg.norm(found[name] - noisy[name], axis=1) for name in noisy]) < 0.03
+    # The best turn: no other one of the same limbs is nearer.
+    for joint, (_, first, last) in ik_limbs.LIMBS.items():
+        best, (upper, lower) = ik_limbs.nearest(noisy)[joint], np.median(medians[joint], axis=0)
+        apart = np.linalg.norm(noisy[last] - noisy[first], axis=1)
+        reached = (apart < upper + lower) & (apart > abs(upper - lower))
+        assert reached.any()
+        assert np.allclose(np.linalg.norm(best - noisy[first], axis=1)[reached], upper)
+        assert np.allclose(np.linalg.norm(best - noisy[last], axis=1)[reached], lower)
+        way = (noisy[last] - noisy[first]) / apart[:, None]
+        for angle in (-0.3, 0.3):
+            arm = best - noisy[first]
+            turned = (arm * np.cos(angle) + np.cross(way, arm) * np.sin(angle)
+                      + way * (way * arm).sum(axis=1, keepdims=True) * (1.0 - np.cos(angle)))  # fmt: skip
+            worse = np.linalg.norm(noisy[first] + turned - noisy[joint], axis=1)
+            assert (worse >= np.linalg.norm(best - noisy[joint], axis=1) - 1e-12).all()
