@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -55,13 +55,22 @@ class Trial:
         """The cameras whose calibration agrees with the triangulation."""
         return tuple(name for name, pixels in self.apart.items() if pixels < AGREES_PX)
 
-    def solve(self, cameras: Sequence[str], truth: Truth) -> dict[str, np.ndarray]:
+    def solve(self, cameras: Sequence[str], truth: Truth, **options: float) -> dict[str, np.ndarray]:
         """Positions (F, 3) of elbows and knees with the silhouettes of some cameras, known sites as in `truth`."""
 
         def silhouettes(frame: int, last: Mapping[str, np.ndarray]) -> list[ik.Silhouette]:
             return [self.views[camera][0][frame] for camera in cameras]
 
-        return follow(truth, self.height, silhouettes if cameras else None)
+        return follow(truth, self.height, silhouettes if cameras else None, **options)
+
+    def sharp(self) -> Trial:
+        """The same silhouettes, their borders as sure as if the calibrations were right."""
+        views = {}
+        for name, (outlines, pose) in self.views.items():
+            camera = replace(outlines[0].camera, distortion=())  # taken out of the masks already
+            masks = [outline.distance < 0.0 for outline in outlines]
+            views[name] = ([ik.Silhouette(mask, camera=camera, world_from_camera=pose) for mask in masks], pose)
+        return replace(self, views=views)
 
 
 def four_cameras(path: Path) -> Trial:

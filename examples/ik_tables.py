@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from ik_limbs import LIMBS, Truth, errors, follow, nearest, row
-from ik_pose2sim import four_cameras
+from ik_pose2sim import Trial, four_cameras
 
 import voodoo
 from voodoo import ik
@@ -26,6 +26,7 @@ from voodoo.views import CameraView, silhouette
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
 SIDE_CAMERA = voodoo.Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
+CAUTIONS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)
 BONES = {
     "upperarm": ("shoulder", "elbow"),
     "forearm": ("elbow", "wrist"),
@@ -136,6 +137,16 @@ def picture(
     return canvas
 
 
+def spread(trial: Trial, cameras: Sequence[str]) -> str:
+    """Mean error [mm] of elbows and knees from the nearest chains, over some cautions around the default (least to most): small
+    changes move the solution of a sequence from one valley to another, so one figure alone says little."""
+    means = [
+        1e3 * np.mean(list(errors(trial.solve(cameras, trial.steady, caution=caution), trial.steady).values()))
+        for caution in CAUTIONS
+    ]
+    return f"{np.mean(means):.1f} ({min(means):.1f} to {max(means):.1f})"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
@@ -173,6 +184,11 @@ def main() -> None:
                 print(f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")
             for joint in ("elbow", "knee", "both"):
                 print(row(name, joint, [errors(one, truth) for one in found]))
+        print(
+            "\n| borders, nearest chains, both | 1 view | 2 views | those that agree | all 4 |\n|---|---|---|---|---|"
+        )
+        for name, some in (("as the calibration is off", trial), ("1 px", trial.sharp())):
+            print(f"| {name} | " + " | ".join(spread(some, cameras) for cameras in sets[1:]) + " |")
         moved = {name: np.linalg.norm(trial.steady[name] - trial.truth[name], axis=1) for name in trial.truth}
         print("\nmoved, mean mm: " + ", ".join(f"{n} {1e3 * d.mean():.1f}" for n, d in moved.items() if d.any()))
         frame = 50
