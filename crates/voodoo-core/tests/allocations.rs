@@ -93,6 +93,7 @@ fn ik_allocations() -> usize {
     let view = View {
         distance: &image,
         thickness: &thickness,
+        border: 1.0,
         width: 160,
         height: 120,
         intrinsics: [140.0, 140.0, 79.5, 59.5],
