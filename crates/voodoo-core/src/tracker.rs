@@ -237,6 +237,7 @@ impl Tracker {
         if self.config.recovery && self.solver.starts_from_prediction() {
             self.search(frame);
         }
+        self.remember_ends();
         self.admit_doubt();
         Ok(&self.estimate)
     }
