@@ -140,7 +140,9 @@ impl Candidates {
                 for row in rows.step_by(grid.rows) {
                     for start in (columns.start + grid.offset(row)..columns.end).step_by(STRETCH * stride) {
                         let stretch = Stretch::load(image, background, row, start, columns.end, stride);
-                        stretch.gather(&m, gate, points);
+                        if stretch.returned() {
+                            stretch.gather(&m, gate, points);
+                        }
                     }
                 }
             },
@@ -228,6 +230,12 @@ impl Stretch {
             }
         }
         Self { x, y, z }
+    }
+
+    /// Whether any pixel returned anything that is not the background.
+    #[inline(always)]
+    fn returned(&self) -> bool {
+        self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
     }
 
     /// Appends the points that returned and lie inside the gate, in order.
