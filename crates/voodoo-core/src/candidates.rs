@@ -309,3 +309,24 @@ fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
     [pose.rotation * Vec3::X, pose.rotation * Vec3::Y, pose.rotation * Vec3::Z, pose.translation]
         .map(|column| column.to_array().map(|value| value as f32))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Grid;
+
+    #[test]
+    fn a_grid_keeps_the_share_asked_for_and_spreads_it() {
+        for tenths in 1..400 {
+            let share = f64::from(tenths) / 10.0;
+            let grid = Grid::new(share);
+            let kept = (grid.rows * grid.columns) as f64 / share.max(1.0);
+            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {share}");
+            assert!((0..50).all(|row| grid.offset(row) < grid.columns));
+        }
+        let columns = |share: f64| [0, 1, 2, 3].map(|row| Grid::new(share).offset(row));
+        assert_eq!((Grid::new(0.3), columns(0.3)), (Grid { rows: 1, columns: 1 }, [0; 4]));
+        assert_eq!((Grid::new(2.0), columns(2.0)), (Grid { rows: 1, columns: 2 }, [0, 1, 0, 1]));
+        assert_eq!((Grid::new(4.0), columns(4.0)), (Grid { rows: 2, columns: 2 }, [0; 4]));
+        assert_eq!((Grid::new(8.0), columns(8.0)), (Grid { rows: 2, columns: 4 }, [0, 0, 2, 2]));
+    }
+}
