@@ -78,9 +78,13 @@ impl Tracker {
     pub(super) fn try_hypotheses(&mut self, frame: &Frame, pace: f64) -> usize {
         let mut work = std::mem::take(&mut self.hypotheses);
         let mut steps = 0;
+        self.collect_open(&mut work);
         for index in 0..self.chains.len() {
-            self.collect_open(&mut work);
-            steps += self.try_chain(index, frame, pace, &mut work);
+            let taken = self.try_chain(index, frame, pace, &mut work);
+            if taken > 0 {
+                self.collect_open(&mut work);
+            }
+            steps += taken;
         }
         self.hypotheses = work;
         steps
