@@ -2,6 +2,7 @@
 //!
 //! `cargo bench --bench step`. Synthetic points of the default human, 1.75 m, ten limbs, which moves to and fro, so that
 //! no frame is at its optimum; the published solver unless another is named; all boxes and weights are the defaults.
+//! Images also of the default human of eighteen limbs.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a bench stops at the first surprise")]
 
 use std::hint::black_box;
@@ -54,7 +55,11 @@ impl Bench<'_> {
 }
 
 fn body() -> Body {
-    Body::human(1.75, HumanModel::Papers).unwrap()
+    human(HumanModel::Papers)
+}
+
+fn human(model: HumanModel) -> Body {
+    Body::human(1.75, model).unwrap()
 }
 
 /// ICP steps forced; every point used.
@@ -65,14 +70,18 @@ fn every_point(max_steps: usize, threads: usize) -> Config {
 }
 
 fn tracker(config: Config) -> Tracker {
-    let mut tracker = Tracker::new(body(), config).unwrap();
-    tracker.reset_pose(&scene::standing(&body())).unwrap();
+    tracker_of(&body(), config)
+}
+
+fn tracker_of(body: &Body, config: Config) -> Tracker {
+    let mut tracker = Tracker::new(body.clone(), config).unwrap();
+    tracker.reset_pose(&scene::standing(body)).unwrap();
     tracker
 }
 
 /// The standing person, and the same 4 cm aside and turned by 0.1 rad.
-fn two_poses() -> [Vec<Pose>; 2] {
-    let first = scene::standing(&body());
+fn two_poses(body: &Body) -> [Vec<Pose>; 2] {
+    let first = scene::standing(body);
     let centre = first[0].translation;
     let turn = Quat::from_axis_angle(Vec3::Z, 0.1);
     let second = first
@@ -87,7 +96,7 @@ fn two_poses() -> [Vec<Pose>; 2] {
 
 fn two_clouds(count: usize) -> [Vec<[f64; 3]>; 2] {
     let mut noise = scene::Noise(7);
-    two_poses().map(|poses| scene::surface_points(&body(), &poses, count, 0.01, &mut noise))
+    two_poses(&body()).map(|poses| scene::surface_points(&body(), &poses, count, 0.01, &mut noise))
 }
 
 /// Least-squares line through `(x, y)`: slope, intercept and R^2.
@@ -169,32 +178,35 @@ fn weights(criterion: &mut Criterion) {
 
 fn images(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("from depth image to estimate, 6 steps");
-    for (width, height, focal) in [(160, 124, 145.0), (640, 480, 560.0)] {
-        let camera = scene::DepthCamera { width, height, focal };
-        let mut noise = scene::Noise(3);
-        let [first, second] = two_poses().map(|poses| camera.shoot(&body(), &poses, 0.01, &mut noise));
-        let seen = first.1;
-        let (first, second) = ([camera.image(&first.0)], [camera.image(&second.0)]);
-        for (solver, name, threads) in [
-            (SolverKind::Limbwise, "limbwise", 1),
-            (SolverKind::Limbwise, "limbwise", 2),
-            (SolverKind::Chain, "chain", 1),
-            (SolverKind::Chain, "chain", 2),
-        ] {
-            let instants: [(&[_], &[_]); 2] = [(&[], &first), (&[], &second)];
-            let config = Config { solver, threads, min_change: 0.0, ..Config::default() };
-            let mut bench = Bench { tracker: tracker(config), instants, frames: 0 };
-            let (time, steps) = bench.typical(201);
-            println!(
-                "{width}x{height}, {seen} pixels on the body, {name}, {threads} thread(s): {:.3} ms a frame of {steps:.1} ICP steps",
-                time * 1e3
-            );
-            group.bench_function(
-                BenchmarkId::new(format!("{name}, {threads} thread(s)"), format!("{width}x{height}")),
-                |b| {
-                    b.iter(|| bench.frame());
-                },
-            );
+    for (model, limbs) in [(HumanModel::Papers, "ten limbs"), (HumanModel::Full, "eighteen limbs")] {
+        let body = human(model);
+        for (width, height, focal) in [(160, 124, 145.0), (640, 480, 560.0)] {
+            let camera = scene::DepthCamera { width, height, focal };
+            let mut noise = scene::Noise(3);
+            let [first, second] = two_poses(&body).map(|poses| camera.shoot(&body, &poses, 0.01, &mut noise));
+            let seen = first.1;
+            let (first, second) = ([camera.image(&first.0)], [camera.image(&second.0)]);
+            for (solver, name, threads) in [
+                (SolverKind::Limbwise, "limbwise", 1),
+                (SolverKind::Limbwise, "limbwise", 2),
+                (SolverKind::Chain, "chain", 1),
+                (SolverKind::Chain, "chain", 2),
+            ] {
+                let instants: [(&[_], &[_]); 2] = [(&[], &first), (&[], &second)];
+                let config = Config { solver, threads, min_change: 0.0, ..Config::default() };
+                let mut bench = Bench { tracker: tracker_of(&body, config), instants, frames: 0 };
+                let (time, steps) = bench.typical(201);
+                println!(
+                    "{width}x{height}, {limbs}, {seen} pixels on the body, {name}, {threads} thread(s): {:.3} ms a frame of {steps:.1} ICP steps",
+                    time * 1e3
+                );
+                group.bench_function(
+                    BenchmarkId::new(format!("{limbs}, {name}, {threads} thread(s)"), format!("{width}x{height}")),
+                    |b| {
+                        b.iter(|| bench.frame());
+                    },
+                );
+            }
         }
     }
 }

@@ -173,8 +173,8 @@ def _draw_solid(
     pixels, depths = view.project(rings.reshape(-1, 3))
     points = np.column_stack([pixels, depths]).reshape(2, _FACETS, 3)
     following = np.roll(points, -1, axis=1)
-    facets = [np.array([points[0, i], points[1, i], following[1, i], following[0, i]]) for i in range(_FACETS)]
-    facets += [points[0], points[1][::-1]]
+    sides = np.stack([points[0], points[1], following[1], following[0]], axis=1)[..., :2]
+    caps = np.stack([points[0], points[1][::-1]])[..., :2]
     axis = transform(root_from_limb, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, shape.length]]))
     middle = axis.mean(axis=0)
     corners = np.concatenate([rings, np.roll(rings, -1, axis=1)])
@@ -184,13 +184,17 @@ def _draw_solid(
     # A light at the viewer: how far a normal points to the viewer is how far a small step along it reduces the depth.
     step = 1e-3
     towards = (view.project(middle[None])[1] - view.project(middle + step * normals)[1]) / step
-    for index, facet in enumerate(facets):
-        x, y = facet[:, 0], facet[:, 1]
-        if np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)) <= 0.0:
-            continue  # seen from behind
-        light = 0.35 + 0.65 * float(np.clip(towards[index], 0.0, 1.0)) if index < _FACETS else 0.8
-        shade = tuple(float(light * channel) for channel in color)
-        cv2.fillConvexPoly(layer, _fixed(facet[:, :2]), shade, cv2.LINE_8, _SUBPIXEL)
+    lights = 0.35 + 0.65 * np.clip(towards, 0.0, 1.0)
+    for facets, shades in ((sides, lights), (caps, np.full(2, 0.8))):
+        # The others are seen from behind.
+        for facet, light in zip(_fixed(facets[_ahead(facets)]), shades[_ahead(facets)].tolist(), strict=True):
+            cv2.fillConvexPoly(layer, facet, tuple(light * channel for channel in color), cv2.LINE_8, _SUBPIXEL)
+
+
+def _ahead(facets: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which polygons (K, N, 2) in pixels run clockwise, and so face the viewer."""
+    x, y = facets[..., 0], facets[..., 1]
+    return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) > 0.0)
 
 
 def _draw_sites(picture: Picture, estimate: voodoo.Estimate, view: View) -> None:

@@ -70,18 +70,8 @@ impl Assignment {
         }
     }
 
-    /// Steps 3 and 4: samples the candidates of a limb and finds their closest points; those too far or on a cap that faces
-    /// a joint get weight zero.
-    pub fn match_limb(
-        &self,
-        index: usize,
-        limb: &Limb,
-        pose: &Pose,
-        candidates: &Candidates,
-        config: &Config,
-        max_distance: f64,
-        matches: &mut LimbMatches,
-    ) {
+    /// Step 3: samples the candidates of a limb.
+    pub fn sample_limb(&self, index: usize, candidates: &Candidates, config: &Config, matches: &mut LimbMatches) {
         let members = &self.members[index];
         let kept = sampled_count(members.len(), config);
         matches.candidate.clear();
@@ -90,24 +80,28 @@ impl Assignment {
         } else {
             matches.candidate.extend((0..kept).map(|sample| members[sample * members.len() / kept]));
         }
-        let pick = |from: &[f32], to: &mut Vec<f32>| {
-            to.clear();
-            to.extend(matches.candidate.iter().map(|candidate| from[*candidate as usize]));
-        };
-        pick(&candidates.points.x, &mut matches.measured.x);
-        pick(&candidates.points.y, &mut matches.measured.y);
-        pick(&candidates.points.z, &mut matches.measured.z);
-        pick(&candidates.weight, &mut matches.weight);
-        limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
-        let refused = refused_regions(limb);
-        let limit = max_distance as f32;
-        for ((weight, distance), region) in
-            matches.weight.iter_mut().zip(&matches.surface.signed_distance).zip(&matches.surface.region)
-        {
-            if distance.abs() > limit || refused[usize::from(*region)] {
-                *weight = 0.0;
-            }
-        }
+        pick(&matches.candidate, &candidates.points.x, &mut matches.measured.x);
+        pick(&matches.candidate, &candidates.points.y, &mut matches.measured.y);
+        pick(&matches.candidate, &candidates.points.z, &mut matches.measured.z);
+    }
+}
+
+fn pick(candidates: &[u32], from: &[f32], to: &mut Vec<f32>) {
+    to.clear();
+    to.extend(candidates.iter().map(|candidate| from[*candidate as usize]));
+}
+
+/// Step 4: finds the closest points of a limb's sampled candidates; those too far or on a cap that faces a joint get weight
+/// zero.
+pub fn match_limb(limb: &Limb, pose: &Pose, candidates: &Candidates, max_distance: f64, matches: &mut LimbMatches) {
+    pick(&matches.candidate, &candidates.weight, &mut matches.weight);
+    limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
+    let refused = refused_regions(limb);
+    let limit = max_distance as f32;
+    let found = matches.surface.signed_distance.iter().zip(&matches.surface.region);
+    for (weight, (distance, region)) in matches.weight.iter_mut().zip(found) {
+        let kept = (distance.abs() <= limit) & !refused[usize::from(*region)];
+        *weight = if kept { *weight } else { 0.0 };
     }
 }
 
@@ -172,10 +166,20 @@ fn closest_limbs(block: &Block, boxes: &[LimbBox], squares: &mut [[f32; BLOCK]])
             *square = [OUTSIDE; BLOCK];
             continue;
         }
+        let (mut local, mut inside, mut any) = ([[0.0; BLOCK]; 3], [false; BLOCK], 0);
         for i in 0..BLOCK {
-            square[i] = shape.square(block.x[i], block.y[i], block.z[i]);
+            let place = shape.local(block.x[i], block.y[i], block.z[i]);
+            inside[i] = shape.holds(place);
+            any |= u8::from(inside[i]);
+            (local[0][i], local[1][i], local[2][i]) = (place[0], place[1], place[2]);
+        }
+        if any == 0 {
+            *square = [OUTSIDE; BLOCK];
+            continue;
         }
         for i in 0..BLOCK {
+            let rough = shape.square([local[0][i], local[1][i], local[2][i]]);
+            square[i] = if inside[i] { rough } else { OUTSIDE };
             let closer = square[i] < least[i];
             closest[i] = if closer { limb } else { closest[i] };
             least[i] = if closer { square[i] } else { least[i] };
@@ -234,13 +238,24 @@ impl LimbBox {
         self.around.iter().zip(bounds).all(|(own, other)| own[0] <= other[1] && other[0] <= own[1])
     }
 
+    /// A point in the limb's frame.
+    #[inline(always)]
+    fn local(&self, x: f32, y: f32, z: f32) -> [f32; 3] {
+        let local = |i: usize| self.axes[0][i] * x + self.axes[1][i] * y + self.axes[2][i] * z + self.shift[i];
+        [local(0), local(1), local(2)]
+    }
+
+    /// Whether a point in the limb's frame lies in the enlarged box.
+    #[inline(always)]
+    fn holds(&self, local: [f32; 3]) -> bool {
+        let inside = |axis: usize| (local[axis] >= self.low[axis]) & (local[axis] <= self.high[axis]);
+        inside(0) & inside(1) & inside(2)
+    }
+
     /// Square of about `(rho - 1) / |grad rho|` beside the limb, with `rho^2 = (x/a)^2 + (y/b)^2`, and of the distance beyond
     /// its ends.
     #[inline(always)]
-    fn square(&self, x: f32, y: f32, z: f32) -> f32 {
-        let local = |i: usize| self.axes[0][i] * x + self.axes[1][i] * y + self.axes[2][i] * z + self.shift[i];
-        let local = [local(0), local(1), local(2)];
-        let inside = |axis: usize| (local[axis] >= self.low[axis]) & (local[axis] <= self.high[axis]);
+    fn square(&self, local: [f32; 3]) -> f32 {
         let along = if local[2] > 0.0 { local[2] } else { 0.0 };
         let along = if along < self.length { along } else { self.length };
         let at_least = |value: f32, least: f32| if value > least { value } else { least };
@@ -255,7 +270,6 @@ impl LimbBox {
         let rise = rho_square - rho_square.sqrt();
         let side_square = rise * rise / at_least(gx * gx + gy * gy, 1e-18);
         let beyond = local[2] - along;
-        let square = side_square + beyond * beyond;
-        if inside(0) & inside(1) & inside(2) { square } else { OUTSIDE }
+        side_square + beyond * beyond
     }
 }

@@ -131,16 +131,18 @@ impl Candidates {
         // A pixel stands for a patch of surface: its size follows from the distance of the body.
         let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(0.3);
         let patch = distance * distance / (image.intrinsics[0] * image.intrinsics[1]);
-        let stride = (VISIBLE_AREA / patch / max_points as f64).sqrt().round().max(1.0);
-        let weight = image.weight * patch * stride * stride / REFERENCE_PATCH;
-        let stride = stride as usize;
+        let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
+        let weight = image.weight * patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
+        let stride = grid.columns;
         widest(
             #[inline(always)]
             || {
-                for row in rows.step_by(stride) {
-                    for start in columns.clone().step_by(STRETCH * stride) {
+                for row in rows.step_by(grid.rows) {
+                    for start in (columns.start + grid.offset(row)..columns.end).step_by(STRETCH * stride) {
                         let stretch = Stretch::load(image, background, row, start, columns.end, stride);
-                        stretch.gather(&m, gate, points);
+                        if stretch.returned() {
+                            stretch.gather(&m, gate, points);
+                        }
                     }
                 }
             },
@@ -152,11 +154,32 @@ impl Candidates {
     }
 }
 
-/// Area of a person that a camera sees, about, m^2.
-const VISIBLE_AREA: f64 = 0.4;
+/// Area of a person that a camera sees, about, m^2; what stands beside counts as well.
+const VISIBLE_AREA: f64 = 0.6;
 /// A depth pixel that stands for this much surface has weight one: 12 mm squared, that of a 160x124 time-of-flight camera
 /// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
 pub const REFERENCE_PATCH: f64 = 0.012 * 0.012;
+
+/// Which pixels of an image are used: every so manyth row, and in it every so manyth column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Grid {
+    rows: usize,
+    columns: usize,
+}
+
+impl Grid {
+    /// About one pixel in `share`, as evenly as whole numbers allow.
+    fn new(share: f64) -> Self {
+        let rows = share.sqrt().floor().max(1.0);
+        let columns = (share / rows).round().max(1.0);
+        Self { rows: rows as usize, columns: columns as usize }
+    }
+
+    /// First column of a row: where columns are wider than rows, those of one row stand between those of the next.
+    fn offset(self, row: usize) -> usize {
+        if self.columns == self.rows { 0 } else { row / self.rows * (self.columns / 2) % self.columns }
+    }
+}
 
 /// Pixels of a row that are looked at together.
 const STRETCH: usize = 64;
@@ -207,6 +230,12 @@ impl Stretch {
             }
         }
         Self { x, y, z }
+    }
+
+    /// Whether any pixel returned anything that is not the background.
+    #[inline(always)]
+    fn returned(&self) -> bool {
+        self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
     }
 
     /// Appends the points that returned and lie inside the gate, in order.
@@ -279,4 +308,25 @@ pub fn shifted(world_from_sensor: &Pose, origin: Vec3) -> Pose {
 fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
     [pose.rotation * Vec3::X, pose.rotation * Vec3::Y, pose.rotation * Vec3::Z, pose.translation]
         .map(|column| column.to_array().map(|value| value as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Grid;
+
+    #[test]
+    fn a_grid_keeps_the_share_asked_for_and_spreads_it() {
+        for tenths in 1..400 {
+            let share = f64::from(tenths) / 10.0;
+            let grid = Grid::new(share);
+            let kept = (grid.rows * grid.columns) as f64 / share.max(1.0);
+            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {share}");
+            assert!((0..50).all(|row| grid.offset(row) < grid.columns));
+        }
+        let columns = |share: f64| [0, 1, 2, 3].map(|row| Grid::new(share).offset(row));
+        assert_eq!((Grid::new(0.3), columns(0.3)), (Grid { rows: 1, columns: 1 }, [0; 4]));
+        assert_eq!((Grid::new(2.0), columns(2.0)), (Grid { rows: 1, columns: 2 }, [0, 1, 0, 1]));
+        assert_eq!((Grid::new(4.0), columns(4.0)), (Grid { rows: 2, columns: 2 }, [0; 4]));
+        assert_eq!((Grid::new(8.0), columns(8.0)), (Grid { rows: 2, columns: 4 }, [0, 0, 2, 2]));
+    }
 }

@@ -85,34 +85,45 @@ pub struct Correspondences {
 }
 
 impl LimbMatches {
+    /// Sum of the weights, and weighted sum of the squared distances.
+    pub fn weighed(&self) -> (f64, f64) {
+        let square = |weight, distance| f64::from(weight) * f64::from(distance) * f64::from(distance);
+        let (weight, distance) = (&self.weight, &self.surface.signed_distance);
+        in_lanes(weight, distance, |weight, distance| [f64::from(weight), square(weight, distance)]).into()
+    }
+
     /// Sum of the weights.
     pub fn total_weight(&self) -> f64 {
-        in_lanes(&self.weight, &self.weight, |weight, _| f64::from(weight))
+        let [total] = in_lanes(&self.weight, &self.weight, |weight, _| [f64::from(weight)]);
+        total
     }
 
     /// Number of accepted pairs and weighted sum of their squared distances.
     pub fn accepted(&self) -> (usize, f64) {
-        let count = self.weight.iter().filter(|weight| **weight > 0.0).count();
-        let square = |weight, distance| f64::from(weight) * f64::from(distance) * f64::from(distance);
-        (count, in_lanes(&self.weight, &self.surface.signed_distance, square))
+        (self.weight.iter().filter(|weight| **weight > 0.0).count(), self.weighed().1)
     }
 }
 
-/// Sum of `value` over two columns in several lanes: no addition waits for the one before, and the order is always the same.
+/// Sums of `values` over two columns in several lanes: no addition waits for the one before, and the order is always the same.
 #[inline(always)]
-fn in_lanes(first: &[f32], second: &[f32], value: impl Fn(f32, f32) -> f64) -> f64 {
+fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, f32) -> [f64; N]) -> [f64; N] {
     const LANES: usize = 8;
-    let mut sums = [0.0; LANES];
+    let mut sums = [[0.0; LANES]; N];
     let ((first, first_rest), (second, second_rest)) = (first.as_chunks::<LANES>(), second.as_chunks::<LANES>());
     for (first, second) in first.iter().zip(second) {
         for l in 0..LANES {
-            sums[l] += value(first[l], second[l]);
+            let values = values(first[l], second[l]);
+            for (sum, value) in sums.iter_mut().zip(values) {
+                sum[l] += value;
+            }
         }
     }
-    for ((sum, first), second) in sums.iter_mut().zip(first_rest).zip(second_rest) {
-        *sum += value(*first, *second);
+    for (l, (first, second)) in first_rest.iter().zip(second_rest).enumerate() {
+        for (sum, value) in sums.iter_mut().zip(values(*first, *second)) {
+            sum[l] += value;
+        }
     }
-    sums.iter().sum()
+    sums.map(|lanes| lanes.iter().sum())
 }
 
 impl Correspondences {
@@ -126,13 +137,17 @@ impl Correspondences {
     /// that belong to something else.
     pub fn scatter(&self, scale: f64) -> Option<f64> {
         let (mut weight, mut sum) = (0.0, 0.0);
+        let inverse_square = 1.0 / (scale * scale);
         for limb in &self.limbs {
-            for (share, distance) in limb.weight.iter().zip(&limb.surface.signed_distance) {
-                let square = f64::from(*distance * *distance);
-                let fits = f64::from(*share) / (1.0 + square / (scale * scale)).powi(2);
-                weight += fits;
-                sum += fits * square;
-            }
+            let fitting = |share, distance| {
+                let square = f64::from(distance) * f64::from(distance);
+                let falloff = 1.0 / (1.0 + square * inverse_square);
+                let fits = f64::from(share) * (falloff * falloff);
+                [fits, fits * square]
+            };
+            let [fits, squares] = in_lanes(&limb.weight, &limb.surface.signed_distance, fitting);
+            weight += fits;
+            sum += squares;
         }
         (weight > 0.0).then(|| sum / weight)
     }
@@ -141,8 +156,9 @@ impl Correspondences {
     pub fn mean_squared_distance(&self) -> Option<f64> {
         let (mut weight, mut sum) = (0.0, 0.0);
         for limb in &self.limbs {
-            weight += limb.total_weight();
-            sum += limb.accepted().1;
+            let (total, squares) = limb.weighed();
+            weight += total;
+            sum += squares;
         }
         for pair in &self.sites {
             weight += pair.weight;

@@ -31,6 +31,9 @@ pub fn face_cameras(
                 #[inline(always)]
                 || facing_away(matches, first..last, camera.as_vec3().to_array()),
             );
+            if away.iter().fold(0, |any, away| any | u8::from(*away)) == 0 {
+                continue;
+            }
             for index in (first..last).filter(|index| away[index - first]) {
                 turn_match(shape, pose, *camera, max_distance, matches, index);
             }

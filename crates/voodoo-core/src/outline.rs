@@ -98,7 +98,7 @@ impl Walk {
         let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
         let step = 0.5 * self.start.z.max(0.1) / focal;
         let deep = self.thickness + DEPTH_REACH;
-        let mut last = None;
+        let mut last: Option<(Vec3, f64)> = None;
         let mut r = 0.0;
         // Long strides as far as the first look past the body, then back, and on in small steps.
         let mut stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
@@ -109,14 +109,14 @@ impl Walk {
                 Pixel::Unknown => return None,
                 Pixel::Something(z) if z < place.z - deep => return None,
                 Pixel::Something(z) if z <= place.z + deep => {
-                    last = Some(place * (z / place.z));
+                    last = Some((place, z));
                     from = r;
                 }
                 Pixel::Something(_) | Pixel::Scene(_) => {
-                    let last = last?;
+                    let (last, z) = last?;
                     if stride <= step || r - from <= step {
                         // The edge lies between the two last looks.
-                        return Some((r - 0.25 * step, last));
+                        return Some((r - 0.25 * step, last * (z / last.z)));
                     }
                     (r, stride) = (from, step);
                 }

@@ -17,9 +17,6 @@ pub struct TwoBone {
     pub lengths: [f64; 2],
 }
 
-/// Angles of the bend about the line to the target that are tried, radians.
-const SWIVELS: usize = 6;
-
 impl TwoBone {
     /// All arms and legs of a body.
     pub fn of(body: &Body) -> Vec<Self> {
@@ -68,9 +65,9 @@ impl TwoBone {
         self.lengths[0] + self.lengths[1]
     }
 
-    /// Puts the chain so that its end is at `target` as nearly as it reaches, with the bend turned by the swivel of this
-    /// number; the joints stay closed.
-    pub fn point_at(&self, body: &Body, poses: &mut [Pose], target: Vec3, swivel: usize) {
+    /// Puts the chain so that its end is at `target` as nearly as it reaches, with the bend turned by `swivel` radians about
+    /// the line to it; the joints stay closed.
+    pub fn point_at(&self, body: &Body, poses: &mut [Pose], target: Vec3, swivel: f64) {
         let root = self.root(body, poses);
         let [first, second] = self.lengths;
         let line = target - root;
@@ -80,16 +77,15 @@ impl TwoBone {
         let direction = line.try_normalize().unwrap_or(-Vec3::Z);
         let along = (first * first - second * second + distance * distance) / (2.0 * distance);
         let off = (first * first - along * along).max(0.0).sqrt();
-        let angle = std::f64::consts::TAU * swivel as f64 / SWIVELS as f64;
-        let side = Quat::from_axis_angle(direction, angle) * direction.any_orthonormal_vector();
+        let side = Quat::from_axis_angle(direction, swivel) * direction.any_orthonormal_vector();
         let bend = root + direction * along + side * off;
         let end = root + direction * distance;
         self.put(body, poses, bend, end);
     }
 
-    /// Number of swivels that `point_at` knows.
-    pub const fn swivels() -> usize {
-        SWIVELS
+    /// Where the chain ends.
+    pub fn end(&self, poses: &[Pose]) -> Vec3 {
+        poses[self.lower] * (Vec3::Z * self.lengths[1])
     }
 
     fn put(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
@@ -136,10 +132,10 @@ mod tests {
             let rest = body.rest_pose(Pose::identity());
             for chain in TwoBone::of(&body) {
                 let target = chain.root(&body, &rest) + Vec3::new(0.6, 0.2, -0.3) * chain.reach();
-                for swivel in 0..TwoBone::swivels() {
+                for swivel in 0..6 {
                     let mut poses = rest.clone();
-                    chain.point_at(&body, &mut poses, target, swivel);
-                    let end = poses[chain.lower] * (Vec3::Z * chain.lengths[1]);
+                    chain.point_at(&body, &mut poses, target, f64::from(swivel));
+                    let end = chain.end(&poses);
                     assert!(
                         (end - target).length() < 0.02 * scale,
                         "{:?} misses by {}",

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::associate::Assignment;
+use crate::associate::{Assignment, match_limb};
 use crate::background::Backgrounds;
 use crate::body::{Body, Pair};
 use crate::calibrate::Girth;
@@ -237,6 +237,7 @@ impl Tracker {
         if self.config.recovery && self.solver.starts_from_prediction() {
             self.search(frame);
         }
+        self.remember_ends();
         self.admit_doubt();
         Ok(&self.estimate)
     }
@@ -261,14 +262,18 @@ impl Tracker {
         } else {
             self.outline.clear();
         }
-        self.match_again(frame, step);
+        self.match_now(frame, &gate, true);
     }
 
     /// Steps 3-5: points stay with their limbs, rims with their edges.
     fn match_again(&mut self, frame: &Frame, step: usize) {
-        // 3 Reduce the number of points, 4 find closest points.
         let gate = self.solver.gate(&self.config, step);
-        self.match_points(&gate, self.config.facing && self.solver.faces_cameras());
+        self.match_now(frame, &gate, false);
+    }
+
+    fn match_now(&mut self, frame: &Frame, gate: &Gate, assigned: bool) {
+        // 3 Reduce the number of points, 4 find closest points.
+        self.match_points(gate, assigned, self.config.facing && self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
         self.outline.pairs(&self.poses, &mut self.correspondences.edges);
@@ -336,20 +341,16 @@ impl Tracker {
         assignment.assign(body, poses, candidates, config.overlap, gate.box_margin);
     }
 
-    fn match_points(&mut self, gate: &Gate, facing: bool) {
+    /// Closest points of the limbs' candidates; `assigned` says whether those are others than the last time.
+    fn match_points(&mut self, gate: &Gate, assigned: bool, facing: bool) {
         let Self { body, poses, candidates, assignment, correspondences, config, threads, .. } = self;
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let assignment = &*assignment;
         let work = |(index, matches): (usize, &mut LimbMatches)| {
-            assignment.match_limb(
-                index,
-                &body.limbs()[index],
-                &poses[index],
-                candidates,
-                config,
-                gate.distance,
-                matches,
-            );
+            if assigned {
+                assignment.sample_limb(index, candidates, config, matches);
+            }
+            match_limb(&body.limbs()[index], &poses[index], candidates, gate.distance, matches);
             if facing {
                 face_cameras(&body.limbs()[index].shape, &poses[index], candidates, gate.distance, matches);
             }

@@ -61,7 +61,7 @@ impl<'a> Views<'a> {
 impl View<'_> {
     /// What the pixel that a point (camera frame) falls in shows. Images of distorting lenses say nothing: their rays are
     /// known by the pixel, not the pixel by the ray.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
         let [fx, fy, cx, cy] = image.intrinsics;

@@ -3,7 +3,7 @@
 
 mod scene;
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 use voodoo_core::Body;
 use voodoo_core::background::Backgrounds;
@@ -117,10 +117,10 @@ fn what_one_camera_cannot_prove_another_can() {
     let [front, back] = cameras();
     let arm = &arms(&body)[0];
     // The hand behind the back, beyond its middle, the elbow where the front camera sees least of the forearm.
-    let poses = (0..TwoBone::swivels()).map(|swivel| {
+    let poses = (0..6).map(|swivel| {
         let mut poses = scene::standing(&body);
         let aside = arm.root(&body, &poses).y;
-        arm.point_at(&body, &mut poses, Vec3::new(2.4 + 0.25, -0.5 * aside, 1.0), swivel);
+        arm.point_at(&body, &mut poses, Vec3::new(2.4 + 0.25, -0.5 * aside, 1.0), f64::from(swivel) * FRAC_PI_3);
         poses
     });
     let shots = |poses: &[Pose]| [front, back].map(|camera| (shoot(&body, poses, camera), camera));

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -130,9 +131,18 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
 
 def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:
     """The mask as a pinhole camera of the same focal lengths and centre would see it."""
+    at = _distorted_pixels(camera)
+    soft = cv2.remap(mask.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+    return np.asarray(soft >= _UNDISTORTED, dtype=np.uint8)
+
+
+@lru_cache(maxsize=8)
+def _distorted_pixels(camera: Camera) -> npt.NDArray[np.float32]:
+    """Where (height, width, 2) the distorted picture shows what each pixel of that pinhole camera sees. Kept: every picture of
+    a camera has the same, and it takes longer than all the rest of a silhouette."""
     u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
     rays = [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)]
     pixels = camera.project(np.stack(rays, axis=-1).reshape(-1, 3)).astype(np.float32)
     at = pixels.reshape(camera.height, camera.width, 2)
-    soft = cv2.remap(mask.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_LINEAR)
-    return np.asarray(soft >= _UNDISTORTED, dtype=np.uint8)
+    at.setflags(write=False)
+    return at

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -88,7 +89,7 @@ class SitePredictor:
             for name, position in current.items():
                 if name in self._last[1]:
                     velocity = (position - self._last[1][name]) / elapsed
-                    if float(np.linalg.norm(velocity)) <= self.max_speed:
+                    if math.hypot(*velocity.tolist()) <= self.max_speed:
                         self._velocity[name] = velocity
         self._last = (stamp, current)
 

@@ -74,28 +74,31 @@ impl Surface<'_> {
             &matches.surface.signed_distance,
             &matches.weight,
         ];
-        let columns = columns.map(|column| column.as_chunks::<LANES>());
-        for block in 0..columns[0].0.len() {
-            self.sum_block(&columns.map(|(blocks, _)| blocks[block]), &mut sums);
+        let count = matches.weight.len() / LANES;
+        let [x, y, z, nx, ny, nz, distance, weight] = columns.map(|column| &column.as_chunks::<LANES>().0[..count]);
+        // Spelt out: an array's `map` within the loop is not inlined.
+        for i in 0..count {
+            self.sum_block([x[i], y[i], z[i], nx[i], ny[i], nz[i], distance[i], weight[i]], &mut sums);
         }
-        if !columns[0].1.is_empty() {
+        if count * LANES < matches.weight.len() {
             // Nothing is what the empty lanes weigh.
-            let last = columns.map(|(_, rest)| {
+            let last = columns.map(|column| {
+                let rest = &column[count * LANES..];
                 let mut lanes = [0.0; LANES];
                 lanes[..rest.len()].copy_from_slice(rest);
                 lanes
             });
-            self.sum_block(&last, &mut sums);
+            self.sum_block(last, &mut sums);
         }
         sums
     }
 
     #[inline(always)]
-    fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight]: &[Lanes; 8], sums: &mut Sums) {
+    fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight]: [Lanes; 8], sums: &mut Sums) {
         let (information, slide) = (self.information as f32, self.slide as f32);
         let inverse_square = (1.0 / (self.scale * self.scale)) as f32;
         let (mut pull, mut plane, mut iso) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        let mut row = [[0.0; LANES], [0.0; LANES], [0.0; LANES], *nx, *ny, *nz];
+        let mut row = [[0.0; LANES], [0.0; LANES], [0.0; LANES], nx, ny, nz];
         for l in 0..LANES {
             let square = distance[l] * distance[l];
             let falloff = 1.0 / (1.0 + square * inverse_square);
@@ -119,15 +122,15 @@ impl Surface<'_> {
                 entry += 1;
             }
         }
-        let (wx, wy, wz) = (product(&iso, x), product(&iso, y), product(&iso, z));
+        let (wx, wy, wz) = (product(&iso, &x), product(&iso, &y), product(&iso, &z));
         for (sum, values) in sums.iso.iter_mut().zip([&iso, &wx, &wy, &wz]) {
             for l in 0..LANES {
                 sum[l] += values[l];
             }
         }
-        let squares = [(&wx, x), (&wx, y), (&wx, z), (&wy, y), (&wy, z), (&wz, z)];
-        for (sum, (left, right)) in sums.iso[4..].iter_mut().zip(squares) {
-            add_product(sum, left, right);
+        let squares = [(&wx, &x), (&wx, &y), (&wx, &z), (&wy, &y), (&wy, &z), (&wz, &z)];
+        for (index, (left, right)) in (4..).zip(squares) {
+            add_product(&mut sums.iso[index], left, right);
         }
     }
 }

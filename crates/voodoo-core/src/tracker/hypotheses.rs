@@ -3,6 +3,7 @@
 use super::Tracker;
 use crate::candidates::REFERENCE_PATCH;
 use crate::chain::joint_turn;
+use crate::estimate::LimbStatus;
 use crate::evidence::{EXPLAINED, Visibility, look, unexplained};
 use crate::frame::Frame;
 use crate::geometry::{Points, Pose, Vec3};
@@ -35,6 +36,9 @@ const INSIDE: f64 = 0.01;
 const TARGETS: usize = 5;
 const HEAP: f64 = 0.08;
 const STRAY: f64 = 3.0;
+/// Bends about the line from the root of a chain to a new end that are tried, and to the end it had.
+const SWIVELS: usize = 6;
+const SWIVELS_AT_REST: usize = 12;
 /// A rough hypothesis explains points up to this distance, metres: they are drawn in when it is refined.
 const ROUGHLY: f64 = 0.08;
 /// Points looked at when hypotheses are compared, at most.
@@ -58,21 +62,29 @@ pub(super) struct Hypotheses {
     trial: Vec<Pose>,
     kept: Vec<Pose>,
     kept_predicted: Vec<Pose>,
+    /// Where each chain ended when the frame last proved it right, world.
+    ends: Vec<Option<Vec3>>,
 }
 
 impl Tracker {
     pub(super) fn prepare_hypotheses(&mut self) {
         self.chains = TwoBone::of(&self.body);
         self.idle = vec![0; self.chains.len()];
+        self.hypotheses.ends.clear();
+        self.hypotheses.ends.resize(self.chains.len(), None);
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others.
     pub(super) fn try_hypotheses(&mut self, frame: &Frame, pace: f64) -> usize {
         let mut work = std::mem::take(&mut self.hypotheses);
         let mut steps = 0;
+        self.collect_open(&mut work);
         for index in 0..self.chains.len() {
-            self.collect_open(&mut work);
-            steps += self.try_chain(index, frame, pace, &mut work);
+            let taken = self.try_chain(index, frame, pace, &mut work);
+            if taken > 0 {
+                self.collect_open(&mut work);
+            }
+            steps += taken;
         }
         self.hypotheses = work;
         steps
@@ -174,7 +186,7 @@ impl Tracker {
         let mut least = current - GAIN;
         let mut found = false;
         for target in targets.into_iter().flatten() {
-            for swivel in 0..TwoBone::swivels() {
+            for swivel in swivels(SWIVELS) {
                 work.trial.clone_from(&self.poses);
                 chain.point_at(&self.body, &mut work.trial, target, swivel);
                 let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
@@ -195,11 +207,36 @@ impl Tracker {
                 work.kept.clone_from(&work.trial);
             }
         }
+        if !found && let Some(end) = work.ends[index] {
+            // Its end where it was when all was well: a foot stands while the body moves over it. The best way of that is
+            // refined, whatever it explains so far, because the body itself may be off by as much.
+            least = f64::INFINITY;
+            for swivel in swivels(SWIVELS_AT_REST) {
+                work.trial.clone_from(&self.poses);
+                chain.point_at(&self.body, &mut work.trial, end - self.origin, swivel);
+                let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
+                if cost < least {
+                    least = cost;
+                    found = true;
+                    work.kept.clone_from(&work.trial);
+                }
+            }
+        }
         work.others = others;
         if !found {
             return 0;
         }
         self.refine(index, frame, pace, work)
+    }
+
+    /// Remembers where the chains end that this frame proves right.
+    pub(super) fn remember_ends(&mut self) {
+        let measured = |limb: usize| self.estimate.limb_status[limb] == LimbStatus::Measured;
+        for (index, chain) in self.chains.iter().enumerate() {
+            if self.idle[index] == 0 && chain.limbs().all(measured) {
+                self.hypotheses.ends[index] = Some(chain.end(&self.poses) + self.origin);
+            }
+        }
     }
 
     /// Whether the frame speaks against a chain where it is: against all of it, and against what lies beyond its hinge.
@@ -372,6 +409,11 @@ fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -
         }
     }
     targets
+}
+
+/// Angles all round, radians.
+fn swivels(count: usize) -> impl Iterator<Item = f64> {
+    (0..count).map(move |number| std::f64::consts::TAU * number as f64 / count as f64)
 }
 
 /// Keeps about `most` of the points, evenly, and their total weight.

@@ -30,8 +30,8 @@ impl Tracker {
         }
         let sources = &mut estimate.sources;
         sources.clear();
-        for source in &candidates.source {
-            entry(sources, *source).count += 1;
+        for run in candidates.source.chunk_by(|source, next| source == next) {
+            entry(sources, run[0]).count += run.len();
         }
         for matches in &correspondences.limbs {
             for ((candidate, weight), distance) in

@@ -26,7 +26,7 @@ impl Tracker {
         for _ in 0..GIRTH_STEPS {
             // The pose is known: what is closest is what was seen.
             self.assign(&gate);
-            self.match_points(&gate, false);
+            self.match_points(&gate, true, false);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
                 let matches = &self.correspondences.limbs[limb];
