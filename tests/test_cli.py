@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
 from voodoo import evaluate as evaluate_module
+from voodoo.cli import common
+from voodoo.cli import track as track_module
 from voodoo.errors import RecordingError
 from voodoo.results import Track
 from voodoo.running import Init, start_tracker, track
@@ -32,7 +34,7 @@ def run(monkeypatch, tmp_path):
 
     call.recording, call.tracker = FakeRecording(frames=12), tracker
     tracker.reference = call.recording.reference
-    for module in (cli, evaluate_module):
+    for module in (common, evaluate_module):
         monkeypatch.setattr(module, "open_recording", opened)
     return call
 
@@ -160,7 +162,7 @@ def test_a_refused_frame_is_named_and_leaves_no_result(run):
 
 
 def test_demo(run, monkeypatch):
-    monkeypatch.setattr(cli, "sample_path", lambda: Path("sample"))
+    monkeypatch.setattr(track_module, "sample_path", lambda: Path("sample"))
     run.tracker.offset = (0.0, 0.03, 0.0)
     result = run("demo", "--out", "here")
     assert result.exit_code == 0, result.stderr
