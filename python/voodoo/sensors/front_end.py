@@ -4,7 +4,7 @@ from standard deviations."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,8 @@ from voodoo.sensors.skin import SkinSettings, SkinTracker
 
 INPUTS = ("depth", "points", "scan", "keypoints", "skin", "markers")
 """Kinds of measurements a front end can use."""
+SENSOR_INPUTS = {kind: kind for kind in INPUTS if kind != "skin"} | {"color": "skin"}
+"""Which of them a recording's sensor of a kind serves, see `SensorInfo`."""
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 
@@ -98,9 +100,15 @@ class FrontEndSettings:
         """The defaults for a recording: the floor is known where its root frame is one of LEVEL_FRAMES.
 
         Raises:
-            MeasurementError: an unknown kind.
+            MeasurementError: an unknown kind, or kinds of which the recording has none.
         """
-        return cls(use=tuple(use), ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
+        settings = cls(use=tuple(use))
+        has = {SENSOR_INPUTS[sensor.kind] for sensor in recording.info().sensors if sensor.kind in SENSOR_INPUTS}
+        if has and not has & set(use):
+            raise MeasurementError(
+                f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(use)}"
+            )
+        return replace(settings, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
 
 
 class FrontEnd:

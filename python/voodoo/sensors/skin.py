@@ -33,7 +33,7 @@ from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.hands import BARE, elsewhere, hand_ends, of_pieces, reach, to_palm
 from voodoo.sensors.model import PixelNoise
-from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
+from voodoo.sensors.pixels import FloatArray, checked_camera, in_sensor, ray_distance, rigid, world_rays
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
 from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates, joined
@@ -397,6 +397,9 @@ class SkinTracker:
 
 
 def _check_image(image: ByteImage, camera: Camera) -> None:
+    checked_camera(camera)
+    if not isinstance(image, np.ndarray):
+        raise MeasurementError(f"image: expected an array (H, W, 3) of uint8, found {type(image).__name__}")
     if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
         raise MeasurementError(
             f"image: expected uint8 of shape {(camera.height, camera.width, 3)}, found {image.dtype} of {image.shape}"
