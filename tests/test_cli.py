@@ -14,6 +14,7 @@ from voodoo.cli import track as track_module
 from voodoo.errors import RecordingError
 from voodoo.results import Track
 from voodoo.running import Init, start_tracker, track
+from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 
 
@@ -216,6 +217,16 @@ def test_track_yields_one_estimate_a_frame_with_its_time(run):
     assert [step.index for step in steps] == [0, 1, 2, 3]
     assert [step.estimate.stamp for step in steps] == recording.stamps.tolist()
     assert all(step.seconds > 0.0 for step in steps)
+
+
+def test_a_depth_range_is_two_distances(run):
+    assert_one_line(run("track", "bag", "--depth-range", "far"), 1, "depth-range: expected NEAR,FAR", "'far'")
+    assert_one_line(run("track", "bag", "--depth-range", "5,1"), 1, "0 <= nearest < farthest")
+    assert common.depth_filter_of(None) is None
+    assert common.depth_filter_of("0.5, 4") == DepthFilter(nearest=0.5, farthest=4.0)
+    run.recording = FakeRecording(frames=3)
+    result = run("track", "bag", "--depth-range", "0.5,4")
+    assert result.exit_code == 0, result.output
 
 
 def test_height_option_wins_over_the_start(run):

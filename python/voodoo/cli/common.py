@@ -21,6 +21,7 @@ from voodoo.picture_writer import PictureWriter
 from voodoo.recordings import Recording, open_recording
 from voodoo.results import Track
 from voodoo.running import track
+from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.front_end import INPUTS, FrontEndSettings
 from voodoo.view import Viewer
 
@@ -41,6 +42,21 @@ def kinds_of(words: str | None) -> tuple[str, ...]:
         VoodooError: an unknown kind.
     """
     return INPUTS if words is None else FrontEndSettings(use=tuple(word.strip() for word in words.split(","))).use
+
+
+def depth_filter_of(words: str | None) -> DepthFilter | None:
+    """The filter of "NEAR,FAR" in metres; none for None.
+
+    Raises:
+        VoodooError: not two numbers, or limits that leave nothing.
+    """
+    if words is None:
+        return None
+    try:
+        nearest, farthest = (float(word) for word in words.split(","))
+    except ValueError:
+        raise VoodooError(f"depth-range: expected NEAR,FAR in metres, found {words!r}") from None
+    return DepthFilter(nearest=nearest, farthest=farthest)
 
 
 def config_of(path: Path | None) -> voodoo.Config:

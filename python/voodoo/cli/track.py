@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ import numpy as np
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, config_of, kinds_of, opened, run, states, viewer_of
+from voodoo.cli.common import clear_errors, config_of, depth_filter_of, kinds_of, opened, run, states, viewer_of
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -59,6 +60,10 @@ def track_command(
         Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
     ] = None,
     use: UseOption = None,
+    depth_range: Annotated[
+        str | None,
+        typer.Option(metavar="NEAR,FAR", help="Leave out depth beyond these metres, and flying pixels at edges."),
+    ] = None,
     with_: Annotated[
         list[Path] | None,
         typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),
@@ -102,6 +107,7 @@ def track_command(
         if view and save is not None:
             raise typer.BadParameter("give --view or --save, not both")
         kinds = kinds_of(use)
+        depth_filter = depth_filter_of(depth_range)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
         source = join(
             opened(recording, loader, frame, **loader_options(recording, loader, markers=markers, layout=layout)),
@@ -124,7 +130,7 @@ def track_command(
             markers=markers,
         )
         with viewer_of(view, save, source.name) as viewer:
-            settings = FrontEndSettings.of(source, use=kinds)
+            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter)
             result, _, _ = run(source, tracker, overlay, settings=settings, viewer=viewer)
         for target in targets:
             export(result, target, body=tracker.body, root_frame=source.root_frame)
