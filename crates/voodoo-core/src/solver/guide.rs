@@ -37,20 +37,11 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Makes the limbs between the root and the sites follow them; false without any. The others stay where they are: a hand
-    /// says nothing about legs, which a root that turns a little with the arm would swing away from their points.
+    /// Makes all limbs follow the sites; false without any.
     pub fn leads_all(&mut self, problem: &Problem) -> bool {
-        let Problem { body, correspondences, .. } = problem;
         self.led.clear();
-        self.led.resize(body.limbs().len(), false);
-        for pair in &correspondences.sites {
-            let mut next = Some(pair.limb);
-            while let Some(limb) = next {
-                self.led[limb] = true;
-                next = body.limbs()[limb].parent.as_ref().map(|(parent, _)| *parent);
-            }
-        }
-        !correspondences.sites.is_empty()
+        self.led.resize(problem.body.limbs().len(), true);
+        !problem.correspondences.sites.is_empty()
     }
 
     /// Whether sites farther than `from` metres from where they were seen lead their limbs alone in this frame.
