@@ -104,17 +104,18 @@ def table(results: list[Result], solver: str) -> str:
     """Mean errors in cm, recording by recording, and the change that fusion makes; its standard error where there are
     several starts."""
     chosen = {(r.recording, r.mode): r for r in results if r.solver == solver}
+    modes = [mode for mode in MODES if any(mode == done for _, done in chosen)]
     recordings = list(dict.fromkeys(name for name, _ in chosen))
     starts = len(results[0].errors)
-    title = f"Solver `{solver}`: mean error (cm) of a joint group, {' / '.join(MODES)}"
+    title = f"Solver `{solver}`: mean error (cm) of a joint group, {' / '.join(modes)}"
     lines = [f"{title}; mean of {starts} starts." if starts > 1 else f"{title}.", ""]
     lines += ["| recording | " + " | ".join(GROUPS) + " |", "|---" * (len(GROUPS) + 1) + "|"]
     for name in recordings:
         cells = [
-            " / ".join(f"{100 * chosen[name, mode].group(group).mean():.1f}" for mode in MODES) for group in GROUPS
+            " / ".join(f"{100 * chosen[name, mode].group(group).mean():.1f}" for mode in modes) for group in GROUPS
         ]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    for mode in ("fused", "all"):
+    for mode in [mode for mode in modes if mode in ("fused", "all")]:
         medians, worst = [], []
         for group in GROUPS:
             changes = []
@@ -136,6 +137,8 @@ def plot(results: list[Result], solvers: list[str], file: Path) -> None:
     for axis, solver in zip(axes[0], solvers, strict=True):
         for offset, mode in enumerate(MODES):
             chosen = [r for r in results if r.solver == solver and r.mode == mode]
+            if not chosen:
+                continue
             values = [100 * np.median([r.group(group).mean() for r in chosen]) for group in GROUPS]
             axis.bar(np.arange(len(GROUPS)) + 0.2 * offset, values, width=0.19, label=mode)
         axis.set_xticks(np.arange(len(GROUPS)) + 0.3, list(GROUPS), rotation=20)
@@ -163,7 +166,7 @@ def draw(results: list[Result], paths: list[Path], solver: str, file: Path) -> N
             raise SystemExit(f"{recording.name}: expected colour pictures, found none")
         truth = dict(zip(recording.reference.names, recording.reference.positions[frame], strict=True))
         tiles = []
-        for mode in ("depth", "2-D", "fused"):
+        for mode in [mode for mode in ("depth", "2-D", "fused") if mode in chosen]:
             image = cv2.resize(picture.image, None, fx=1.5, fy=1.5, interpolation=cv2.INTER_CUBIC)
             for joints, colour in ((truth, (255, 255, 255)), (chosen[mode].joints[frame], (0, 90, 255))):
                 points = in_sensor(picture.root_from_sensor, list(joints.values()))
@@ -185,13 +188,15 @@ def main() -> None:
     parser.add_argument("recordings", type=Path, nargs="+")
     parser.add_argument("--out", type=Path, default=Path("out/fusion"))
     parser.add_argument("--solvers", nargs="+", default=["limbwise", voodoo.Config().solver])
+    parser.add_argument("--modes", nargs="+", choices=MODES, default=list(MODES), help="depth and fused are always run")
     parser.add_argument("--starts", type=int, default=1, help="runs of each recording; all but the first disturbed")
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
     if options.starts < 1:
         parser.error(f"--starts: expected a number >= 1, found {options.starts}")
     solvers = list(dict.fromkeys(options.solvers))
-    jobs = [(path, solver, mode, options.starts) for path in options.recordings for solver in solvers for mode in MODES]
+    modes = [mode for mode in MODES if mode in {"depth", "fused", *options.modes}]
+    jobs = [(path, solver, mode, options.starts) for path in options.recordings for solver in solvers for mode in modes]
     if options.jobs > 1:
         with ProcessPoolExecutor(options.jobs) as pool:
             results = list(pool.map(run, jobs))

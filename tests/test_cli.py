@@ -9,9 +9,12 @@ from typer.testing import CliRunner
 from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
 from voodoo import evaluate as evaluate_module
+from voodoo.cli import common
+from voodoo.cli import track as track_module
 from voodoo.errors import RecordingError
 from voodoo.results import Track
 from voodoo.running import Init, start_tracker, track
+from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 
 
@@ -32,7 +35,7 @@ def run(monkeypatch, tmp_path):
 
     call.recording, call.tracker = FakeRecording(frames=12), tracker
     tracker.reference = call.recording.reference
-    for module in (cli, evaluate_module):
+    for module in (common, evaluate_module):
         monkeypatch.setattr(module, "open_recording", opened)
     return call
 
@@ -160,7 +163,7 @@ def test_a_refused_frame_is_named_and_leaves_no_result(run):
 
 
 def test_demo(run, monkeypatch):
-    monkeypatch.setattr(cli, "sample_path", lambda: Path("sample"))
+    monkeypatch.setattr(track_module, "sample_path", lambda: Path("sample"))
     run.tracker.offset = (0.0, 0.03, 0.0)
     result = run("demo", "--out", "here")
     assert result.exit_code == 0, result.stderr
@@ -214,6 +217,16 @@ def test_track_yields_one_estimate_a_frame_with_its_time(run):
     assert [step.index for step in steps] == [0, 1, 2, 3]
     assert [step.estimate.stamp for step in steps] == recording.stamps.tolist()
     assert all(step.seconds > 0.0 for step in steps)
+
+
+def test_a_depth_range_is_two_distances(run):
+    assert_one_line(run("track", "bag", "--depth-range", "far"), 1, "depth-range: expected NEAR,FAR", "'far'")
+    assert_one_line(run("track", "bag", "--depth-range", "5,1"), 1, "0 <= nearest < farthest")
+    assert common.depth_filter_of(None) is None
+    assert common.depth_filter_of("0.5, 4") == DepthFilter(nearest=0.5, farthest=4.0)
+    run.recording = FakeRecording(frames=3)
+    result = run("track", "bag", "--depth-range", "0.5,4")
+    assert result.exit_code == 0, result.output
 
 
 def test_height_option_wins_over_the_start(run):

@@ -8,6 +8,7 @@ import voodoo
 from voodoo import Camera, MeasurementError
 from voodoo.sensors.assignment import assign
 from voodoo.sensors.depth import BodyView, DepthFilter, StillDepth, body_view
+from voodoo.sensors.hands import FINGERS_M, of_pieces, to_palm
 from voodoo.sensors.skin import SkinSettings, SkinTracker
 from voodoo.sensors.skin_regions import candidates, joined
 
@@ -333,6 +334,38 @@ def test_what_a_shadow_parts_is_one_hand_and_arms_stay_apart():
     _, regions = candidates(joined(mask, palm_px=5.4), palm_px=5.4)
     assert regions[104, 104] == regions[114, 104] != 0
     assert regions[120, 204] != regions[120, 214]
+
+
+def test_a_hand_in_pieces_is_where_it_is_expected_between_them():
+    fingers, palm, far = np.array([2.0, 0.0, 0.9]), np.array([2.0, 0.0, 1.0]), np.array([2.0, 0.0, 1.2])
+    expected = np.array([2.05, 0.0, 0.97])
+    assert np.allclose(of_pieces(fingers, [palm, far], expected), [2.0, 0.0, 0.97])
+    assert np.array_equal(of_pieces(fingers, [far], expected), fingers), "no hand is that long"
+    assert np.array_equal(of_pieces(fingers, [palm], np.array([2.0, 0.0, 0.5])), fingers), "not beyond the pieces"
+
+
+def test_a_ring_across_a_hand_does_not_move_it_to_its_fingers():
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z - 0.04))
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    joints = Pose(head, left, right).joints
+    whole = picture(head, left, right, seed=3)
+    cv2.ellipse(whole, left, (5, 11), 0, 0, 360, SKIN, -1)
+    (ray,) = [ray for ray in skin.observe(whole, CAMERA, POSE, joints, body=body) if ray.site == "l_hand"]
+    assert np.linalg.norm(ray.place - joints["l_hand"]) < 0.02
+    parted = whole.copy()
+    cv2.rectangle(parted, (100, left[1] - 3), (120, left[1] + 2), (90, 40, 30), -1)
+    (ray,) = [ray for ray in skin.observe(parted, CAMERA, POSE, joints, body=body) if ray.site == "l_hand"]
+    assert pixel_error(skin, "l_hand", left) > 4.0, "it is named after one piece"
+    assert np.linalg.norm(ray.place - joints["l_hand"]) < 0.02
+
+
+def test_a_hands_middle_lies_beyond_its_palm():
+    predicted = {"l_hand": np.array([2.0, 0.0, 1.0]), "l_elbow": np.array([2.0, 0.0, 1.3]), "head_center": np.zeros(3)}
+    assert np.allclose(to_palm("l_hand", predicted), [0.0, 0.0, FINGERS_M])
+    assert np.array_equal(to_palm("head_center", predicted), np.zeros(3))
+    assert np.array_equal(to_palm("r_hand", predicted | {"r_hand": np.ones(3)}), np.zeros(3)), "without an elbow"
 
 
 def test_a_far_hand_is_no_speck():

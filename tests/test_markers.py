@@ -1,11 +1,15 @@
 """Marker files and markers on limbs."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import voodoo
 from voodoo.errors import BodyError, MeasurementError, RecordingError
 from voodoo.markers import Z_UP_FROM_Y_UP, add_markers, body_with_markers, marker_offset, read_markers, read_trc
+from voodoo.recordings.marker_files import MarkerMap
 
 TRC = (
     "PathFileType\t4\t(X/Y/Z)\tx.trc\n"
@@ -96,3 +100,13 @@ def test_add_markers_leaves_out_what_is_missing(tmp_path):
     assert add_markers(voodoo.Frame(stamp=0.0), markers, 1, sites=sites, weight=1.0) == ("l_wrist", "r_wrist")
     with pytest.raises(MeasurementError, match="0 to 1"):
         add_markers(voodoo.Frame(stamp=0.0), markers, 2, sites=sites, weight=1.0)
+
+
+def test_the_documented_marker_map_fits_the_default_human(tmp_path):
+    text = (Path(__file__).parents[1] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    (block,) = [block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "markers.toml" in block]
+    (tmp_path / "markers.toml").write_text(block, encoding="utf-8")
+    chosen = MarkerMap.load(tmp_path / "markers.toml")
+    body = body_with_markers(voodoo.Body.human(), chosen.worn())
+    assert chosen.limbs and set(chosen.limbs) <= set(body.site_names)
+    assert set(chosen.sites.values()) <= set(body.site_names)

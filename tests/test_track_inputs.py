@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import voodoo
 from test_exports import read_bvh
 from voodoo import cli
+from voodoo.cli import common
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.export import write_trc
 from voodoo.inputs import join, keypoint_folders
@@ -52,7 +53,7 @@ class Short(Recording):
 @pytest.fixture
 def run(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli, "open_recording", lambda path, **options: Short(open_recording(path)))
+    monkeypatch.setattr(common, "open_recording", lambda path, **options: Short(open_recording(path)))
 
     def call(*arguments):
         return CliRunner().invoke(cli.app, ["track", str(sample_path()), *map(str, arguments)], env={"COLUMNS": "200"})

@@ -209,8 +209,10 @@ def checked_joints(
     """Positions by name as plain numbers.
 
     Raises:
-        BodyError: an entry is not three finite numbers; it names the entry.
+        BodyError: no mapping, or an entry is not three finite numbers; it names the entry.
     """
+    if not isinstance(joints, Mapping):
+        raise BodyError(f"{what}: expected a mapping of names to positions, found {type(joints).__name__}")
     checked = {}
     for name, position in joints.items():
         try:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from voodoo.errors import VoodooError
+from voodoo.keypoints import layout_of
 from voodoo.recordings import Recording, open_recording
 from voodoo.recordings.joined import Joined, WithKeypoints
 from voodoo.recordings.loaders import guess_loader
@@ -52,6 +54,9 @@ def join(
     Raises:
         VoodooError: what cannot be read or does not belong together.
     """
+    layout_of(layout)
+    if not math.isfinite(offset):
+        raise VoodooError(f"offset: expected a finite number of seconds, found {offset}")
     if keypoints:
         recording = WithKeypoints(recording, keypoints, layout=layout)
     if others:

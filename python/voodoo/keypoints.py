@@ -19,7 +19,7 @@ from voodoo.errors import MeasurementError, RecordingError, reading
 from voodoo.keypoint_layouts import LAYOUTS, Layout
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import in_sensor, rigid, world_rays
+from voodoo.sensors.pixels import checked_camera, in_sensor, rigid, world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -99,7 +99,10 @@ def site_pixels(
         MeasurementError: unknown layout or wrong shape.
     """
     table = layout_of(layout)
-    rows = np.asarray(keypoints, dtype=np.float64)
+    try:
+        rows = np.asarray(keypoints, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise MeasurementError(f"keypoints: expected numbers (u, v, confidence), found {keypoints!r}") from error
     if rows.shape != (table.count, 3):
         raise MeasurementError(f"keypoints: expected shape ({table.count}, 3) for {layout}, found {rows.shape}")
     seen, unseen = [], []
@@ -129,6 +132,9 @@ class KeypointSensor:
         min_confidence: see site_pixels.
         source: name for `Estimate.sources`.
         sites: use only these; None means all the layout has.
+
+    Raises:
+        MeasurementError: an unknown layout or site, no calibration, or no rigid pose.
     """
 
     layout: str
@@ -139,6 +145,15 @@ class KeypointSensor:
     min_confidence: float = MIN_CONFIDENCE
     source: str = "keypoints"
     sites: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Check what does not depend on a picture."""
+        known = [part.site for part in layout_of(self.layout).parts]
+        unknown = sorted(set(self.sites or ()) - set(known))
+        if unknown:
+            raise MeasurementError(f"sites: expected some of {', '.join(known)}, found {', '.join(unknown)}")
+        checked_camera(self.camera)
+        rigid(self.world_from_sensor)
 
     def add(
         self,

@@ -86,6 +86,8 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
         RecordingError: not of that form; names the line.
     """
     path = Path(path)
+    if not path.is_file():
+        raise RecordingError(f"{path}: expected a .trc file, found none")
     with reading(path, "a readable .trc file"):
         lines = path.read_text(encoding="utf-8").splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):

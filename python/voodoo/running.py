@@ -107,7 +107,8 @@ def start_tracker(
         markers: those worn on limbs become sites of the body.
 
     Raises:
-        VoodooError: there is no first pose, it does not fix the pose of this body, or both body and height are given.
+        VoodooError: there is no first pose, it does not fix the pose of this body, both body and height are given, or a
+            marker stands for a site that the body has not.
     """
     if body is not None and height is not None:
         raise VoodooError("body and height: expected at most one of them, found both")
@@ -123,6 +124,11 @@ def start_tracker(
         body = voodoo.Body.human(model=model) if height is None else voodoo.Body.human(height=height, model=model)
     if markers is not None and markers.limbs:
         body = body_with_markers(body, markers.worn())
+    for marker, site in () if markers is None else markers.sites.items():
+        if site not in body.site_names:
+            raise VoodooError(
+                f"marker {marker}: expected one of the sites {', '.join(body.site_names)}, found {site!r}"
+            )
     tracker = voodoo.Tracker(body, config=config if config is not None else voodoo.Config())
     tracker.reset(joints=dict(init.joints), fit_sizes=True)
     return tracker

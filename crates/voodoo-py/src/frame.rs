@@ -220,6 +220,12 @@ impl PyFrame {
         source: &str,
     ) -> PyResult<()> {
         let number = |name: &str| camera.getattr(name)?.extract::<f64>();
+        let pixels = |name: &str| camera.getattr(name)?.extract::<usize>();
+        let (Ok(width), Ok(height)) = (pixels("width"), pixels("height")) else {
+            let found = camera.get_type().name()?;
+            let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
+            return Err(exception(camera.py(), "MeasurementError", text));
+        };
         let intrinsics = [number("fx")?, number("fy")?, number("cx")?, number("cy")?];
         let rays = match camera.getattr("distorted")?.extract::<bool>()? {
             true => Some(camera.call_method0("rays")?.cast::<PyArray3<f32>>()?.clone()),
@@ -245,6 +251,13 @@ impl PyFrame {
         } else {
             return Err(wrong());
         };
+        if [size[0], size[1]] != [height, width] {
+            let text = format!(
+                "image: expected {height} rows of {width} pixels, as its camera has, found shape [{}, {}]",
+                size[0], size[1]
+            );
+            return Err(exception(py, "MeasurementError", text));
+        }
         let data = ImageData {
             pixels,
             size: [size[0], size[1]],

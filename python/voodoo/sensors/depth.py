@@ -66,18 +66,23 @@ class DepthFilter:
             image: uint16 or float32; 0 and NaN mean "no return".
             metres_per_unit: of the image.
         """
+        dropped = self.dropped(image, metres_per_unit=metres_per_unit)
         kept: DepthArray = image.copy()
-        kept[self.dropped(image, metres_per_unit=metres_per_unit)] = 0
+        kept[dropped] = 0
         return kept
 
     def dropped(self, image: DepthArray, *, metres_per_unit: float = 0.001) -> npt.NDArray[np.bool_]:
         """(H, W): True for pixels that returned something that is not used.
 
         Raises:
-            MeasurementError: not a 2-D uint16 or float32 array.
+            MeasurementError: not a 2-D uint16 or float32 array, or no unit.
         """
+        if not isinstance(image, np.ndarray):
+            raise MeasurementError(f"depth: expected an array (H, W), found {type(image).__name__}")
         if image.ndim != 2 or image.dtype not in (np.uint16, np.float32):
             raise MeasurementError(f"depth: expected (H, W) uint16 or float32, found {image.dtype} of {image.shape}")
+        if not (np.isfinite(metres_per_unit) and metres_per_unit > 0.0):
+            raise MeasurementError(f"metres_per_unit: expected a finite length > 0, found {metres_per_unit!r}")
         z = image.astype(np.float32) * np.float32(metres_per_unit)
         returned = np.isfinite(z) & (z > 0.0)
         z[~returned] = 0.0

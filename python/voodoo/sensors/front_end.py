@@ -4,7 +4,7 @@ from standard deviations."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from voodoo.sensors.model import (
     RangeNoise,
     SensorModel,
 )
+from voodoo.sensors.motion import LimbMotion
 from voodoo.sensors.occlusion import body_before
 from voodoo.sensors.pixels import FloatArray, in_sensor
 from voodoo.sensors.rays import SiteRay, add_rays, agreed
@@ -40,6 +41,8 @@ from voodoo.sensors.skin import SkinSettings, SkinTracker
 
 INPUTS = ("depth", "points", "scan", "keypoints", "skin", "markers")
 """Kinds of measurements a front end can use."""
+SENSOR_INPUTS = {kind: kind for kind in INPUTS if kind != "skin"} | {"color": "skin"}
+"""Which of them a recording's sensor of a kind serves, see `SensorInfo`."""
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 
@@ -97,9 +100,15 @@ class FrontEndSettings:
         """The defaults for a recording: the floor is known where its root frame is one of LEVEL_FRAMES.
 
         Raises:
-            MeasurementError: an unknown kind.
+            MeasurementError: an unknown kind, or kinds of which the recording has none.
         """
-        return cls(use=tuple(use), ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
+        settings = cls(use=tuple(use))
+        has = {SENSOR_INPUTS[sensor.kind] for sensor in recording.info().sensors if sensor.kind in SENSOR_INPUTS}
+        if has and not has & set(use):
+            raise MeasurementError(
+                f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(use)}"
+            )
+        return replace(settings, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
 
 
 class FrontEnd:
@@ -122,6 +131,7 @@ class FrontEnd:
         self._scenes: dict[str, StillDepth] = {}
         self._steps = 0
         self._predictor = SitePredictor()
+        self._motion = LimbMotion()
         chosen = self.settings
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
         self._predictor.update(float("nan"), tracker.estimate.joints)
@@ -135,6 +145,7 @@ class FrontEnd:
         """
         estimate = self.tracker.step(self.frame(recorded))
         self._predictor.update(recorded.stamp, estimate.joints)
+        self._motion.update(recorded.stamp, estimate.world_from_limb)
         for item in recorded.measurements:
             if isinstance(item, ColorImage) and item.sensor in self.skin:
                 # The first frame shows the pose that was set; without it a colour camera alone would never begin.
@@ -206,16 +217,26 @@ class FrontEnd:
             )
         elif isinstance(item, PointCloud) and "points" in use:
             weight = self._points_weight(item, predicted)
-            frame.add_points(item.points, world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
+            points = self._carried(item, item.points, frame.stamp)
+            frame.add_points(points, world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
         elif isinstance(item, LaserScan) and "scan" in use:
             weight = self._weight(self.settings.scan_noise, self.settings.scan_sharing, item, predicted)
-            frame.add_points(item.points(), world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
+            points = self._carried(item, item.points(), frame.stamp)
+            frame.add_points(points, world_from_sensor=item.root_from_sensor, weight=weight, source=item.sensor)
         elif isinstance(item, MarkerSet) and "markers" in use:
             sigma = self.settings.marker_sigma if item.sigma is None else item.sigma
             weight = self.settings.model.weight(sigma)
             for site, position in item.positions.items():
                 if site in predicted:
                     frame.add_position(site, position, weight=weight, source=item.sensor)
+
+    def _carried(self, item: LaserScan | PointCloud, points: npt.NDArray[Any], stamp: float) -> npt.NDArray[Any]:
+        """Points of the sensor (N, 3), those on the body where they are at `stamp`."""
+        if not self._motion.moves(stamp - item.stamp):
+            return points
+        pose = item.root_from_sensor
+        places = points.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
+        return in_sensor(pose, self._motion.carried(places, stamp - item.stamp, self.tracker.limb_distances))
 
     def _add_skin(self, item: ColorImage, predicted: Mapping[str, FloatArray], depth: DepthImage | None) -> None:
         skin = self.skin.setdefault(item.sensor, SkinTracker(self.settings.skin))

@@ -61,6 +61,17 @@ def world_rays(
     return pose[:3, 3], directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
+def checked_camera(camera: object) -> Camera:
+    """A calibration, checked.
+
+    Raises:
+        MeasurementError: something else, or none.
+    """
+    if not isinstance(camera, Camera):
+        raise MeasurementError(f"camera: expected a Camera, the calibration of the image, found {camera!r}")
+    return camera
+
+
 def rigid(world_from_sensor: npt.ArrayLike) -> FloatArray:
     """A (4, 4) array, checked.
 

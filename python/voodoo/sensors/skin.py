@@ -31,8 +31,9 @@ from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
 from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
+from voodoo.sensors.hands import BARE, elsewhere, hand_ends, of_pieces, reach, to_palm
 from voodoo.sensors.model import PixelNoise
-from voodoo.sensors.pixels import FloatArray, in_sensor, ray_distance, rigid, world_rays
+from voodoo.sensors.pixels import FloatArray, checked_camera, in_sensor, ray_distance, rigid, world_rays
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
 from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates, joined
@@ -48,12 +49,8 @@ BARE_M = 0.08
 """What is nearer to the bare limbs than this may be theirs."""
 STANDS_OUT_M = 0.02
 """A hand before trunk or legs stands out from them by as much; a stripe of a shirt does not."""
-BARE = ("head", "neck", "upperarm", "forearm", "hand")
-"""Endings of the names of limbs that show skin."""
 NEAREST_HAND, FARTHEST_HAND_M = 0.6, 0.10
 """A hand is no nearer to an elbow that is seen than this share of its forearm, and not this much farther."""
-ON_LIMB_M, OFF_LIMB_M = 0.03, 0.06
-"""What is no farther than this from a limb, and this much farther from another, is of the first."""
 FACE_BEHIND_M, HAND_BEHIND_M = 0.075, 0.04
 """The middle of a head lies this far behind its face, that of a hand behind its skin."""
 
@@ -229,11 +226,12 @@ class SkinTracker:
         allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, held, specks=speck)
         # A speck far from where the hand is expected is what is left of another region.
         allowed[(distance > self.settings.gate) & np.array(speck)] = 0.0
+        others = elsewhere(sites, sights, limbs, lost)
         found = self.blobs.name(
             seen,
             distance,
             allowed,
-            _elsewhere(sites, sights, limbs, lost),
+            others,
             sites=sites,
             gates=dict.fromkeys(sites, self.settings.gate),
             growth=self.settings.gate_growth,
@@ -251,9 +249,18 @@ class SkinTracker:
             self.assigned[site] = self.candidates[column]
             across = self.settings.noise.sigma(places[site][1], focal)
             sight = sights[column]
-            place = self._inside(site, sight) if sight.deep else None
+            direction, place = sight.direction, self._inside(site, sight) if sight.deep else None
+            if place is not None and not site.startswith("head"):
+                able = (allowed[sites.index(site)] > 0) & ~others[sites.index(site)]
+                able[list(found.values())] = False
+                pieces = [
+                    self._inside(site, other) for other, free in zip(sights, able, strict=True) if free and other.deep
+                ]
+                place = of_pieces(place, pieces, predicted[site])
+                direction = (place - origin) / float(np.linalg.norm(place - origin))
             bias = self.settings.sites[site]
-            rays.append(SiteRay(site, origin, sight.direction, across, source, bias=bias, place=place))
+            ray = SiteRay(site, origin, direction, across, source, bias=bias, place=place)
+            rays.append(ray.moved(to_palm(site, predicted)))
         return rays
 
     def _inside(self, site: str, sight: Sight) -> FloatArray:
@@ -294,9 +301,9 @@ class SkinTracker:
                 continue
             allowed[row] *= [sight.hand for sight in sights]
             if shoulder is not None:
-                reach = _reach(side, predicted)
+                farthest = reach(side, predicted)
                 distance = [float(np.linalg.norm(sight.place - shoulder)) for sight in sights]
-                allowed[row] *= [not sight.deep or d < reach for sight, d in zip(sights, distance, strict=True)]
+                allowed[row] *= [not sight.deep or d < farthest for sight, d in zip(sights, distance, strict=True)]
             elbow = predicted.get(f"{side}_elbow")
             if elbow is not None and site in held:
                 # What is much nearer is the forearm's middle, with the hand in the shade or cut off.
@@ -305,10 +312,10 @@ class SkinTracker:
                 least, most = NEAREST_HAND * forearm, math.inf if site in lost else forearm + FARTHEST_HAND_M
                 allowed[row] *= [not sight.deep or least < d < most for sight, d in zip(sights, apart, strict=True)]
             if elbow is not None:
-                ends = np.array(_hand_ends(sights, predicted[site], elbow))
+                ends = np.array(hand_ends(sights, predicted[site], elbow))
                 if site in lost:
                     # Nothing speaks for where the hand is expected, but it may be there all the same.
-                    ends |= _hand_ends(sights, None, elbow)
+                    ends |= hand_ends(sights, None, elbow)
                 allowed[row] *= ends
         return allowed
 
@@ -389,49 +396,10 @@ class SkinTracker:
         }
 
 
-def _reach(side: str, predicted: Mapping[str, FloatArray]) -> float:
-    """How far a hand can be from its shoulder [m], with room for a model that is not where the person is."""
-    joints = [predicted.get(f"{side}_{name}") for name in ("shoulder", "elbow", "hand")]
-    if any(joint is None for joint in joints):
-        return math.inf
-    shoulder, elbow, hand = (np.asarray(joint) for joint in joints)
-    return 1.2 * float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(hand - elbow)) + 0.15
-
-
-def _elsewhere(
-    sites: list[str],
-    sights: list[Sight],
-    limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
-    lost: Collection[str],
-) -> npt.NDArray[np.bool_]:
-    """(S, B): whether a sight is the surface of a limb other than a hand's own forearm, of a bare one if that is lost."""
-    result = np.zeros((len(sites), len(sights)), dtype=np.bool_)
-    deep = np.array([sight.deep for sight in sights])
-    for row, site in enumerate(sites):
-        own = [name for name in limbs if name.startswith(site[0]) and name.endswith(("forearm", "hand"))]
-        if not own or site.startswith("head"):
-            continue
-        names = [name for name in limbs if name not in own and (site not in lost or name.endswith(BARE))]
-        others = np.min([limbs[name] for name in names], axis=0, initial=np.inf)
-        own_away = np.min([limbs[name] for name in own], axis=0)
-        result[row] = deep & (others < ON_LIMB_M) & (own_away > others + OFF_LIMB_M)
-    return result
-
-
-def _hand_ends(sights: list[Sight], hand: FloatArray | None, elbow: FloatArray) -> list[bool]:
-    """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region."""
-    towards = [
-        (0.0 if hand is None else float(np.linalg.norm(item.place - hand))) - float(np.linalg.norm(item.place - elbow))
-        for item in sights
-    ]
-    least: dict[int, float] = {}
-    for item, value in zip(sights, towards, strict=True):
-        if item.hand:
-            least[item.region] = min(value, least.get(item.region, math.inf))
-    return [value <= least.get(item.region, math.inf) for item, value in zip(sights, towards, strict=True)]
-
-
 def _check_image(image: ByteImage, camera: Camera) -> None:
+    checked_camera(camera)
+    if not isinstance(image, np.ndarray):
+        raise MeasurementError(f"image: expected an array (H, W, 3) of uint8, found {type(image).__name__}")
     if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
         raise MeasurementError(
             f"image: expected uint8 of shape {(camera.height, camera.width, 3)}, found {image.dtype} of {image.shape}"

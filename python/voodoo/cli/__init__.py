@@ -1,0 +1,58 @@
+"""The command line. Every command is a few calls of the package; nothing is computed here."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated
+
+import typer
+
+from voodoo.cli.evaluate import eval_command
+from voodoo.cli.ik import ik_command
+from voodoo.cli.show import body_command, config_command, info_command
+from voodoo.cli.track import demo_command, track_command
+
+app = typer.Typer(
+    name="voodoo",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main() -> None:
+    """Entry point of the `voodoo` command."""
+    app()
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        try:
+            typer.echo(f"voodoo {version('voodoo')}")
+        except PackageNotFoundError:
+            typer.echo("voodoo (not installed)")
+        raise typer.Exit
+
+
+@app.callback()
+def voodoo_command(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Follow a person's pose through depth, laser and point cloud recordings, on a plain CPU.
+
+    Try [bold]voodoo demo[/bold] first; then [bold]voodoo info RECORDING[/bold] and
+    [bold]voodoo track RECORDING --out pose.csv --overlay look.mp4[/bold].
+    """
+
+
+# In the order of `voodoo --help`.
+app.command("track")(track_command)
+app.command("demo")(demo_command)
+app.command("ik")(ik_command)
+app.command("eval")(eval_command)
+app.command("info")(info_command)
+app.command("config")(config_command)
+app.command("body")(body_command)

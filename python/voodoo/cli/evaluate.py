@@ -1,0 +1,82 @@
+"""`voodoo eval`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from voodoo.cli.common import clear_errors, config_of, kinds_of, progressing
+from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, UseOption
+from voodoo.errors import VoodooError
+
+
+def eval_command(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings, or folders that hold some.")
+    ],
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for tables and plot.")] = None,
+    config: ConfigOption = None,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Recordings at the same time; by default one for each core.")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
+    ] = None,
+    model: ModelOption = "full",
+    use: UseOption = None,
+    depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
+    ablation: Annotated[
+        bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
+    ] = False,
+    loader: LoaderOption = None,
+) -> None:
+    """Track recordings that bring a truth or a reference skeleton, and measure the result.
+
+    Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
+    summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end.
+
+    With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
+    switch turned over, the other solvers, no prediction, no jitter penalty)
+    and prints a row each; --out gets ablation.md and ablation.csv.
+
+    [bold]Examples[/bold]
+
+    voodoo eval rendered/ --only '*_cmu' --out report
+
+    voodoo eval utd-mhad/ --jobs 4 --out report
+
+    voodoo eval rendered/ --ablate --out report
+    """
+    from voodoo.ablate import ablate, table, variants, write_tables
+    from voodoo.evaluate import evaluate_all, find_recordings
+    from voodoo.report import markdown, write_reports
+
+    with clear_errors():
+        config_of(config)  # a bad file is one error here instead of one for each recording
+        paths = find_recordings(recordings, only=only or ())
+        jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        kinds = ("depth",) if depth_only else kinds_of(use)
+        if ablation:
+            chosen = config_of(config)
+            runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, jobs=jobs)
+            ablations = list(progressing(runs, "ablating", len(variants(chosen))))
+            typer.echo(table(ablations))
+            if out is not None:
+                typer.echo("wrote " + ", ".join(str(file) for file in write_tables(out, ablations)))
+            failed = [score for item in ablations for score in item.failures]
+            if failed:
+                raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
+            return
+        done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, jobs=jobs)
+        ordered = sorted(progressing(done, "evaluating", len(paths)), key=lambda item: item[0])
+        scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
+        typer.echo(markdown(scores))
+        if out is not None:
+            files = write_reports(out, scores, tables)
+            typer.echo("wrote " + ", ".join(str(file) for file in files))
+        failures = [score for score in scores if score.failure]
+        if failures:
+            raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")

@@ -1,0 +1,91 @@
+"""`voodoo ik`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+import voodoo
+from voodoo.cli.common import clear_errors, opened, states
+from voodoo.cli.options import BodyOption, FrameOption, HeightOption, LoaderOption, ModelOption, RecordingArgument
+from voodoo.export.files import check_target
+from voodoo.export.files import save as export
+from voodoo.results import Track
+from voodoo.running import Init, start_tracker
+
+
+def ik_command(
+    recording: RecordingArgument,
+    targets: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Known positions: a result of voodoo track. By default the reference's."),
+    ] = None,
+    sites: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...", help="The sites that are known: by default head, trunk, hands (or wrists), ankles."
+        ),
+    ] = None,
+    pictures: Annotated[
+        str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), or none (plain).")
+    ] = "depth",
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Solve every frame by itself, from the first pose, not from the one before.")
+    ] = False,
+    init: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
+    ] = None,
+    body: BodyOption = None,
+    height: HeightOption = None,
+    model: ModelOption = "full",
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME_ik.csv.",
+        ),
+    ] = None,
+    frame: FrameOption = None,
+    loader: LoaderOption = None,
+) -> None:
+    """Find postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
+
+    The .csv has the columns of voodoo track, its NAME_rad led by the six of the root; the other formats are those of voodoo
+    track, too. Sites that are not among the known ones are compared with the reference, if it has them.
+
+    [bold]Examples[/bold]
+
+    voodoo ik walk_bag/ --pictures none
+
+    voodoo ik walk_bag/ --targets pose.npz --sites head_center,l_shoulder,r_shoulder,l_hip,r_hip,l_hand --out pose.bvh
+    """
+    from voodoo.ik_recording import Positions, follow
+
+    with clear_errors():
+        if body is not None and height is not None:
+            raise typer.BadParameter("give --body or --height, not both")
+        source = opened(recording, loader, frame)
+        written = out or [Path(f"{source.name}_ik.csv")]
+        for file in written:
+            check_target(file)
+        positions = Positions.of(source, None if targets is None else Track.load(targets))
+        tracker = start_tracker(
+            source,
+            init=None if init is None else Init.load(init),
+            body=None if body is None else voodoo.Body.load(body),
+            height=height,
+            model=model,
+        )
+        known = None if sites is None else tuple(name.strip() for name in sites.split(","))
+        how: Any = {"sites": known, "pictures": pictures, "warm": not alone}
+        result, errors = follow(source, tracker, positions, **how)
+        for file in written:
+            export(result, file, body=tracker.body, root_frame=source.root_frame)
+        for name, values in errors.items():
+            if np.isfinite(values).any():
+                typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
+        typer.echo(f"{len(result)} frames, {states(result)}; wrote {' and '.join(map(str, written))}")

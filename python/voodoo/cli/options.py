@@ -1,0 +1,41 @@
+"""Arguments and options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from voodoo.recordings import LOADERS
+from voodoo.running import HumanModel
+from voodoo.sensors.front_end import INPUTS
+
+RecordingArgument = Annotated[
+    Path, typer.Argument(metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, Pose2Sim or PNG folder, .trc, .c3d.")
+]
+LoaderOption = Annotated[
+    str | None, typer.Option("--loader", metavar="NAME", help=f"Instead of a guess: {', '.join(LOADERS)}.")
+]
+ConfigOption = Annotated[
+    Path | None, typer.Option("--config", metavar="FILE", help="Settings as TOML; `voodoo config` prints all of them.")
+]
+BodyOption = Annotated[
+    Path | None, typer.Option("--body", metavar="FILE", help="What to track, as TOML; `voodoo body` prints the human.")
+]
+HeightOption = Annotated[
+    float | None,
+    typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in metres."),
+]
+ModelOption = Annotated[
+    HumanModel,
+    typer.Option("--model", help="The default human: of eighteen limbs (full), or of the papers' ten."),
+]
+FrameOption = Annotated[
+    str | None,
+    typer.Option("--frame", metavar="NAME", help="Root frame of the result, instead of the recording's own."),
+]
+UseOption = Annotated[
+    str | None,
+    typer.Option("--use", metavar="KIND,...", help=f"Inputs to use, by default all there are: {', '.join(INPUTS)}."),
+]

@@ -1,0 +1,44 @@
+"""`voodoo info`, `voodoo config` and `voodoo body`: what there is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import voodoo
+from voodoo.cli.common import clear_errors, opened
+from voodoo.cli.options import FrameOption, HeightOption, LoaderOption, ModelOption, RecordingArgument
+
+
+def info_command(recording: RecordingArgument, frame: FrameOption = None, loader: LoaderOption = None) -> None:
+    """Say what is in a recording: sensors, topics, frames, rates, root frame and reference."""
+    with clear_errors():
+        typer.echo(str(opened(recording, loader, frame).info()))
+
+
+def config_command() -> None:
+    """Print the default configuration as commented TOML, to change and give back with --config.
+
+    [bold]Example[/bold]
+
+    voodoo config > fast.toml
+    """
+    typer.echo(voodoo.Config().to_toml(), nl=False)
+
+
+def body_command(
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A body file to check and print.")] = None,
+    height: HeightOption = None,
+    model: ModelOption = "full",
+) -> None:
+    """Print a body as TOML: the default human of a stature, or a file after checking it."""
+    with clear_errors():
+        if file is not None and height is not None:
+            raise typer.BadParameter("give FILE or --height, not both")
+        if file is not None:
+            body = voodoo.Body.load(file)
+        else:
+            body = voodoo.Body.human(1.75 if height is None else height, model=model)
+        typer.echo(body.to_toml(), nl=False)

@@ -1,0 +1,163 @@
+"""`voodoo track` and `voodoo demo`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import voodoo
+from voodoo.cli.common import clear_errors, config_of, depth_filter_of, kinds_of, opened, run, states, viewer_of
+from voodoo.cli.options import (
+    BodyOption,
+    ConfigOption,
+    FrameOption,
+    HeightOption,
+    LoaderOption,
+    ModelOption,
+    RecordingArgument,
+    UseOption,
+)
+from voodoo.export.files import check_target
+from voodoo.export.files import save as export
+from voodoo.inputs import join, keypoint_folders, loader_options
+from voodoo.keypoint_layouts import LAYOUTS
+from voodoo.overlay import contact_sheet
+from voodoo.picture_writer import save_picture
+from voodoo.recordings import sample_path
+from voodoo.recordings.marker_files import MarkerMap
+from voodoo.running import Init, start_tracker
+from voodoo.sensors.front_end import FrontEndSettings
+
+
+def track_command(
+    recording: RecordingArgument,
+    init: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
+    ] = None,
+    body: BodyOption = None,
+    height: HeightOption = None,
+    model: ModelOption = "full",
+    config: ConfigOption = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME.csv.",
+        ),
+    ] = None,
+    overlay: Annotated[
+        Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
+    ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show every step in Rerun (pip install voodoo\\[view]).")
+    ] = False,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
+    ] = None,
+    use: UseOption = None,
+    depth_range: Annotated[
+        str | None,
+        typer.Option(metavar="NEAR,FAR", help="Leave out depth beyond these metres, and flying pixels at edges."),
+    ] = None,
+    with_: Annotated[
+        list[Path] | None,
+        typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),
+    ] = None,
+    offset: Annotated[float, typer.Option(metavar="S", help="Seconds to add to the stamps of --with.")] = 0.0,
+    keypoints: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SENSOR=DIR", help="OpenPose JSON files, one for each image of SENSOR; repeatable."),
+    ] = None,
+    layout: Annotated[str, typer.Option(metavar="NAME", help=f"Of all keypoints: {', '.join(LAYOUTS)}.")] = "body25b",
+    marker_map: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="TOML: which sites the markers of .trc and .c3d files stand for."),
+    ] = None,
+    frame: FrameOption = None,
+    loader: LoaderOption = None,
+) -> None:
+    """Track the body through a recording and write one row a frame.
+
+    All inputs the recording has are used: depth images, point clouds, laser scans, skin in colour images, 2-D
+    keypoints, markers. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
+
+    The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in metres for every joint and site, in the
+    recording's root frame (base_link if it has one), and NAME_rad for every joint angle. The .npz adds the pose of
+    every limb.
+
+    --init gives the pose in the first frame, by any subset of names that fixes it:
+    [cyan]{"height_m": 1.76, "joints": {"l_shoulder": \\[3.1, -0.3, 1.4], "r_shoulder": \\[3.2, 0.1, 1.4], ...}}[/cyan]
+
+    [bold]Examples[/bold]
+
+    voodoo track walk_bag/ --init start.json --out walk.csv
+
+    voodoo track a1_s1_t1_depth.mat --height 1.80 --out pose.npz --out pose.bvh --overlay look.mp4
+
+    voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
+    """
+    with clear_errors():
+        if body is not None and height is not None:
+            raise typer.BadParameter("give --body or --height, not both")
+        if view and save is not None:
+            raise typer.BadParameter("give --view or --save, not both")
+        kinds = kinds_of(use)
+        depth_filter = depth_filter_of(depth_range)
+        markers = None if marker_map is None else MarkerMap.load(marker_map)
+        source = join(
+            opened(recording, loader, frame, **loader_options(recording, loader, markers=markers, layout=layout)),
+            keypoints=keypoint_folders(keypoints or ()),
+            layout=layout,
+            others=with_ or (),
+            offset=offset,
+            markers=markers,
+        )
+        targets = out or [Path(f"{source.name}.csv")]
+        for target in targets:
+            check_target(target)
+        tracker = start_tracker(
+            source,
+            init=None if init is None else Init.load(init),
+            body=None if body is None else voodoo.Body.load(body),
+            height=height,
+            model=model,
+            config=config_of(config),
+            markers=markers,
+        )
+        with viewer_of(view, save, source.name) as viewer:
+            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter)
+            result, _, _ = run(source, tracker, overlay, settings=settings, viewer=viewer)
+        for target in targets:
+            export(result, target, body=tracker.body, root_frame=source.root_frame)
+        written = [str(path) for path in (*targets, overlay, save) if path is not None]
+        typer.echo(f"{len(result)} frames, {states(result)}; wrote {' and '.join(written)}")
+
+
+def demo_command(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for result and pictures.")] = Path("voodoo-demo"),
+) -> None:
+    """Run the main job on the bundled recording, a person who bends, scoops and reaches up.
+
+    Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the recording's exact truth.
+    """
+    from voodoo.evaluate import compare
+
+    with clear_errors():
+        source = opened(sample_path(), None, None)
+        tracker = start_tracker(source)
+        out.mkdir(parents=True, exist_ok=True)
+        result, seconds, sheet = run(source, tracker, out / "overlay.mp4", sheet=6)
+        result.save(out / "pose.csv")
+        save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
+        errors = compare(source, result)
+        typer.echo(f"{source.name}: {len(result)} frames, {states(result)}")
+        typer.echo(
+            f"time of a frame   {1e3 * np.mean(seconds):.2f} ms (mean), {1e3 * np.median(seconds):.2f} ms (median)"
+        )
+        typer.echo(f"mean joint error  {100 * np.nanmean(errors):.1f} cm against exact truth, twelve joints")
+        typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")

@@ -1,0 +1,83 @@
+"""Where points that were measured some time before the frame are at its time: each goes on with the limb it lies on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.sensors.pixels import FloatArray
+
+_SAME_S = 1e-3
+"""Stamps that differ by less are one time."""
+
+
+@dataclass
+class LimbMotion:
+    """Carries points along with the limbs.
+
+    A laser at 15 Hz beside a camera at 30 Hz is up to a period old when it is used, in which a walking leg goes 5 cm: twice
+    what the model's legs are off. Points are moved like those of `SitePredictor`.
+
+    Args:
+        near: points farther than this from every limb [m] are the scene's and stay.
+        velocity_share: see `SitePredictor`.
+        max_speed: a limb that is faster [m/s] has jumped; its points stay.
+        longest: no point is carried on for longer than this [s].
+    """
+
+    near: float = 0.20
+    velocity_share: float = 0.6
+    max_speed: float = 8.0
+    longest: float = 0.1
+    _poses: FloatArray | None = field(default=None, repr=False)
+    _moves: FloatArray | None = field(default=None, repr=False)
+    _stamp: float = field(default=float("nan"), repr=False)
+
+    def update(self, stamp: float, world_from_limb: Mapping[str, npt.NDArray[np.float64]]) -> None:
+        """Take up the poses of all limbs (4, 4) at `stamp` [s]."""
+        poses = np.array(list(world_from_limb.values()), dtype=np.float64)
+        self._moves = None
+        if self._poses is not None and len(self._poses) == len(poses) and stamp > self._stamp:
+            # What the last interval did to a place on a limb, a second: (L, 3, 4).
+            moves = (poses @ np.linalg.inv(self._poses) - np.eye(4))[:, :3] / (stamp - self._stamp)
+            self._moves = self.velocity_share * moves
+        self._poses, self._stamp = poses, stamp
+
+    def moves(self, elapsed: float) -> bool:
+        """Whether there is anything to do for points seen `elapsed` seconds before the frame."""
+        return self._moves is not None and abs(elapsed) >= _SAME_S
+
+    def carried(
+        self, points: FloatArray, elapsed: float, distances: Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
+    ) -> FloatArray:
+        """Places (N, 3) [m] at the frame's time of points (N, 3) in the world, seen `elapsed` seconds before it.
+
+        Args:
+            points: in the world.
+            elapsed: negative for a sensor that measured after the frame's time.
+            distances: of places (N, 3) from each limb, (L, N) [m]; see `Tracker.limb_distances`.
+        """
+        if self._moves is None or self._poses is None or not self.moves(elapsed):
+            return points
+        origins = self._poses[:, :3, 3]
+        # No limb is longer than a metre: what is far from all of them needs no distances.
+        low, high = origins.min(axis=0) - 1.0, origins.max(axis=0) + 1.0
+        around = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+        if not len(around):
+            return points
+        away = distances(points[around])
+        if len(away) != len(self._moves):
+            return points
+        limb = np.asarray(away.argmin(axis=0))
+        on_body = away[limb, np.arange(len(around))] < self.near
+        chosen, limb = around[on_body], limb[on_body]
+        moves = self._moves[limb]
+        velocity = np.einsum("nij,nj->ni", moves[:, :, :3], points[chosen]) + moves[:, :, 3]
+        steady = np.linalg.norm(velocity, axis=1) < self.max_speed * self.velocity_share
+        result = points.copy()
+        result[chosen[steady]] += np.clip(elapsed, -self.longest, self.longest) * velocity[steady]
+        return result

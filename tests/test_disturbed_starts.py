@@ -1,0 +1,64 @@
+"""The table of examples/disturbed_starts.py."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import voodoo
+
+ROOT = Path(__file__).resolve().parent.parent
+BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
+
+
+@pytest.fixture
+def disturbed():
+    spec = importlib.util.spec_from_file_location("disturbed_starts", ROOT / "examples" / "disturbed_starts.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_first_start_is_the_recordings_own_and_the_others_are_near_it(disturbed, monkeypatch, capsys):
+    started = []
+    reset = voodoo.Tracker.reset
+
+    def noted(self, *, joints, **how):
+        started.append(np.array(list(joints.values())))
+        return reset(self, joints=joints, **how)
+
+    monkeypatch.setattr(voodoo.Tracker, "reset", noted)
+    monkeypatch.setattr(sys, "argv", ["disturbed_starts.py", str(BUNDLED), "--starts", "2"])
+    disturbed.main()
+    own = voodoo.open_recording(BUNDLED).start["joints"]
+    assert np.array_equal(started[0], np.array(list(own.values())))
+    assert 0.002 < (started[1] - started[0]).std() < 0.006
+    row, total = capsys.readouterr().out.strip().splitlines()[2::2]
+    errors = [float(word) for word in row.split("|")[2].split()]
+    assert len(errors) == 2 and 0.5 < min(errors) <= max(errors) < 6.0, row
+    assert "of 2 runs end with a joint lost" in total
+
+
+def test_a_lost_joint_is_named(disturbed, monkeypatch):
+    class Still(voodoo.Tracker):
+        """It stays where it started: nothing is near enough to be matched."""
+
+        def __init__(self, body):
+            blind = voodoo.Config(gate_start=0.001, gate_end=0.001, hypotheses=False, recovery=False, outline=False)
+            super().__init__(body, config=blind)
+
+    monkeypatch.setattr(voodoo, "Tracker", Still)
+    recording = voodoo.open_recording(BUNDLED, use=("depth",))
+    error, kind, lost = disturbed.run(recording, np.random.default_rng(0), 0.0)
+    assert error > 0.10 and kind == 0
+    assert "l_wrist" in lost or "r_wrist" in lost, lost
+
+
+def test_a_recording_without_truth_is_refused(disturbed):
+    class Bare:
+        name, start, reference = "bare", None, None
+
+    with pytest.raises(SystemExit, match="bare: expected a recording with a start and exact truth, found none"):
+        disturbed.run(Bare(), np.random.default_rng(0), 0.0)

@@ -1,0 +1,101 @@
+"""What cannot be meant is refused by name, with what was expected and what was found."""
+
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo.errors import BodyError, MeasurementError, RecordingError, VoodooError
+from voodoo.inputs import join
+from voodoo.keypoints import KeypointSensor
+from voodoo.markers import read_trc
+from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.marker_files import MarkerMap
+from voodoo.running import start_tracker
+from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.front_end import FrontEndSettings
+from voodoo.sensors.skin import SkinTracker
+
+CAMERA = voodoo.Camera(32, 24, 30.0, 30.0, 15.5, 11.5)
+HERE = np.eye(4)
+NAN = float("nan")
+
+
+def depth(image, camera=CAMERA):
+    voodoo.Frame(stamp=0.0).add_depth(image, camera=camera, metres_per_unit=0.001, world_from_sensor=HERE)
+
+
+def sensor(**changes):
+    return KeypointSensor(**({"layout": "coco17", "camera": CAMERA, "world_from_sensor": HERE} | changes))
+
+
+def skin(image, camera=CAMERA):
+    SkinTracker().observe(image, camera, HERE, {})
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: depth(np.zeros((24, 33), np.uint16)),
+            MeasurementError,
+            "image: expected 24 rows of 32 pixels, as its camera has, found shape [24, 33]",
+        ),
+        (lambda: depth(np.zeros((24, 32), np.uint16), None), MeasurementError, "camera: expected a Camera"),
+        (lambda: sensor(layout="coco"), MeasurementError, "layout 'coco': expected one of coco17"),
+        (
+            lambda: sensor(camera=None),
+            MeasurementError,
+            "camera: expected a Camera, the calibration of the image, found",
+        ),
+        (lambda: sensor(world_from_sensor=np.eye(3)), MeasurementError, "expected a finite (4, 4) array, found"),
+        (lambda: sensor(sites=("l_wirst",)), MeasurementError, "sites: expected some of l_shoulder"),
+        (
+            lambda: sensor().observe("seen", stamp=0.0, predicted={}),
+            MeasurementError,
+            "keypoints: expected numbers (u, v, confidence), found 'seen'",
+        ),
+        (lambda: skin([[1]]), MeasurementError, "image: expected an array (H, W, 3) of uint8, found list"),
+        (lambda: skin(np.zeros((24, 32, 3), np.uint8), None), MeasurementError, "camera: expected a Camera"),
+        (lambda: DepthFilter().apply([[1, 2]]), MeasurementError, "depth: expected an array (H, W), found list"),
+        (
+            lambda: DepthFilter().apply(np.zeros((2, 2), np.uint16), metres_per_unit=NAN),
+            MeasurementError,
+            "metres_per_unit: expected a finite length > 0, found nan",
+        ),
+        (
+            lambda: voodoo.Tracker(voodoo.Body.human()).reset(joints=[(0.0, 0.0, 0.0)]),
+            BodyError,
+            "joints: expected a mapping of names to positions, found list",
+        ),
+        (lambda: read_trc("nowhere.trc"), RecordingError, "nowhere.trc: expected a .trc file, found none"),
+    ],
+)
+def test_a_wrong_argument(call, error, words):
+    with pytest.raises(error) as caught:
+        call()
+    assert words in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return open_recording(sample_path())
+
+
+def test_a_layout_nobody_knows_and_an_offset_that_is_none(recording):
+    """Also where nothing is joined that would use them."""
+    with pytest.raises(VoodooError, match="layout 'coco': expected one of coco17"):
+        join(recording, layout="coco")
+    with pytest.raises(VoodooError, match="offset: expected a finite number of seconds, found nan"):
+        join(recording, offset=NAN)
+
+
+def test_inputs_that_the_recording_has_not(recording):
+    with pytest.raises(MeasurementError, match=r"\(depth, scan, skin\), found markers, keypoints"):
+        FrontEndSettings.of(recording, use=("markers", "keypoints"))
+    assert FrontEndSettings.of(recording, use=("markers", "scan")).use == ("markers", "scan")
+    assert FrontEndSettings.of(recording).ground_z == 0.0
+
+
+def test_a_marker_that_stands_for_no_site(recording):
+    with pytest.raises(VoodooError, match=r"marker LWRA: expected one of the sites .*l_wrist.*, found 'l_wirst'"):
+        start_tracker(recording, markers=MarkerMap(sites={"LWRA": "l_wirst"}))
