@@ -28,7 +28,7 @@ const REFINE: usize = 8;
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
 /// A new configuration that costs more than this, and more than the old one, is no pose of a body.
-const STRAINED: f64 = 40.0;
+const STRAINED: f64 = 60.0;
 /// Places along a limb that are looked at, and how deep (metres) one lies in another limb when it is inside.
 const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const INSIDE: f64 = 0.01;
@@ -61,6 +61,7 @@ pub(super) struct Hypotheses {
     distances: Vec<f32>,
     trial: Vec<Pose>,
     kept: Vec<Pose>,
+    at_rest: Vec<Pose>,
     kept_predicted: Vec<Pose>,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
@@ -207,9 +208,10 @@ impl Tracker {
                 work.kept.clone_from(&work.trial);
             }
         }
-        if !found && let Some(end) = work.ends[index] {
-            // Its end where it was when all was well: a foot stands while the body moves over it. The best way of that is
-            // refined, whatever it explains so far, because the body itself may be off by as much.
+        // Its end where it was when all was well: a foot stands while the body moves over it. The best way of that is refined
+        // too, whatever it explains so far, because the body itself may be off by as much.
+        let mut at_rest = false;
+        if let Some(end) = work.ends[index] {
             least = f64::INFINITY;
             for swivel in swivels(SWIVELS_AT_REST) {
                 work.trial.clone_from(&self.poses);
@@ -217,16 +219,22 @@ impl Tracker {
                 let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
                 if cost < least {
                     least = cost;
-                    found = true;
-                    work.kept.clone_from(&work.trial);
+                    at_rest = true;
+                    work.at_rest.clone_from(&work.trial);
                 }
             }
         }
         work.others = others;
-        if !found {
-            return 0;
+        let mut steps = 0;
+        if at_rest {
+            std::mem::swap(&mut work.kept, &mut work.at_rest);
+            steps += self.refine(index, frame, pace, work);
+            std::mem::swap(&mut work.kept, &mut work.at_rest);
         }
-        self.refine(index, frame, pace, work)
+        if found {
+            steps += self.refine(index, frame, pace, work);
+        }
+        steps
     }
 
     /// Remembers where the chains end that this frame proves right.
