@@ -19,7 +19,7 @@ const IDLE: f64 = 0.3;
 const REFUTED: f64 = 0.2;
 /// Either share is of this many patches at least, and has to last for so many frames.
 const LEAST: f64 = 20.0;
-const PATIENCE: usize = 3;
+const PATIENCE: usize = 2;
 /// A hypothesis must explain so many patches more than the current pose.
 const GAIN: f64 = 25.0;
 /// ICP steps that refine the best hypothesis.
@@ -65,6 +65,8 @@ pub(super) struct Hypotheses {
     kept_predicted: Vec<Pose>,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
+    /// Chains of which the last frame asked for a change.
+    proposed: Vec<bool>,
 }
 
 impl Tracker {
@@ -73,6 +75,8 @@ impl Tracker {
         self.idle = vec![0; self.chains.len()];
         self.hypotheses.ends.clear();
         self.hypotheses.ends.resize(self.chains.len(), None);
+        self.hypotheses.proposed.clear();
+        self.hypotheses.proposed.resize(self.chains.len(), false);
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others.
@@ -151,10 +155,12 @@ impl Tracker {
         };
         if open < SUSPICIOUS {
             self.idle[index] = 0;
+            work.proposed[index] = false;
             return 0;
         }
         if self.suspect(chain, views, work) == [false; 2] {
             self.idle[index] = 0;
+            work.proposed[index] = false;
             return 0;
         }
         self.idle[index] += 1;
@@ -225,16 +231,38 @@ impl Tracker {
             }
         }
         work.others = others;
+        let proposed = std::mem::take(&mut work.proposed[index]);
         let mut steps = 0;
         if at_rest {
             std::mem::swap(&mut work.kept, &mut work.at_rest);
-            steps += self.refine(index, frame, pace, work);
+            steps += REFINE;
+            if self.refine(index, frame, pace, work) {
+                self.take_seconded(index, frame, proposed, work);
+            }
             std::mem::swap(&mut work.kept, &mut work.at_rest);
         }
-        if found {
-            steps += self.refine(index, frame, pace, work);
+        if found && !work.proposed[index] {
+            steps += REFINE;
+            if self.refine(index, frame, pace, work) {
+                self.take_seconded(index, frame, proposed, work);
+            }
         }
         steps
+    }
+
+    /// A change of a chain is made when two frames in a row ask for one: a single frame may be disturbed.
+    fn take_seconded(&mut self, index: usize, frame: &Frame, proposed: bool, work: &mut Hypotheses) {
+        work.proposed[index] = true;
+        if !proposed {
+            self.take_back(frame, work);
+        }
+    }
+
+    /// The poses from before the hypothesis.
+    fn take_back(&mut self, frame: &Frame, work: &mut Hypotheses) {
+        self.poses.clone_from(&work.trial);
+        self.predicted.clone_from(&work.kept_predicted);
+        self.match_all(frame, self.config.max_steps);
     }
 
     /// Remembers where the chains end that this frame proves right.
@@ -296,7 +324,7 @@ impl Tracker {
     }
 
     /// Refines the kept hypothesis with the whole body and takes it when it explains the frame better as a whole.
-    fn refine(&mut self, index: usize, frame: &Frame, pace: f64, work: &mut Hypotheses) -> usize {
+    fn refine(&mut self, index: usize, frame: &Frame, pace: f64, work: &mut Hypotheses) -> bool {
         let before = self.overall_score(frame);
         let strained = self.strain(&self.chains[index], &self.poses).max(STRAINED);
         work.trial.clone_from(&self.poses);
@@ -314,13 +342,11 @@ impl Tracker {
             // What is as suspect as before is not worth a jump.
             let strain = self.strain(&self.chains[index], &self.poses);
             if strain <= strained && !self.suspect(&self.chains[index], views, work)[0] {
-                return REFINE;
+                return true;
             }
         }
-        self.poses.clone_from(&work.trial);
-        self.predicted.clone_from(&work.kept_predicted);
-        self.match_all(frame, last);
-        REFINE
+        self.take_back(frame, work);
+        false
     }
 
     pub(super) fn overall_score(&self, frame: &Frame) -> f64 {
