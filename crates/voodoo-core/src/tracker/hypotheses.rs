@@ -3,7 +3,7 @@
 use super::Tracker;
 use crate::candidates::REFERENCE_PATCH;
 use crate::chain::joint_turn;
-use crate::estimate::LimbStatus;
+use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, Visibility, look, unexplained};
 use crate::frame::Frame;
 use crate::geometry::{Points, Pose, Vec3};
@@ -73,10 +73,16 @@ impl Tracker {
     pub(super) fn prepare_hypotheses(&mut self) {
         self.chains = TwoBone::of(&self.body);
         self.idle = vec![0; self.chains.len()];
-        self.hypotheses.ends.clear();
-        self.hypotheses.ends.resize(self.chains.len(), None);
-        self.hypotheses.proposed.clear();
-        self.hypotheses.proposed.resize(self.chains.len(), false);
+        let work = &mut self.hypotheses;
+        work.ends.clear();
+        work.ends.resize(self.chains.len(), None);
+        work.proposed.clear();
+        work.proposed.resize(self.chains.len(), false);
+        // Room at once, not when the first hard frame comes.
+        for poses in [&mut work.trial, &mut work.kept, &mut work.at_rest, &mut work.kept_predicted] {
+            poses.clear();
+            poses.reserve(self.body.limbs().len());
+        }
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others.
@@ -265,8 +271,11 @@ impl Tracker {
         self.match_all(frame, self.config.max_steps);
     }
 
-    /// Remembers where the chains end that this frame proves right.
+    /// Remembers where the chains end that this frame proves right; a lost body has been anywhere.
     pub(super) fn remember_ends(&mut self) {
+        if self.estimate.status == Status::Lost {
+            self.hypotheses.ends.fill(None);
+        }
         let measured = |limb: usize| self.estimate.limb_status[limb] == LimbStatus::Measured;
         for (index, chain) in self.chains.iter().enumerate() {
             if self.idle[index] == 0 && chain.limbs().all(measured) {
