@@ -369,6 +369,7 @@ mod hypotheses;
 mod named;
 mod report;
 mod scene;
+mod score;
 mod search;
 mod sizes;
 mod status;

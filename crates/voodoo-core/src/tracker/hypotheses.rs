@@ -1,14 +1,13 @@
 //! Trying other configurations of arms and legs, and keeping the best by one score.
 
+use std::f64::consts::TAU;
+
 use super::Tracker;
-use crate::candidates::REFERENCE_PATCH;
-use crate::chain::joint_turn;
 use crate::estimate::{LimbStatus, Status};
-use crate::evidence::{EXPLAINED, Visibility, look, unexplained};
+use crate::evidence::{EXPLAINED, Visibility, look};
 use crate::frame::Frame;
 use crate::geometry::{Points, Pose, Vec3};
 use crate::recover::TwoBone;
-use crate::terms::ShortestAxis;
 use crate::view::Views;
 
 /// So many unexplained patches near a chain make it suspect.
@@ -24,14 +23,8 @@ const PATIENCE: usize = 2;
 const GAIN: f64 = 25.0;
 /// ICP steps that refine the best hypothesis.
 const REFINE: usize = 8;
-/// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians.
-const LIMIT_STRAIN: f64 = 0.1;
-const MOTION_STRAIN: f64 = 0.6;
 /// A new configuration that costs more than this, and more than the old one, is no pose of a body.
 const STRAINED: f64 = 60.0;
-/// Places along a limb that are looked at, and how deep (metres) one lies in another limb when it is inside.
-const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const INSIDE: f64 = 0.01;
 /// Places where the end of a chain is tried, size of what stands for one (metres), and patches of it that may be stray.
 const TARGETS: usize = 5;
 const HEAP: f64 = 0.08;
@@ -159,12 +152,7 @@ impl Tracker {
             chain.limbs().for_each(|limb| sum += look(views, &self.body.limbs()[limb], &poses[limb]));
             sum
         };
-        if open < SUSPICIOUS {
-            self.idle[index] = 0;
-            work.proposed[index] = false;
-            return 0;
-        }
-        if self.suspect(chain, views, work) == [false; 2] {
+        if open < SUSPICIOUS || self.suspect(chain, views, work) == [false; 2] {
             self.idle[index] = 0;
             work.proposed[index] = false;
             return 0;
@@ -196,63 +184,50 @@ impl Tracker {
             points + look(poses).cost() + self.strain(chain, poses)
         };
         let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
-        let mut least = current - GAIN;
-        let mut found = false;
-        for target in targets.into_iter().flatten() {
-            for swivel in swivels(SWIVELS) {
-                work.trial.clone_from(&self.poses);
-                chain.point_at(&self.body, &mut work.trial, target, swivel);
-                let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
+        let enough = current - GAIN;
+        let Hypotheses { near, near_weight, best, distances, trial, kept, at_rest, .. } = work;
+        // The best way to end at a place that costs less than `least`, into `kept`; returns its cost.
+        let mut end_at = |target: Vec3, ways: usize, mut least: f64, kept: &mut Vec<Pose>| {
+            for swivel in 0..ways {
+                trial.clone_from(&self.poses);
+                chain.point_at(&self.body, trial, target, TAU * swivel as f64 / ways as f64);
+                let cost = score(trial, near, near_weight, best, distances);
                 if cost < least {
                     least = cost;
-                    found = true;
-                    work.kept.clone_from(&work.trial);
+                    kept.clone_from(trial);
                 }
             }
-        }
-        if self.previous.len() == self.poses.len() {
-            // Where the chain was a frame ago, carried by its parent.
-            work.trial.clone_from(&self.poses);
-            carry(chain, &self.body, &self.previous, &mut work.trial);
-            let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
-            if cost < least {
-                found = true;
-                work.kept.clone_from(&work.trial);
-            }
-        }
+            least
+        };
+        let mut least =
+            targets.into_iter().flatten().fold(enough, |least, target| end_at(target, SWIVELS, least, kept));
         // Its end where it was when all was well: a foot stands while the body moves over it. The best way of that is refined
         // too, whatever it explains so far, because the body itself may be off by as much.
-        let mut at_rest = false;
-        if let Some(end) = work.ends[index] {
-            least = f64::INFINITY;
-            for swivel in swivels(SWIVELS_AT_REST) {
-                work.trial.clone_from(&self.poses);
-                chain.point_at(&self.body, &mut work.trial, end - self.origin, swivel);
-                let cost = score(&work.trial, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
-                if cost < least {
-                    least = cost;
-                    at_rest = true;
-                    work.at_rest.clone_from(&work.trial);
-                }
+        let rested = work.ends[index]
+            .is_some_and(|end| end_at(end - self.origin, SWIVELS_AT_REST, f64::INFINITY, at_rest) < f64::INFINITY);
+        if self.previous.len() == self.poses.len() {
+            // Where the chain was a frame ago, carried by its parent.
+            trial.clone_from(&self.poses);
+            carry(chain, &self.body, &self.previous, trial);
+            let cost = score(trial, near, near_weight, best, distances);
+            if cost < least {
+                least = cost;
+                kept.clone_from(trial);
             }
         }
         work.others = others;
         let proposed = std::mem::take(&mut work.proposed[index]);
+        let tried = [(rested, std::mem::take(&mut work.at_rest)), (least < enough, std::mem::take(&mut work.kept))];
         let mut steps = 0;
-        if at_rest {
-            std::mem::swap(&mut work.kept, &mut work.at_rest);
-            steps += REFINE;
-            if self.refine(index, frame, pace, work) {
-                self.take_seconded(index, frame, proposed, work);
-            }
-            std::mem::swap(&mut work.kept, &mut work.at_rest);
-        }
-        if found && !work.proposed[index] {
-            steps += REFINE;
-            if self.refine(index, frame, pace, work) {
-                self.take_seconded(index, frame, proposed, work);
+        for (_, poses) in tried.iter().filter(|(found, _)| *found) {
+            if !work.proposed[index] {
+                steps += REFINE;
+                if self.refine(index, frame, pace, poses, work) {
+                    self.take_seconded(index, frame, proposed, work);
+                }
             }
         }
+        [(_, work.at_rest), (_, work.kept)] = tried;
         steps
     }
 
@@ -332,15 +307,22 @@ impl Tracker {
         }
     }
 
-    /// Refines the kept hypothesis with the whole body and takes it when it explains the frame better as a whole.
-    fn refine(&mut self, index: usize, frame: &Frame, pace: f64, work: &mut Hypotheses) -> bool {
+    /// Refines a hypothesis with the whole body and takes it when it explains the frame better as a whole; else all is as before.
+    fn refine(
+        &mut self,
+        index: usize,
+        frame: &Frame,
+        pace: f64,
+        hypothesis: &Vec<Pose>,
+        work: &mut Hypotheses,
+    ) -> bool {
         let before = self.overall_score(frame);
         let strained = self.strain(&self.chains[index], &self.poses).max(STRAINED);
         work.trial.clone_from(&self.poses);
-        self.poses.clone_from(&work.kept);
+        self.poses.clone_from(hypothesis);
         // The prediction spoke for the old configuration; the new one is what is expected now.
         work.kept_predicted.clone_from(&self.predicted);
-        self.predicted.clone_from(&work.kept);
+        self.predicted.clone_from(hypothesis);
         let last = self.config.max_steps;
         for step in 0..REFINE {
             self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
@@ -357,62 +339,6 @@ impl Tracker {
         self.take_back(frame, work);
         false
     }
-
-    pub(super) fn overall_score(&self, frame: &Frame) -> f64 {
-        let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
-        let limbs = self.body.limbs().iter().zip(&self.poses);
-        let seen: f64 = limbs.map(|(limb, pose)| look(views, limb, pose).cost()).sum();
-        let strain: f64 = self.chains.iter().map(|chain| self.strain(chain, &self.poses)).sum();
-        let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
-        unexplained(&self.correspondences, total) + seen + strain
-    }
-
-    /// Patches of a chain whose axis lies inside another limb: there is no room for it.
-    fn inside(&self, chain: &TwoBone, poses: &[Pose]) -> f64 {
-        let mut cost = 0.0;
-        for limb in chain.limbs() {
-            let shape = &self.body.limbs()[limb].shape;
-            let patches = 2.0 * shape.length() * shape.b0().max(shape.b1()) / REFERENCE_PATCH;
-            // The joint of the upper limb lies inside its parent.
-            let first = if limb == chain.upper { 2 } else { 0 };
-            for place in &PLACES[first..] {
-                let point = poses[limb] * Vec3::new(0.0, 0.0, place * shape.length());
-                let within = (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
-                    let local = poses[other].inverse_transform_point(point);
-                    self.body.limbs()[other].shape.approximate_distance(local) < -INSIDE
-                });
-                cost += if within { patches / PLACES.len() as f64 } else { 0.0 };
-            }
-        }
-        cost
-    }
-
-    /// Cost of broken joint limits, of missed sites and of motion since the last frame, in unexplained patches.
-    fn strain(&self, chain: &TwoBone, poses: &[Pose]) -> f64 {
-        let mut cost = 0.0;
-        for limb in [chain.upper, chain.lower] {
-            let Some((parent, joint)) = &self.body.limbs()[limb].parent else { continue };
-            let turn = joint_turn(joint, &poses[*parent], &poses[limb]);
-            cost += limit_strain(&self.body, poses, limb);
-            if self.previous.len() == poses.len() {
-                let before = joint_turn(joint, &self.previous[*parent], &self.previous[limb]);
-                let moved = (turn * before.inverse()).to_scaled_axis_shortest().length() / MOTION_STRAIN;
-                cost += moved * moved;
-            }
-        }
-        cost + self.inside(chain, poses) + self.sites_missed(chain, poses)
-    }
-}
-
-/// Cost of the broken limits of the joint of a limb, in unexplained patches.
-pub(super) fn limit_strain(body: &crate::body::Body, poses: &[Pose], limb: usize) -> f64 {
-    let Some((parent, joint)) = &body.limbs()[limb].parent else { return 0.0 };
-    let Some(limits) = &joint.limits else { return 0.0 };
-    let turn = joint_turn(joint, &poses[*parent], &poses[limb]).to_scaled_axis_shortest();
-    let excess = |(axis, [low, high]): (usize, &[f64; 2])| {
-        ((low - turn[axis]).max(turn[axis] - high).max(0.0) / LIMIT_STRAIN).powi(2)
-    };
-    limits.iter().enumerate().map(excess).sum()
 }
 
 /// The chain's relative pose of another time on the parent of now.
@@ -452,11 +378,6 @@ fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -
         }
     }
     targets
-}
-
-/// Angles all round, radians.
-fn swivels(count: usize) -> impl Iterator<Item = f64> {
-    (0..count).map(move |number| std::f64::consts::TAU * number as f64 / count as f64)
 }
 
 /// Keeps about `most` of the points, evenly, and their total weight.
