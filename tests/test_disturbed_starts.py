@@ -1,6 +1,5 @@
 """The table of examples/disturbed_starts.py."""
 
-import importlib.util
 import sys
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 
 import voodoo
+from ik_cases import load_example
 
 ROOT = Path(__file__).resolve().parent.parent
 BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
@@ -15,10 +15,7 @@ BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
 
 @pytest.fixture
 def disturbed():
-    spec = importlib.util.spec_from_file_location("disturbed_starts", ROOT / "examples" / "disturbed_starts.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_example("disturbed_starts")
 
 
 def test_the_first_start_is_the_recordings_own_and_the_others_are_near_it(disturbed, monkeypatch, capsys):

@@ -1,11 +1,11 @@
 """Pictures of lost joints, as examples/failures.py makes them."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
 
 import voodoo
+from ik_cases import load_example
 from voodoo import running
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -13,10 +13,7 @@ BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
 
 
 def load():
-    spec = importlib.util.spec_from_file_location("failures", ROOT / "examples" / "failures.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_example("failures")
 
 
 def test_only_what_is_lost_gets_a_picture(monkeypatch):

@@ -10,7 +10,15 @@ import typer
 
 import voodoo
 from voodoo.cli.common import clear_errors, opened, states
-from voodoo.cli.options import BodyOption, FrameOption, HeightOption, LoaderOption, ModelOption, RecordingArgument
+from voodoo.cli.options import (
+    BodyOption,
+    FrameOption,
+    HeightOption,
+    InitOption,
+    LoaderOption,
+    ModelOption,
+    RecordingArgument,
+)
 from voodoo.export.files import check_target
 from voodoo.export.files import save as export
 from voodoo.results import Track
@@ -35,10 +43,7 @@ def ik_command(
     alone: Annotated[
         bool, typer.Option("--alone", help="Solve every frame by itself, from the first pose, not from the one before.")
     ] = False,
-    init: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
-    ] = None,
+    init: InitOption = None,
     body: BodyOption = None,
     height: HeightOption = None,
     model: ModelOption = "full",

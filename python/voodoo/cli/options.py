@@ -27,6 +27,10 @@ HeightOption = Annotated[
     float | None,
     typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in metres."),
 ]
+InitOption = Annotated[
+    Path | None,
+    typer.Option("--init", metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
+]
 ModelOption = Annotated[
     HumanModel,
     typer.Option("--model", help="The default human: of eighteen limbs (full), or of the papers' ten."),

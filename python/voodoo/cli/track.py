@@ -16,6 +16,7 @@ from voodoo.cli.options import (
     ConfigOption,
     FrameOption,
     HeightOption,
+    InitOption,
     LoaderOption,
     ModelOption,
     RecordingArgument,
@@ -35,10 +36,7 @@ from voodoo.sensors.front_end import FrontEndSettings
 
 def track_command(
     recording: RecordingArgument,
-    init: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
-    ] = None,
+    init: InitOption = None,
     body: BodyOption = None,
     height: HeightOption = None,
     model: ModelOption = "full",
