@@ -13,7 +13,10 @@ import numpy as np
 
 import voodoo
 from voodoo import metrics
-from voodoo.recordings import DepthImage, Recording
+from voodoo.evaluate import compare
+from voodoo.recordings import Recording
+from voodoo.results import Track
+from voodoo.running import track
 
 NOISE_M = 0.004
 
@@ -25,26 +28,9 @@ def run(recording: Recording, chance: np.random.Generator, noise: float) -> tupl
     tracker = voodoo.Tracker(voodoo.Body.human(recording.start["height_m"]))
     joints = recording.start["joints"].items()
     tracker.reset(joints={name: np.add(place, chance.normal(0.0, noise, 3)) for name, place in joints})
-    stamps, found = [], []
-    for recorded in recording:
-        frame = voodoo.Frame(recorded.stamp)
-        frame.set_ground(normal=(0.0, 0.0, 1.0))
-        for item in recorded.measurements:
-            if isinstance(item, DepthImage):
-                frame.add_depth(
-                    item.image,
-                    camera=item.camera,
-                    metres_per_unit=item.metres_per_unit,
-                    world_from_sensor=item.root_from_sensor,
-                )
-        estimate = tracker.step(frame)
-        stamps.append(recorded.stamp)
-        found.append([estimate.joints[name] for name in metrics.JOINTS])
-    reference = recording.reference
-    columns = [reference.names.index(name) for name in metrics.JOINTS]
-    truth = metrics.match_reference(np.array(stamps), reference.stamps, reference.positions, tolerance=0.02)[:, columns]
-    errors = metrics.joint_errors(np.array(found), truth)
-    kind, lost = metrics.tracking_class(errors, np.array(stamps), limit=0.10)[:2]
+    result = Track.of([step.estimate for step in track(recording, tracker)], body=tracker.body)
+    errors = compare(recording, result)
+    kind, lost = metrics.tracking_class(errors, result.stamps, limit=0.10)
     return float(errors.mean()), kind, [name for name, gone in zip(metrics.JOINTS, lost[-1], strict=True) if gone]
 
 
