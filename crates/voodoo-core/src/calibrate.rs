@@ -2,7 +2,7 @@
 //! its surface lies about the line of its joints. Later frames show sides that were hidden then (a trunk behind hanging
 //! arms): two edges across a limb tell how wide it is, wherever it is.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
 use crate::correspondence::LimbMatches;
 use crate::geometry::{Pose, Vec3};
@@ -18,6 +18,8 @@ const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
 /// Scatter of an edge of the outline: about a pixel.
 const EDGE_SIGMA: f64 = 0.01;
+/// How far the axis of a tracked limb is off across the line of sight, metres.
+const ASIDE_SIGMA: f64 = 0.01;
 /// Edges of following frames err alike: this many frames tell as much as one.
 const ALIKE: f64 = 10.0;
 /// So many frames are remembered: clothes move.
@@ -120,30 +122,35 @@ impl Default for Girth {
 }
 
 impl Girth {
-    /// Factors of the semi-axes after one more frame: a Kalman filter of the three relative changes. `sides` are the edges on
-    /// both sides of the limb at one place each; their sum does not depend on where the limb's axis is. The thickness along
-    /// the line of sight stays: the surface there is where it was seen.
-    pub fn follow(
-        &mut self,
-        shape: &TaperedEllipticCylinder,
-        sides: impl Iterator<Item = [Edge; 2]>,
-    ) -> Option<[f64; 4]> {
+    /// Factors of the semi-axes after one more frame: a Kalman filter of the three relative changes. `edges` lie on the sides
+    /// of the limb; how far its axis is off across them in this frame is eliminated, so that edges on both sides tell the
+    /// most. The thickness along the line of sight stays: the surface there is where it was seen.
+    pub fn follow(&mut self, shape: &TaperedEllipticCylinder, edges: impl Iterator<Item = Edge>) -> Option<[f64; 4]> {
+        let mut aside = Matrix2::identity() / (ASIDE_SIGMA * ASIDE_SIGMA * ALIKE);
+        let (mut mixed, mut pull) = (Matrix3x2::zeros(), Vector2::zeros());
         let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());
         let mut thickness = Vector3::zeros();
-        for [left, right] in sides {
-            let row = girth_row(shape, left.foot, left.side) + girth_row(shape, right.foot, right.side);
-            let wider = left.seen - left.rim + right.seen - right.rim;
-            let weight = kernel(0.5 * wider) / (2.0 * EDGE_SIGMA * EDGE_SIGMA * ALIKE);
+        for edge in edges {
+            let row = girth_row(shape, edge.foot, edge.side);
+            let side = Vector2::new(edge.side.x, edge.side.y);
+            let wider = edge.seen - edge.rim;
+            let weight = kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA * ALIKE);
             h += weight * row * row.transpose();
             g += weight * wider * row;
-            let ahead = Vec3::new(-left.side.y, left.side.x, 0.0);
-            let t = left.foot.z / shape.length();
+            aside += weight * side * side.transpose();
+            mixed += weight * row * side.transpose();
+            pull += weight * wider * side;
+            let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
+            let t = edge.foot.z / shape.length();
             let a = shape.a0() + t * (shape.a1() - shape.a0());
             let b = shape.b0() + t * (shape.b1() - shape.b0());
             let depth = (a * ahead.x).hypot(b * ahead.y);
-            let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, left.foot.z);
-            thickness += girth_row(shape, front, ahead);
+            let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, edge.foot.z);
+            thickness += 0.5 * girth_row(shape, front, ahead);
         }
+        let inverse = aside.try_inverse()?;
+        h -= mixed * inverse * mixed.transpose();
+        g -= mixed * inverse * pull;
         h += thickness * thickness.transpose() / (EDGE_SIGMA * EDGE_SIGMA);
         if h.trace() <= 0.0 {
             return None;
@@ -201,7 +208,7 @@ mod tests {
         let mut after_one = 0.0;
         for frame in 0..60 {
             let seen = sides(&shape, truth - 0.5 * (shape.b0() + shape.b1()), 0.02);
-            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen.into_iter()).unwrap();
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen.into_iter().flatten()).unwrap();
             let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
             shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
             if frame == 0 {

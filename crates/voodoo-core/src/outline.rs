@@ -16,7 +16,7 @@ const EDGE_REACH: f64 = 0.08;
 /// The same beyond a free limb's tip.
 const TIP_REACH: f64 = 0.20;
 /// An edge with another limb this near may be that limb's, metres: it tells nothing of girths.
-const APART: f32 = 0.05;
+const APART: f32 = 0.03;
 /// Edges are approached in strides of about this length, metres, of so many half pixels at most.
 const STRIDE: f64 = 0.008;
 const MOST_STEPS: f64 = 4.0;
@@ -203,17 +203,10 @@ impl Outline {
         }
     }
 
-    /// The edges on both sides of a limb, place by place where both were found apart from other limbs.
-    pub fn sides(&self, limb: usize) -> impl Iterator<Item = [Edge; 2]> {
-        self.edges.windows(2).filter_map(move |pair| {
-            let [one, other] = pair else { return None };
-            if one.stranger.min(other.stranger) < APART {
-                return None;
-            }
-            // Both sides of a place are looked for one after the other, in opposite directions.
-            let opposite = one.limb == limb && other.limb == limb && one.edge.side == -other.edge.side;
-            (opposite && one.edge.foot.z == other.edge.foot.z).then_some([one.edge, other.edge])
-        })
+    /// The edges on the sides of a limb that were found apart from other limbs.
+    pub fn sides(&self, limb: usize) -> impl Iterator<Item = Edge> {
+        let own = move |found: &&Found| found.limb == limb && found.stranger >= APART && found.edge.side != Vec3::Z;
+        self.edges.iter().filter(own).map(|found| found.edge)
     }
 
     /// The rims at `poses` and the edges that were found, as pairs.

@@ -15,6 +15,8 @@ pub struct TwoBone {
     pub ends: Vec<usize>,
     /// Lengths of the two bones, the second with what hangs on it, metres.
     pub lengths: [f64; 2],
+    /// It hangs on the near end of the body's root limb: the body stands on it.
+    pub leg: bool,
 }
 
 impl TwoBone {
@@ -24,7 +26,7 @@ impl TwoBone {
         let mut found = Vec::new();
         for (lower, limb) in limbs.iter().enumerate() {
             let Some((upper, hinge)) = &limb.parent else { continue };
-            let Some((_, ball)) = &limbs[*upper].parent else { continue };
+            let Some((trunk, ball)) = &limbs[*upper].parent else { continue };
             if hinge.kind() != JointKind::Hinge || ball.kind() == JointKind::Hinge {
                 continue;
             }
@@ -42,7 +44,8 @@ impl TwoBone {
                 0.6 * shape.length() * along.z.max(0.0)
             };
             let second = limb.shape.length() + ends.iter().map(reach).fold(0.0, f64::max);
-            found.push(Self { upper: *upper, lower, ends, lengths: [first, second] });
+            let leg = *trunk == 0 && ball.parent_from_joint.translation.z < 0.5 * limbs[0].shape.length();
+            found.push(Self { upper: *upper, lower, ends, lengths: [first, second], leg });
         }
         found
     }

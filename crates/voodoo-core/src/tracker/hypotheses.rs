@@ -12,6 +12,11 @@ use crate::view::Views;
 
 /// So many unexplained patches near a chain make it suspect.
 const SUSPICIOUS: f64 = 25.0;
+/// So many near an arm make it suspect whatever else speaks for it.
+const STRIKING: f64 = 40.0;
+/// After so many refusals in a row a chain is tried in every `REST`th frame only: a hidden arm is refused for seconds.
+const TIRED: usize = 8;
+const REST: usize = 3;
 /// A chain is idle when the patches that it alone explains are a smaller share of those it shows.
 const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
@@ -58,6 +63,8 @@ pub(super) struct Hypotheses {
     kept_predicted: Vec<Pose>,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
+    /// How often each chain was refused a change since it was in order.
+    refused: Vec<usize>,
     /// Chains of which the last frame asked for a change.
     proposed: Vec<bool>,
 }
@@ -69,6 +76,8 @@ impl Tracker {
         let work = &mut self.hypotheses;
         work.ends.clear();
         work.ends.resize(self.chains.len(), None);
+        work.refused.clear();
+        work.refused.resize(self.chains.len(), 0);
         work.proposed.clear();
         work.proposed.resize(self.chains.len(), false);
         // Room at once, not when the first hard frame comes.
@@ -152,13 +161,18 @@ impl Tracker {
             chain.limbs().for_each(|limb| sum += look(views, &self.body.limbs()[limb], &poses[limb]));
             sum
         };
-        if open < SUSPICIOUS || self.suspect(chain, views, work) == [false; 2] {
+        // Furniture stays open beside legs; nothing else than the arm is expected about an arm.
+        let striking = !chain.leg && open >= STRIKING;
+        if open < SUSPICIOUS || (self.suspect(chain, views, work) == [false; 2] && !striking) {
             self.idle[index] = 0;
             work.proposed[index] = false;
+            work.refused[index] = 0;
             return 0;
         }
         self.idle[index] += 1;
-        if self.idle[index] < PATIENCE {
+        work.refused[index] += 1;
+        let tired = work.refused[index] > TIRED && !work.refused[index].is_multiple_of(REST);
+        if self.idle[index] < PATIENCE || tired {
             return 0;
         }
         let targets = targets(&work.near, &work.near_weight, root, &mut work.best);
@@ -234,6 +248,7 @@ impl Tracker {
     /// A change of a chain is made when two frames in a row ask for one: a single frame may be disturbed.
     fn take_seconded(&mut self, index: usize, frame: &Frame, proposed: bool, work: &mut Hypotheses) {
         work.proposed[index] = true;
+        work.refused[index] = 0;
         if !proposed {
             self.take_back(frame, work);
         }

@@ -56,7 +56,7 @@ impl Tracker {
         }
     }
 
-    /// Draws the girths to what the outline of this frame shows of both sides of each limb.
+    /// Draws the girths to what the outline of this frame shows of the sides of each limb.
     pub(super) fn refine_girths(&mut self) {
         for (limb, girth) in self.girths.iter_mut().enumerate() {
             if self.estimate.limb_status.get(limb) != Some(&LimbStatus::Measured) {
