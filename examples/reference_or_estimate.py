@@ -21,6 +21,7 @@ from voodoo.evaluate import LIMIT_EXACT_M, select_by
 from voodoo.recordings import DepthImage
 from voodoo.rendering import render_depth
 from voodoo.running import start_tracker, track
+from voodoo.sensors.front_end import FrontEndSettings
 
 CHAINS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle")}
 LIMBS = {"arm": ("upperarm", "forearm", "hand"), "leg": ("thigh", "calf", "foot")}
@@ -77,7 +78,8 @@ def joints_of(recording, steps):
 def judged(recording):
     """(winner among GROUPS, off by [m], called measured) of every limb that is off."""
     tracker = start_tracker(recording)
-    steps = [(step, tracker.body) for step in track(recording, tracker)]
+    settings = FrontEndSettings.of(recording, use=("depth",))
+    steps = [(step, tracker.body) for step in track(recording, tracker, settings=settings)]
     estimated, reference = joints_of(recording, steps)
     errors = np.linalg.norm(estimated - reference, axis=2)
     cut_out = select_by(recording) == "segmented"
@@ -117,7 +119,7 @@ def main() -> None:
     options = parser.parse_args()
     found, told = Counter(), Counter()
     for path in options.recordings:
-        recording = voodoo.open_recording(path, use=("depth",))
+        recording = voodoo.open_recording(path)
         if recording.reference is None:
             raise SystemExit(f"{recording.name}: expected a recording with a reference or truth, found none")
         for winner, error, measured in judged(recording):
