@@ -201,6 +201,8 @@ def scores():
             frames=10,
             exact=True,
             error_m=0.02,
+            far_told=1.0,
+            far_ends=10,
             tracking_class=2,
             best_lag=0,
             joint_error_m=dict.fromkeys(module.metrics.JOINTS, 0.02),
@@ -211,6 +213,8 @@ def scores():
             frames=10,
             exact=True,
             error_m=0.06,
+            far_told=0.4,
+            far_ends=90,
             tracking_class=0,
             best_lag=1,
             joint_error_m=dict.fromkeys(module.metrics.JOINTS, 0.06),
@@ -225,6 +229,8 @@ def test_summary_counts_classes_and_averages():
     assert exact.classes == (1, 0, 1)
     assert exact.class_average == 1.0
     assert exact.means["error_m"] == pytest.approx(0.04)
+    assert exact.means["far_told"] == pytest.approx(0.7) and exact.means["far_told_together"] == pytest.approx(0.46)
+    assert np.isnan(exact.means["near_doubted_together"])
     assert exact.lags == ((0, 1), (1, 1))
     assert (unknown.sequences, unknown.failures) == (0, 1)
 

@@ -69,6 +69,7 @@ class Score:
         degraded_share, lost_share: frames in which the tracker itself said so.
         far_told, near_doubted: of the elbows, wrists, knees and ankles farther than 10 cm from the truth the share whose
             limb was not called measured; and of the nearer ones.
+        far_ends, near_ends: how many such joints there were, over all frames.
         step_s: mean time of a frame from measurements to estimate.
     """
 
@@ -99,6 +100,8 @@ class Score:
     lost_share: float = np.nan
     far_told: float = np.nan
     near_doubted: float = np.nan
+    far_ends: int = 0
+    near_ends: int = 0
     step_s: float = np.nan
 
 
@@ -303,6 +306,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     still = metrics.standing_still(reference, stamps)
     distances = np.concatenate([step.witness.distances for step in steps])
     measured = np.array([step.measured for step in steps])
+    far, near = (_ends(errors, far=which) for which in (True, False))
     score = Score(
         name=recording.name,
         path=path,
@@ -328,19 +332,20 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         reference_standing_jitter_m=metrics.standing_jitter(reference, still),
         degraded_share=float(np.mean([word == "degraded" for word in status])),
         lost_share=float(np.mean([word == "lost" for word in status])),
-        far_told=_told(errors, measured, far=True),
-        near_doubted=_told(errors, measured, far=False),
+        far_told=metrics.mean_or_nan((~measured[far]).astype(np.float64)),
+        near_doubted=metrics.mean_or_nan((~measured[near]).astype(np.float64)),
+        far_ends=int(far.sum()),
+        near_ends=int(near.sum()),
         step_s=float(seconds.mean()),
     )
     within = np.array([step.witness.within for step in steps])
     return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
 
 
-def _told(errors: FloatArray, measured: npt.NDArray[np.bool_], *, far: bool) -> float:
-    """Share of the limbs' ends, those farther than LIMIT_EXACT_M or the others, whose limb was not called measured."""
+def _ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
+    """Which of the joints (F, 12) are ends of limbs, and farther than LIMIT_EXACT_M from the truth or nearer."""
     ends = np.array([name in _CARRIER for name in metrics.JOINTS])
-    group = np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far)
-    return float(np.mean(~measured[group])) if group.any() else float("nan")
+    return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
 
 
 def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:

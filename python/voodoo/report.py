@@ -27,7 +27,7 @@ class Summary:
         failures: how many were not.
         classes: how many in class 0, 1 and 2 of K06 Table I.
         lags: (lag [frames], sequences) for each best lag that occurs.
-        means: by the name of the Score field.
+        means: by the name of the Score field; with "_together" behind it, over the limbs of all sequences.
     """
 
     kind: str
@@ -54,6 +54,11 @@ _MEANS = (
     "reference_standing_jitter_m", "degraded_share", "lost_share", "far_told", "near_doubted", "step_s",
 )  # fmt: skip
 
+_TOGETHER = {"far_told": "far_ends", "near_doubted": "near_ends"}
+"""Shares that are also taken of all sequences together, because some have few such limbs, and what they are shares of."""
+
+_SUMMARY = (*_MEANS, *(f"{name}_together" for name in _TOGETHER))
+
 _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("error_m", "mean joint error", lambda value: f"{100 * value:.1f} cm"),
     ("error_lag0_m", "... at lag 0", lambda value: f"{100 * value:.1f} cm"),
@@ -72,6 +77,8 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("lost_share", "frames called lost", lambda value: f"{100 * value:.1f} %"),
     ("far_told", "limbs off by 10 cm and not called measured", lambda value: f"{100 * value:.0f} %"),
     ("near_doubted", "nearer limbs not called measured", lambda value: f"{100 * value:.1f} %"),
+    ("far_told_together", "limbs off by 10 cm, all sequences together", lambda value: f"{100 * value:.1f} %"),
+    ("near_doubted_together", "nearer limbs, all sequences together", lambda value: f"{100 * value:.1f} %"),
     ("step_s", "time of a frame", lambda value: f"{1000 * value:.2f} ms"),
 )
 
@@ -90,6 +97,7 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
             means = {
                 name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in _MEANS
             }
+            means |= {f"{name}_together": _together(done, name, count) for name, count in _TOGETHER.items()}
             summaries.append(
                 Summary(
                     kind=kind if done else "not tracked",
@@ -211,12 +219,19 @@ def _joint_table(scores: Sequence[Score]) -> list[str]:
     return [*lines, ""]
 
 
+def _together(scores: Sequence[Score], name: str, count: str) -> float:
+    """Share over all sequences, each counted by how many there are of what it is a share of; NaN when there are none."""
+    counts = [(getattr(score, name), getattr(score, count)) for score in scores if getattr(score, count) > 0]
+    total = sum(number for _, number in counts)
+    return sum(share * number for share, number in counts) / total if total else math.nan
+
+
 def _kind(score: Score) -> str:
     return {True: "exact truth", False: "reference skeleton", None: "no reference"}[score.exact]
 
 
 def _write_sequences(path: Path, scores: Sequence[Score]) -> None:
-    header = ["name", "failure", "frames", "exact", "tracking_class", "best_lag", *_MEANS]
+    header = ["name", "failure", "frames", "exact", "tracking_class", "best_lag", *_MEANS, *_TOGETHER.values()]
     header += [f"error_{name}_m" for name in metrics.JOINTS] + ["selection", "lost_joints", "path"]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -224,7 +239,7 @@ def _write_sequences(path: Path, scores: Sequence[Score]) -> None:
         for score in scores:
             row: list[object] = [score.name, score.failure, score.frames]
             row += [_cell(value) for value in (score.exact, score.tracking_class, score.best_lag)]
-            row += [_cell(getattr(score, name)) for name in _MEANS]
+            row += [_cell(getattr(score, name)) for name in (*_MEANS, *_TOGETHER.values())]
             row += [_cell(score.joint_error_m.get(name)) for name in metrics.JOINTS]
             writer.writerow([*row, _cell(score.selection), " ".join(score.lost_joints), str(score.path)])
 
@@ -232,10 +247,10 @@ def _write_sequences(path: Path, scores: Sequence[Score]) -> None:
 def _write_summary(path: Path, summaries: Sequence[Summary]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["kind", "sequences", "failures", "class_0", "class_1", "class_2", "class_average", *_MEANS])
+        writer.writerow(["kind", "sequences", "failures", "class_0", "class_1", "class_2", "class_average", *_SUMMARY])
         for item in summaries:
             row = [item.kind, item.sequences, item.failures, *item.classes, _cell(item.class_average)]
-            writer.writerow(row + [_cell(item.means[name]) for name in _MEANS])
+            writer.writerow(row + [_cell(item.means[name]) for name in _SUMMARY])
 
 
 def _write_frames(path: Path, table: FrameTable) -> None:

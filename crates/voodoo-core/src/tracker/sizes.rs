@@ -2,7 +2,6 @@
 
 use super::Tracker;
 use crate::calibrate::{Girth, GirthFit, girth_step};
-use crate::estimate::LimbStatus;
 use crate::frame::Frame;
 use crate::geometry::Vec3;
 use crate::outline::edges;
@@ -59,7 +58,7 @@ impl Tracker {
     /// Draws the girths to what the outline of this frame shows of the sides of each limb.
     pub(super) fn refine_girths(&mut self) {
         for (limb, girth) in self.girths.iter_mut().enumerate() {
-            if self.estimate.limb_status.get(limb) != Some(&LimbStatus::Measured) {
+            if !self.judgement.relied_on(limb) {
                 continue;
             }
             let shape = self.body.limbs()[limb].shape;

@@ -5,6 +5,10 @@
 //! it wrong. For arms and legs, `proof` looks closer at what the depth images show; without any, an arm or leg is as good as
 //! what it hangs on.
 //!
+//! That is said twice. What the tracker goes by itself (where a limb ended when all was well, whose girth an outline shows) has to
+//! be proven along the whole limb and over several frames. What is told of this frame has to be told before the limb is far off,
+//! and it asks for both limbs of an arm or leg: a forearm on an arm that nothing proves may be anything that is seen there.
+//!
 //! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
 //! body is called tracked of which more than a quarter of the limbs is not measured.
 
@@ -14,6 +18,7 @@ use crate::evidence::{EXPLAINED, look};
 use crate::frame::Frame;
 use crate::geometry::Points;
 use crate::proof::{Proof, prove};
+use crate::recover::TwoBone;
 use crate::render::Outline;
 use crate::roundness::roundness;
 use crate::view::Views;
@@ -27,13 +32,20 @@ const LEAST: f64 = 8.0;
 const CONTRADICTED: f64 = 0.3;
 /// A limb of which a smaller share shows is hidden.
 const SHOWN: f64 = 0.35;
-/// A limb of an arm or leg is measured when what speaks for it less what speaks against it is this at least, of the whole limb
-/// and of its outer part: about one in twenty good ones is doubted so on the rendered recordings.
-const PROVEN: [f64; 2] = [0.14, 0.05];
+/// The tracker relies on a limb of an arm or leg when what speaks for it less what speaks against it is this at least, of the
+/// whole limb and of its outer part.
+const RELIABLE: [f64; 2] = [0.14, 0.05];
+/// It is told to be measured when it is this for the whole limb, and for the upper one as well: one in twenty good ones is doubted
+/// so on the rendered recordings.
+const TOLD: f64 = 0.1;
+/// The outer part of a limb shows when what speaks for it is this at least.
+const SHOWS: f64 = 0.01;
 /// Without a depth image, points on a limb that make it measured.
 const FEW: f64 = 5.0;
 /// Share of the past frames in what is said about a limb: evidence flickers.
 const MEMORY: f64 = 0.6;
+/// The same for what is told: a limb is lost within few frames.
+const SHORT_MEMORY: f64 = 0.4;
 /// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
 const FLAT: f64 = 0.2;
 const SLOW_MEMORY: f64 = 0.9;
@@ -53,6 +65,8 @@ pub(super) struct Support {
     shown: f64,
     /// What speaks for this limb and no other, less what speaks against it; of limbs that images show.
     proven: Option<[f64; 2]>,
+    /// The same with a short memory.
+    lately: Option<[f64; 2]>,
     frames: usize,
 }
 
@@ -71,16 +85,24 @@ pub(super) struct Judgement {
     proofs: Vec<Proof>,
     /// Roundness of what is seen where the body is thought to be.
     round: Option<f64>,
+    /// The status of the limbs that the tracker goes by.
+    reliable: Vec<LimbStatus>,
 }
 
 impl Judgement {
     pub(super) fn clear(&mut self) {
         self.limbs.clear();
+        self.reliable.clear();
+    }
+
+    /// Whether the tracker relied on a limb in the last frame.
+    pub(super) fn relied_on(&self, limb: usize) -> bool {
+        self.reliable.get(limb) == Some(&LimbStatus::Measured)
     }
 
     /// A pose that somebody vouches for is taken to be on a body until many frames say otherwise.
     pub(super) fn vouch(&mut self) {
-        self.limbs.clear();
+        self.clear();
         self.round = Some(1.0);
     }
 
@@ -102,17 +124,45 @@ impl Support {
 
     fn prove(&mut self, proof: &Proof) {
         let now = proof.net();
-        let mixed = |before: [f64; 2]| [0, 1].map(|part| MEMORY * before[part] + (1.0 - MEMORY) * now[part]);
-        self.proven = proof.known.then(|| self.proven.map_or(now, mixed));
+        for (value, keep) in [(&mut self.proven, MEMORY), (&mut self.lately, SHORT_MEMORY)] {
+            let mixed = |before: [f64; 2]| [0, 1].map(|part| keep * before[part] + (1.0 - keep) * now[part]);
+            *value = proof.known.then(|| value.map_or(now, mixed));
+        }
     }
 
-    /// The status by support, corrected by what images prove of the limb.
-    fn proven_status(&self, supported: LimbStatus) -> LimbStatus {
-        match self.proven {
-            None => supported,
-            Some([whole, outer]) if whole >= PROVEN[0] && outer >= PROVEN[1] => LimbStatus::Measured,
-            Some(_) if self.contradicted > CONTRADICTED => LimbStatus::Lost,
-            Some(_) => LimbStatus::Inferred,
+    /// The status the tracker goes by: the one by support, corrected by what images prove of the limb.
+    fn reliable(&self, supported: LimbStatus) -> LimbStatus {
+        let proven = self.proven.map(|parts| parts[0] >= RELIABLE[0] && parts[1] >= RELIABLE[1]);
+        proven.map_or(supported, |proven| self.image_status(proven))
+    }
+
+    /// The status that is told of the upper limb of an arm or leg, which ends where its outer part shows or its lower limb begins.
+    fn told_upper(&self, lower: &Self, reliable: LimbStatus) -> LimbStatus {
+        self.lately.map_or(reliable, |_| self.image_status(self.shows() && (self.outer_shows() || lower.shows())))
+    }
+
+    /// The same of the lower limb: on an upper limb that nothing proves, it may be anything as long that is seen there.
+    fn told_lower(&self, upper: &Self, reliable: LimbStatus) -> LimbStatus {
+        self.lately.map_or(reliable, |_| self.image_status(self.shows() && upper.shows()))
+    }
+
+    /// What the images show of the limb is enough to tell that it is measured; so it is where no image says anything.
+    fn shows(&self) -> bool {
+        self.lately.is_none_or(|[whole, _]| whole >= TOLD)
+    }
+
+    fn outer_shows(&self) -> bool {
+        self.lately.is_none_or(|[_, outer]| outer >= SHOWS)
+    }
+
+    /// The status of a limb that images show.
+    fn image_status(&self, proven: bool) -> LimbStatus {
+        if proven {
+            LimbStatus::Measured
+        } else if self.contradicted > CONTRADICTED {
+            LimbStatus::Lost
+        } else {
+            LimbStatus::Inferred
         }
     }
 
@@ -165,25 +215,17 @@ impl Tracker {
         let statuses = &mut self.estimate.limb_status;
         statuses.clear();
         statuses.extend(work.limbs.iter().map(Support::status));
-        let hang = |statuses: &mut Vec<LimbStatus>| {
-            for chain in &self.chains {
-                // Hands and feet show too few patches to tell on their own.
-                for end in &chain.ends {
-                    statuses[*end] = statuses[chain.lower];
-                }
-            }
-        };
         for chain in &self.chains {
             if statuses[chain.lower] == LimbStatus::Measured {
                 statuses[chain.lower] = statuses[chain.upper];
             }
         }
-        hang(statuses);
+        hang(&self.chains, statuses);
         self.estimate.status = overall(statuses);
         for limb in self.chains.iter().flat_map(|chain| [chain.upper, chain.lower]) {
-            statuses[limb] = work.limbs[limb].proven_status(statuses[limb]);
+            statuses[limb] = work.limbs[limb].reliable(statuses[limb]);
         }
-        hang(statuses);
+        hang(&self.chains, statuses);
         if let Some(now) = roundness(views, &self.body, &self.poses) {
             work.round = Some(work.round.map_or(now, |before| SLOW_MEMORY * before + (1.0 - SLOW_MEMORY) * now));
         }
@@ -194,8 +236,27 @@ impl Tracker {
         self.judgement = work;
     }
 
-    /// No body is tracked of which too many limbs are not measured; after the search, which goes by support.
+    /// Keeps the limbs' status that the tracker goes by, and tells the other; no body is tracked of which too many limbs are not
+    /// measured. After the search, which goes by support.
     pub(super) fn admit_doubt(&mut self) {
+        let Self { judgement, chains, estimate, .. } = self;
+        let statuses = &mut estimate.limb_status;
+        judgement.reliable.clone_from(statuses);
+        // A body that is lost altogether has no limb that is not.
+        if statuses.iter().any(|status| *status != LimbStatus::Lost) {
+            for chain in &*chains {
+                let [upper, lower] = [chain.upper, chain.lower].map(|limb| &judgement.limbs[limb]);
+                statuses[chain.upper] = upper.told_upper(lower, statuses[chain.upper]);
+                statuses[chain.lower] = lower.told_lower(upper, statuses[chain.lower]);
+            }
+            hang(chains, statuses);
+            for chain in &*chains {
+                // A forearm may be known by its inner part, but not the hand.
+                let hidden =
+                    statuses[chain.lower] == LimbStatus::Measured && !judgement.limbs[chain.lower].outer_shows();
+                chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
+            }
+        }
         if self.estimate.status == Status::Tracking && measured_share(&self.estimate.limb_status) < TRACKED {
             self.estimate.status = Status::Degraded;
         }
@@ -236,6 +297,13 @@ impl Tracker {
                 clouds[closest] += if place * step < pixels { 0.0 } else { weight };
             }
         }
+    }
+}
+
+/// Hands and feet show too few patches to tell on their own.
+fn hang(chains: &[TwoBone], statuses: &mut [LimbStatus]) {
+    for chain in chains {
+        chain.ends.iter().for_each(|end| statuses[*end] = statuses[chain.lower]);
     }
 }
 

@@ -1,0 +1,145 @@
+"""Which of two explains the depth: the limbs of the estimate that are off by 10 cm, or the reference that says so.
+
+    python examples/reference_or_estimate.py ../shared/data/utd-mhad/Depth/a7_s*_depth.mat
+
+A reference skeleton is itself wrong at times. For every elbow, wrist, knee and ankle farther than 10 cm from it (at the best
+lag) the limb is put between the joints of the estimate and between those of the reference, and the depth image is asked at 25
+places on each: seen there and explained by no other arm, leg or trunk, less seen past, weighted with the distance from the upper
+joint, as the tracker does itself. With exact truth as reference the estimate should hardly ever win.
+"""
+
+import argparse
+import itertools
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+import voodoo
+from voodoo import metrics
+from voodoo.evaluate import LIMIT_EXACT_M, select_by
+from voodoo.recordings import DepthImage
+from voodoo.rendering import render_depth
+from voodoo.running import start_tracker, track
+from voodoo.sensors.front_end import FrontEndSettings
+
+CHAINS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle")}
+LIMBS = {"arm": ("upperarm", "forearm", "hand"), "leg": ("thigh", "calf", "foot")}
+ALONG, ACROSS = (0.1, 0.3, 0.5, 0.7, 0.9), (-0.7, -0.35, 0.0, 0.35, 0.7)
+NEAR_M, PAST_M, BEFORE_M = 0.04, 0.08, 0.01
+CLEARLY = 0.1
+"""A difference of shares that is more than chance."""
+GROUPS = ("the estimate", "neither", "the reference")
+
+
+def net(ends, shape, depth, others, camera, cut_out):
+    """What speaks for a limb between two points (camera frame, metres), less what speaks against it; at most 1."""
+    axis = ends[1] - ends[0]
+    along = axis / np.linalg.norm(axis)
+    total = 0.0
+    for t in ALONG:
+        centre = ends[0] + t * axis
+        radius = (1.0 - t) * (shape.a0 + shape.b0) / 2 + t * (shape.a1 + shape.b1) / 2
+        ahead = -centre + (centre @ along) * along
+        if np.linalg.norm(ahead) < 1e-6:
+            continue
+        ahead /= np.linalg.norm(ahead)
+        for s in ACROSS:
+            place = centre + radius * (ahead * np.sqrt(1.0 - s * s) + np.cross(along, ahead) * s)
+            column, row = np.rint(camera.project(place[None])[0]).astype(int)
+            if not (0 <= column < camera.width and 0 <= row < camera.height):
+                continue
+            seen, other = depth[row, column], others[row, column]
+            if (other > 0.0 and other < place[2] - BEFORE_M) or (seen <= 0.0 and not cut_out):
+                continue
+            if seen <= 0.0 or seen > place[2] + PAST_M:
+                total -= t
+            elif abs(seen - place[2]) < NEAR_M and not (other > 0.0 and abs(other - seen) < NEAR_M):
+                total += t
+    return total / (sum(ALONG) * len(ACROSS))
+
+
+def joints_of(recording, steps):
+    """Estimated and reference joints (F, 12, 3), the latter moved by the best lag where they are no exact truth."""
+    stamps = np.array([step.estimate.stamp for step, _ in steps])
+    estimated = np.array([[step.estimate.joints[name] for name in metrics.JOINTS] for step, _ in steps])
+    known = recording.reference
+    columns = [known.names.index(name) for name in metrics.JOINTS]
+    period = float(np.median(np.diff(known.stamps)))
+    reference = metrics.match_reference(stamps, known.stamps, known.positions[:, columns], tolerance=period / 2)
+    lag = 0 if known.exact else metrics.best_lag(estimated, reference)
+    moved = np.full_like(reference, np.nan)
+    source = np.arange(len(steps)) - lag
+    inside = (source >= 0) & (source < len(steps))
+    moved[inside] = reference[source[inside]]
+    return estimated, moved
+
+
+def judged(recording):
+    """(winner among GROUPS, off by [m], called measured) of every limb that is off."""
+    tracker = start_tracker(recording)
+    settings = FrontEndSettings.of(recording, use=("depth",))
+    steps = [(step, tracker.body) for step in track(recording, tracker, settings=settings)]
+    estimated, reference = joints_of(recording, steps)
+    errors = np.linalg.norm(estimated - reference, axis=2)
+    cut_out = select_by(recording) == "segmented"
+    for (step, body), mine, other, error in zip(steps, estimated, reference, errors, strict=True):
+        image = next(item for item in step.recorded.measurements if isinstance(item, DepthImage))
+        depth = image.image * image.metres_per_unit
+        camera_from_root = np.linalg.inv(image.root_from_sensor)
+        for side, kind in itertools.product("lr", CHAINS):
+            joints = [metrics.JOINTS.index(f"{side}_{name}") for name in CHAINS[kind]]
+            limbs = [f"{side}_{name}" for name in LIMBS[kind]]
+            if not (error[joints[1:]] > LIMIT_EXACT_M).any() or not np.isfinite(error[joints]).all():
+                continue
+            # The body without this arm or leg, which is put behind the camera.
+            poses = {name: np.array(pose) for name, pose in step.estimate.world_from_limb.items()}
+            for name in limbs:
+                poses[name][:3, 3] -= 50.0 * image.root_from_sensor[:3, 2]
+            others = render_depth(body, poses, camera=image.camera, world_from_sensor=image.root_from_sensor).depth
+            for which in (1, 2):
+                if error[joints[which]] <= LIMIT_EXACT_M:
+                    continue
+                limb = limbs[which - 1]
+                ends = joints[which - 1 : which + 1]
+                shape = body.limbs[body.limb_names.index(limb)].shape
+                nets = [
+                    net(points[ends] @ camera_from_root[:3, :3].T + camera_from_root[:3, 3], shape, depth, others,
+                        image.camera, cut_out)
+                    for points in (mine, other)
+                ]  # fmt: skip
+                better = nets[0] - nets[1]
+                winner = GROUPS[0] if better > CLEARLY else GROUPS[2] if better < -CLEARLY else GROUPS[1]
+                yield winner, error[joints[which]], step.estimate.limb_status[limb] == "measured"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recordings", nargs="+", type=Path)
+    options = parser.parse_args()
+    found, told = Counter(), Counter()
+    for path in options.recordings:
+        recording = voodoo.open_recording(path)
+        if recording.reference is None:
+            raise SystemExit(f"{recording.name}: expected a recording with a reference or truth, found none")
+        for winner, error, measured in judged(recording):
+            for limit in (0.10, 0.15, 0.20):
+                found[winner, limit] += error > limit
+                told[winner, limit] += error > limit and not measured
+    print("| off by more than | " + " | ".join(f"{name} explains the depth better" for name in GROUPS) + " | all |")
+    print("|---|" + "---|" * (len(GROUPS) + 1))
+    for limit in (0.10, 0.15, 0.20):
+        total, all_told = (sum(counts[name, limit] for name in GROUPS) for counts in (found, told))
+        cells = [
+            f"{share(found[name, limit], total)}, told {share(told[name, limit], found[name, limit])}"
+            for name in GROUPS
+        ]
+        print(f"| {100 * limit:.0f} cm | " + " | ".join(cells) + f" | {total}, told {share(all_told, total)} |")
+
+
+def share(part: int, whole: int) -> str:
+    return f"{100 * part / whole:.0f} %" if whole else "-"
+
+
+if __name__ == "__main__":
+    main()
