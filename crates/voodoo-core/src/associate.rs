@@ -7,6 +7,7 @@ use crate::correspondence::LimbMatches;
 use crate::geometry::Pose;
 use crate::nearest::{NONE, Nearest};
 use crate::shape::Region;
+use crate::simd::widest;
 
 /// Working memory of the assignment.
 #[derive(Debug, Default)]
@@ -73,13 +74,18 @@ fn pick(candidates: &[u32], from: &[f32], to: &mut Vec<f32>) {
 pub fn match_limb(limb: &Limb, pose: &Pose, candidates: &Candidates, max_distance: f64, matches: &mut LimbMatches) {
     pick(&matches.candidate, &candidates.weight, &mut matches.weight);
     limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
-    let refused = refused_regions(limb);
-    let limit = max_distance as f32;
-    let found = matches.surface.signed_distance.iter().zip(&matches.surface.region);
-    for (weight, (distance, region)) in matches.weight.iter_mut().zip(found) {
-        let kept = (distance.abs() <= limit) & !refused[usize::from(*region)];
-        *weight = if kept { *weight } else { 0.0 };
-    }
+    let (refused, limit) = (refused_regions(limb), max_distance as f32);
+    let LimbMatches { weight, surface, .. } = matches;
+    widest(
+        #[inline(always)]
+        || {
+            let found = surface.signed_distance.iter().zip(&surface.region);
+            for (weight, (distance, region)) in weight.iter_mut().zip(found) {
+                let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
+                *weight = if kept { *weight } else { 0.0 };
+            }
+        },
+    );
 }
 
 /// How many of a limb's candidates are used (K06 IV-B.3).
@@ -87,13 +93,9 @@ fn sampled_count(members: usize, config: &Config) -> usize {
     (members / config.sampling_factor).max(config.min_limb_points).min(config.max_limb_points).min(members)
 }
 
-/// Caps and rims that face a joint lie inside the body.
-fn refused_regions(limb: &Limb) -> [bool; 5] {
+/// Caps and rims that face a joint lie inside the body: one bit a region.
+fn refused_regions(limb: &Limb) -> u32 {
     let [proximal, distal] = limb.match_caps;
-    let mut refused = [false; 5];
-    refused[Region::ProximalCap as usize] = !proximal;
-    refused[Region::ProximalRim as usize] = !proximal;
-    refused[Region::DistalCap as usize] = !distal;
-    refused[Region::DistalRim as usize] = !distal;
-    refused
+    let both = |cap: Region, rim: Region, matched: bool| if matched { 0 } else { 1 << cap as u32 | 1 << rim as u32 };
+    both(Region::ProximalCap, Region::ProximalRim, proximal) | both(Region::DistalCap, Region::DistalRim, distal)
 }
