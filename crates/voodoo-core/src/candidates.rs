@@ -186,7 +186,7 @@ impl Grid {
 }
 
 /// Pixels of a row that are looked at together.
-const STRETCH: usize = 64;
+const STRETCH: usize = 32;
 
 /// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
 struct Stretch {
