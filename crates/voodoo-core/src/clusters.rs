@@ -7,6 +7,7 @@ use crate::simd::widest;
 pub const CLUSTER: usize = 32;
 /// Cells along each axis of the grid that sorts the points: a power of two.
 const CELLS: usize = 16;
+const LAST: i32 = CELLS as i32 - 1;
 /// A cell is no smaller than this, metres: about as large as a cluster of a depth image's points.
 const LEAST_CELL: f32 = 0.08;
 
@@ -18,7 +19,7 @@ pub struct Clusters {
     points: Points,
     bounds: Vec<Bounds>,
     /// The cell of each point, and where the next point of each cell goes.
-    cells: Vec<u16>,
+    cells: Vec<i32>,
     next: Vec<u32>,
 }
 
@@ -63,14 +64,14 @@ impl Clusters {
         self.next.clear();
         self.next.resize(CELLS * CELLS * CELLS, 0);
         for cell in &self.cells {
-            self.next[usize::from(*cell)] += 1;
+            self.next[*cell as usize] += 1;
         }
         let mut start = 0;
         for next in &mut self.next {
             start += std::mem::replace(next, start);
         }
         for (index, cell) in (0..).zip(&self.cells) {
-            let place = &mut self.next[usize::from(*cell)];
+            let place = &mut self.next[*cell as usize];
             self.order[*place as usize] = index;
             *place += 1;
         }
@@ -91,24 +92,17 @@ impl Clusters {
     /// The cell of every point: layer by layer, and in each to and fro, so that one cell lies beside the next.
     #[inline(always)]
     fn find_cells(&mut self, points: &Points) {
-        let axes = [&points.x, &points.y, &points.z].map(|values| {
-            let [low, high] = range(values);
-            (low, 1.0 / ((high - low) / CELLS as f32).max(LEAST_CELL))
-        });
+        let (x, y, z) = (Axis::of(&points.x), Axis::of(&points.y), Axis::of(&points.z));
         self.cells.clear();
         self.cells.resize(points.len(), 0);
-        let places = points.x.iter().zip(&points.y).zip(&points.z);
-        for (cell, ((x, y), z)) in self.cells.iter_mut().zip(places) {
-            let last = CELLS as i32 - 1;
-            let along = |axis: usize, value: f32| {
-                let (low, scale) = axes[axis];
-                (((value - low) * scale) as i32).clamp(0, last)
-            };
-            let back = |turn: i32| -(turn & 1) & last;
-            let z = along(2, *z);
-            let y = along(1, *y) ^ back(z);
-            let x = along(0, *x) ^ back(y);
-            *cell = ((z * CELLS as i32 + y) * CELLS as i32 + x) as u16;
+        let back = |turn: i32| -(turn & 1) & LAST;
+        let (xs, ys, zs) =
+            (&points.x[..self.cells.len()], &points.y[..self.cells.len()], &points.z[..self.cells.len()]);
+        for (index, cell) in self.cells.iter_mut().enumerate() {
+            let layer = z.cell(zs[index]);
+            let row = y.cell(ys[index]) ^ back(layer);
+            let place = x.cell(xs[index]) ^ back(row);
+            *cell = (layer * CELLS as i32 + row) * CELLS as i32 + place;
         }
     }
 
@@ -141,22 +135,44 @@ impl Clusters {
     }
 }
 
+/// The cells along an axis.
+struct Axis {
+    low: f32,
+    scale: f32,
+}
+
+impl Axis {
+    #[inline(always)]
+    fn of(values: &[f32]) -> Self {
+        let [low, high] = range(values);
+        Self { low, scale: 1.0 / ((high - low) / CELLS as f32).max(LEAST_CELL) }
+    }
+
+    /// The cell of a value; a NaN counts as the least.
+    #[inline(always)]
+    fn cell(&self, value: f32) -> i32 {
+        let place = (value - self.low) * self.scale;
+        let place = if place > 0.0 { place } else { 0.0 };
+        (if place < LAST as f32 { place } else { LAST as f32 }) as i32
+    }
+}
+
 /// Least and greatest of some values, in lanes.
 #[inline(always)]
 fn range(values: &[f32]) -> [f32; 2] {
     const LANES: usize = 8;
     let (mut low, mut high) = ([f32::MAX; LANES], [f32::MIN; LANES]);
     let (whole, rest) = values.as_chunks::<LANES>();
-    let mut take = |lane: usize, value: f32| {
-        low[lane] = if value < low[lane] { value } else { low[lane] };
-        high[lane] = if value > high[lane] { value } else { high[lane] };
-    };
     for lanes in whole {
         for lane in 0..LANES {
-            take(lane, lanes[lane]);
+            low[lane] = if lanes[lane] < low[lane] { lanes[lane] } else { low[lane] };
+            high[lane] = if lanes[lane] > high[lane] { lanes[lane] } else { high[lane] };
         }
     }
-    rest.iter().for_each(|value| take(0, *value));
+    for value in rest {
+        low[0] = if *value < low[0] { *value } else { low[0] };
+        high[0] = if *value > high[0] { *value } else { high[0] };
+    }
     [low.into_iter().fold(f32::MAX, f32::min), high.into_iter().fold(f32::MIN, f32::max)]
 }
 
