@@ -7,7 +7,9 @@ use crate::simd::widest;
 pub const CLUSTER: usize = 32;
 /// Cells along each axis of the grid that sorts the points: a power of two.
 const CELLS: usize = 16;
-const LAST: i32 = CELLS as i32 - 1;
+const LAST: u32 = CELLS as u32 - 1;
+/// Single precision has no fractions from here on, and the bits after the leading one are zero.
+const WHOLE: f32 = (1 << 23) as f32;
 /// A cell is no smaller than this, metres: about as large as a cluster of a depth image's points.
 const LEAST_CELL: f32 = 0.08;
 
@@ -19,7 +21,7 @@ pub struct Clusters {
     points: Points,
     bounds: Vec<Bounds>,
     /// The cell of each point, and where the next point of each cell goes.
-    cells: Vec<i32>,
+    cells: Vec<u32>,
     next: Vec<u32>,
 }
 
@@ -95,14 +97,14 @@ impl Clusters {
         let (x, y, z) = (Axis::of(&points.x), Axis::of(&points.y), Axis::of(&points.z));
         self.cells.clear();
         self.cells.resize(points.len(), 0);
-        let back = |turn: i32| -(turn & 1) & LAST;
+        let back = |turn: u32| (turn & 1) * LAST;
         let (xs, ys, zs) =
             (&points.x[..self.cells.len()], &points.y[..self.cells.len()], &points.z[..self.cells.len()]);
         for (index, cell) in self.cells.iter_mut().enumerate() {
             let layer = z.cell(zs[index]);
             let row = y.cell(ys[index]) ^ back(layer);
             let place = x.cell(xs[index]) ^ back(row);
-            *cell = (layer * CELLS as i32 + row) * CELLS as i32 + place;
+            *cell = (layer * CELLS as u32 + row) * CELLS as u32 + place;
         }
     }
 
@@ -150,10 +152,12 @@ impl Axis {
 
     /// The cell of a value; a NaN counts as the least.
     #[inline(always)]
-    fn cell(&self, value: f32) -> i32 {
+    fn cell(&self, value: f32) -> u32 {
         let place = (value - self.low) * self.scale;
         let place = if place > 0.0 { place } else { 0.0 };
-        (if place < LAST as f32 { place } else { LAST as f32 }) as i32
+        let place = if place < LAST as f32 { place } else { LAST as f32 };
+        // The last bits of the sum are the whole number; unlike a cast, every lane has this.
+        (place + WHOLE).to_bits() & LAST
     }
 }
 
