@@ -2,6 +2,7 @@
 
 use crate::background::{Background, Backgrounds};
 use crate::body::Body;
+use crate::clusters::Clusters;
 use crate::config::Config;
 use crate::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
 use crate::geometry::{Aabb, Mat3, Points, Pose, Vec3};
@@ -24,6 +25,8 @@ pub struct Candidates {
     /// The pixels of depth images come first, image after image: the number of points up to the end of each, and where its
     /// camera stands.
     pub cameras: Vec<(u32, Vec3)>,
+    /// The points once more, neighbours together.
+    pub(crate) clusters: Clusters,
 }
 
 /// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
@@ -87,6 +90,7 @@ impl Candidates {
         for cloud in frame.clouds {
             self.gather_cloud(cloud, origin, &gate);
         }
+        self.clusters.arrange(&self.points);
     }
 
     fn push(&mut self, point: [f32; 3], weight: f32, limb: u16, source: u16) {
@@ -182,7 +186,7 @@ impl Grid {
 }
 
 /// Pixels of a row that are looked at together.
-const STRETCH: usize = 64;
+const STRETCH: usize = 32;
 
 /// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
 struct Stretch {

@@ -4,6 +4,7 @@
 
 use crate::geometry::{Mat3, Points, Vec3};
 use crate::shape::SurfaceBatch;
+use crate::simd::widest;
 
 /// Surface matches of one limb: measured points and their closest points. Rejected pairs stay with weight zero.
 #[derive(Debug, Default)]
@@ -89,12 +90,20 @@ impl LimbMatches {
     pub fn weighed(&self) -> (f64, f64) {
         let square = |weight, distance| f64::from(weight) * f64::from(distance) * f64::from(distance);
         let (weight, distance) = (&self.weight, &self.surface.signed_distance);
-        in_lanes(weight, distance, |weight, distance| [f64::from(weight), square(weight, distance)]).into()
+        let both = |weight, distance| [f64::from(weight), square(weight, distance)];
+        widest(
+            #[inline(always)]
+            || in_lanes(weight, distance, both),
+        )
+        .into()
     }
 
     /// Sum of the weights.
     pub fn total_weight(&self) -> f64 {
-        let [total] = in_lanes(&self.weight, &self.weight, |weight, _| [f64::from(weight)]);
+        let [total] = widest(
+            #[inline(always)]
+            || in_lanes(&self.weight, &self.weight, |weight, _| [f64::from(weight)]),
+        );
         total
     }
 
@@ -145,7 +154,10 @@ impl Correspondences {
                 let fits = f64::from(share) * (falloff * falloff);
                 [fits, fits * square]
             };
-            let [fits, squares] = in_lanes(&limb.weight, &limb.surface.signed_distance, fitting);
+            let [fits, squares] = widest(
+                #[inline(always)]
+                || in_lanes(&limb.weight, &limb.surface.signed_distance, fitting),
+            );
             weight += fits;
             sum += squares;
         }

@@ -221,10 +221,15 @@ impl Outline {
     }
 
     /// Depth at which the ray through `(x / z, y / z)` meets the limb, metres; NaN where it does not.
+    #[inline(always)]
     pub fn depth_at(&self, x: f64, y: f64) -> f64 {
-        if !(x >= self.low[0] && x <= self.high[0] && y >= self.low[1] && y <= self.high[1]) {
-            return f64::NAN;
-        }
+        // Most rays pass far from most limbs.
+        let near = (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]);
+        if near { self.depth_within(x, y) } else { f64::NAN }
+    }
+
+    #[inline(never)]
+    fn depth_within(&self, x: f64, y: f64) -> f64 {
         let (depth, unsure) = if self.plain { self.meet_plain(x, y) } else { (f64::NAN, true) };
         if unsure { self.meet_exactly(x, y) } else { depth }
     }

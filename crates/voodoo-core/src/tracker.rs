@@ -220,9 +220,14 @@ impl Tracker {
             }
             previous = distance;
         }
-        self.match_all(frame, self.config.max_steps);
+        self.match_last(frame);
         if self.config.hypotheses && self.solver.starts_from_prediction() && self.stamp.is_some() {
             steps += self.try_hypotheses(frame, pace);
+        }
+        if !(self.pairs.is_empty() && self.girths.is_empty()) && self.config.max_steps >= OUTLINE_FROM {
+            // Sizes follow the outline.
+            self.find_outline(frame);
+            self.outline.pairs(&self.poses, &mut self.correspondences.edges);
         }
         if !self.pairs.is_empty() && self.estimate.status != Status::Lost {
             self.refine_lengths(pace);
@@ -256,13 +261,27 @@ impl Tracker {
         // 2 Assign points to limbs.
         let gate = self.solver.gate(&self.config, step);
         self.assign(&gate);
-        if self.config.outline && step >= OUTLINE_FROM {
-            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
-            self.outline.find(&self.body, &self.poses, views.iter());
+        if step >= OUTLINE_FROM {
+            self.find_outline(frame);
         } else {
             self.outline.clear();
         }
         self.match_now(frame, &gate, true);
+    }
+
+    /// The same after the last step, but for the outline: it moves nothing any more.
+    fn match_last(&mut self, frame: &Frame) {
+        let gate = self.solver.gate(&self.config, self.config.max_steps);
+        self.assign(&gate);
+        self.outline.clear();
+        self.match_now(frame, &gate, true);
+    }
+
+    fn find_outline(&mut self, frame: &Frame) {
+        if self.config.outline {
+            let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            self.outline.find(&self.body, &self.poses, views.iter());
+        }
     }
 
     /// Steps 3-5: points stay with their limbs, rims with their edges.

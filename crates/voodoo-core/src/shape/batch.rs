@@ -1,6 +1,6 @@
 //! Closest points of many queries at once.
 
-use super::kernel::{BLOCK, Block, Constants, Surface, closest};
+use super::kernel::{BLOCK, Block, Constants, SHORT, Surface, closest};
 use super::{SurfacePoint, TaperedEllipticCylinder};
 use crate::geometry::{Points, Pose, Vec3};
 use std::ops::Range;
@@ -82,17 +82,32 @@ impl TaperedEllipticCylinder {
             return;
         }
         let constants = Constants::new(self, world_from_limb);
-        let run = kernel();
+        let whole = xs.len() - xs.len() % BLOCK;
+        let queries = [xs, ys, zs];
+        self.closest_blocks(world_from_limb, &constants, kernel::<BLOCK>(), queries, 0..whole, out);
+        self.closest_blocks(world_from_limb, &constants, kernel::<SHORT>(), queries, whole..xs.len(), out);
+    }
+
+    /// Closest points of the queries in `range`, block by block.
+    fn closest_blocks<const N: usize>(
+        &self,
+        world_from_limb: &Pose,
+        constants: &Constants,
+        run: Kernel<N>,
+        queries: [&[f32]; 3],
+        range: Range<usize>,
+        out: &mut SurfaceBatch,
+    ) {
         let mut block = Block::ZERO;
         let mut found = Surface::ZERO;
-        for start in (0..xs.len()).step_by(BLOCK) {
-            let count = BLOCK.min(xs.len() - start);
+        for start in range.clone().step_by(N) {
+            let count = N.min(range.end - start);
             let span = start..start + count;
             // The tail is padded with what the block held before, so every point meets the same instructions.
-            load(&mut block.x, &xs[span.clone()]);
-            load(&mut block.y, &ys[span.clone()]);
-            load(&mut block.z, &zs[span.clone()]);
-            run(&constants, &block, &mut found);
+            load(&mut block.x, &queries[0][span.clone()]);
+            load(&mut block.y, &queries[1][span.clone()]);
+            load(&mut block.z, &queries[2][span.clone()]);
+            run(constants, &block, &mut found);
             store(&mut out.points.x[span.clone()], &found.points.x);
             store(&mut out.points.y[span.clone()], &found.points.y);
             store(&mut out.points.z[span.clone()], &found.points.z);
@@ -130,7 +145,7 @@ impl TaperedEllipticCylinder {
 
 /// Copies a block, mostly a whole one: its size is then known to the compiler.
 #[inline(always)]
-fn load(to: &mut [f32; BLOCK], from: &[f32]) {
+fn load<const N: usize>(to: &mut [f32; N], from: &[f32]) {
     match from.first_chunk() {
         Some(from) => *to = *from,
         None => to[..from.len()].copy_from_slice(from),
@@ -138,17 +153,17 @@ fn load(to: &mut [f32; BLOCK], from: &[f32]) {
 }
 
 #[inline(always)]
-fn store<T: Copy>(to: &mut [T], from: &[T; BLOCK]) {
+fn store<T: Copy, const N: usize>(to: &mut [T], from: &[T; N]) {
     match to.first_chunk_mut() {
         Some(to) => *to = *from,
         None => to.copy_from_slice(&from[..to.len()]),
     }
 }
 
-type Kernel = fn(&Constants, &Block, &mut Surface);
+type Kernel<const N: usize> = fn(&Constants, &Block<N>, &mut Surface<N>);
 
 /// The fastest kernel this processor can run; the detection is cached by the standard library.
-fn kernel() -> Kernel {
+fn kernel<const N: usize>() -> Kernel<N> {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
         return |constants, queries, out| {
@@ -163,14 +178,14 @@ fn kernel() -> Kernel {
 }
 
 /// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
-fn closest_baseline(constants: &Constants, queries: &Block, out: &mut Surface) {
-    closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }>(constants, queries, out);
+fn closest_baseline<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+    closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn closest_avx2(constants: &Constants, queries: &Block, out: &mut Surface) {
-    closest::<true>(constants, queries, out);
+fn closest_avx2<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+    closest::<true, N>(constants, queries, out);
 }
 
 #[cfg(test)]
@@ -178,7 +193,7 @@ mod tests {
     use super::*;
 
     /// Points on a grid around the side, from 2 cm inside to 4 cm outside.
-    fn shell(shape: &TaperedEllipticCylinder) -> Vec<Block> {
+    fn shell(shape: &TaperedEllipticCylinder) -> Vec<Block<BLOCK>> {
         let point = |n: usize| {
             let (angle, t) = (0.1 * n as f64, (n % 97) as f64 / 96.0);
             let off = (n % 61) as f64 * 1e-3 - 0.02;

@@ -49,17 +49,22 @@ impl TaperedEllipticCylinder {
         if !q.is_finite() {
             return SurfacePoint { point: Vec3::NAN, normal: Vec3::Z, signed_distance: f64::NAN, region: Region::Side };
         }
-        self.nearest_face(q, self.closest_on_side(folded(q)))
+        let folded = folded(q);
+        self.nearest_face(q, self.closest_on_side(folded, self.guessed(folded)))
     }
 
     /// [`Self::closest_point`] for shapes whose end ellipses differ little: where the minimum found first is a distinct one,
     /// the side has no other basin, and none is looked for.
     pub(super) fn closest_point_in_one_basin(&self, q: Vec3) -> SurfacePoint {
-        let folded_query = folded(q);
-        let guessed = self.refine(Angle::ZERO, self.guess(folded_query), Angle::RIGHT, folded_query);
+        if !q.is_finite() {
+            return self.closest_point(q);
+        }
+        let folded = folded(q);
+        let guessed = self.guessed(folded);
         let (a, b) = self.semi_axes(guessed.t * self.length);
         let tangent = (a * guessed.angle.s).powi(2) + (b * guessed.angle.c).powi(2);
-        if guessed.bend >= DISTINCT * tangent { self.nearest_face(q, guessed) } else { self.closest_point(q) }
+        let distinct = guessed.bend >= DISTINCT * tangent;
+        self.nearest_face(q, if distinct { guessed } else { self.closest_on_side(folded, guessed) })
     }
 
     /// The closest point when that of the side is known: a cap may be nearer.
@@ -120,9 +125,13 @@ impl TaperedEllipticCylinder {
         first.min(last) > 0.2 * first.max(last)
     }
 
-    /// The closest point of the side with its rims, for a query with `x, y >= 0`.
-    fn closest_on_side(&self, q: Vec3) -> Foot {
-        let guessed = self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q);
+    /// The minimum found from the first guess, for a query with `x, y >= 0`.
+    fn guessed(&self, q: Vec3) -> Foot {
+        self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q)
+    }
+
+    /// The closest point of the side with its rims, for a query with `x, y >= 0` and what was guessed for it.
+    fn closest_on_side(&self, q: Vec3, guessed: Foot) -> Foot {
         if self.aspect_change() < 1e-12 && self.is_blunt() {
             return guessed;
         }

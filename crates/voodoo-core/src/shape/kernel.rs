@@ -4,8 +4,10 @@ use super::closest::DISTINCT;
 use super::{RIM_NORMAL_DISTANCE, Region, TaperedEllipticCylinder};
 use crate::geometry::{Mat3, Pose, Vec3};
 
-/// Points a block. The loop over a block has no branch and no bounds check, so it becomes SIMD of the target's width.
+/// Points of a whole block, and of the short ones at the end. The loop over a block has no branch and no bounds check, so it
+/// becomes SIMD of the target's width.
 pub(super) const BLOCK: usize = 32;
+pub(super) const SHORT: usize = 8;
 /// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, metres, that passes.
 const CONVERGED: f32 = 3e-8;
 /// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned: the error of the foot is that of the query divided by it.
@@ -13,34 +15,29 @@ const CONDITIONED: f32 = DISTINCT as f32;
 
 /// One block of points, structure of arrays.
 #[derive(Clone, Copy)]
-pub(super) struct Block {
-    pub x: [f32; BLOCK],
-    pub y: [f32; BLOCK],
-    pub z: [f32; BLOCK],
+pub(super) struct Block<const N: usize> {
+    pub x: [f32; N],
+    pub y: [f32; N],
+    pub z: [f32; N],
 }
 
-impl Block {
-    pub const ZERO: Self = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+impl<const N: usize> Block<N> {
+    pub const ZERO: Self = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
 }
 
 /// The results of one block, in the frame of the queries.
-pub(super) struct Surface {
-    pub points: Block,
-    pub normals: Block,
-    pub signed_distance: [f32; BLOCK],
-    pub region: [u8; BLOCK],
+pub(super) struct Surface<const N: usize> {
+    pub points: Block<N>,
+    pub normals: Block<N>,
+    pub signed_distance: [f32; N],
+    pub region: [u8; N],
     /// Not zero where the exact path must decide.
-    pub doubtful: [u8; BLOCK],
+    pub doubtful: [u8; N],
 }
 
-impl Surface {
-    pub const ZERO: Self = Self {
-        points: Block::ZERO,
-        normals: Block::ZERO,
-        signed_distance: [0.0; BLOCK],
-        region: [0; BLOCK],
-        doubtful: [0; BLOCK],
-    };
+impl<const N: usize> Surface<N> {
+    pub const ZERO: Self =
+        Self { points: Block::ZERO, normals: Block::ZERO, signed_distance: [0.0; N], region: [0; N], doubtful: [0; N] };
 }
 
 /// What the kernel needs of shape and pose, in single precision.
@@ -185,10 +182,10 @@ fn turned<const FMA: bool>(c: f32, s: f32, step: f32) -> (f32, f32) {
 ///
 /// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
 #[inline(always)]
-pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut Surface) {
-    let mut limb = Block::ZERO;
-    let (mut cosine, mut sine) = ([0f32; BLOCK], [0f32; BLOCK]);
-    for i in 0..BLOCK {
+pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+    let mut limb = Block::<N>::ZERO;
+    let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
+    for i in 0..N {
         let (wx, wy, wz) = (queries.x[i] - k.origin[0], queries.y[i] - k.origin[1], queries.z[i] - k.origin[2]);
         let turn = |axis: usize| {
             let [cx, cy, cz] = k.columns[axis];
@@ -207,12 +204,12 @@ pub(super) fn closest<const FMA: bool>(k: &Constants, queries: &Block, out: &mut
             max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny),
         );
     }
-    for i in 0..BLOCK {
+    for i in 0..N {
         let (c, s) = (cosine[i], sine[i]);
         let f = foot::<FMA>(k, c, s, limb.x[i].abs(), limb.y[i].abs(), limb.z[i]);
         (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
     }
-    for i in 0..BLOCK {
+    for i in 0..N {
         let (qx, qy, z) = (limb.x[i], limb.y[i], limb.z[i]);
         let (x, y) = (qx.abs(), qy.abs());
         let f = foot::<FMA>(k, cosine[i], sine[i], x, y, z);
