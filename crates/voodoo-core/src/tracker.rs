@@ -298,11 +298,16 @@ impl Tracker {
         self.outline.pairs(&self.poses, &mut self.correspondences.edges);
     }
 
-    /// Lets the solver follow the named sites before the points are assigned.
+    /// Lets the solver follow the named sites before the frame's steps.
     fn lead(&mut self, frame: &Frame, pace: f64) {
+        let named = !frame.positions.is_empty() || !frame.rays.is_empty();
         let mut step = 0;
         loop {
-            self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+            if named && self.solver.leads_with_points() {
+                self.match_all(frame, 0);
+            } else {
+                self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
+            }
             let Self { body, correspondences, previous, config, solver, poses, .. } = self;
             if !solver.lead(&Problem { body, correspondences, predicted: previous, step, pace, config }, poses) {
                 break;

@@ -2,14 +2,17 @@
 //!
 //! A position of a hand says something about the whole arm, but a limb alone hears of it one joint a step (K06 IV-B.7). Here
 //! the sites with positions and rays move the chain as one, each joint by no more than its motion allows (R07, J10).
+//!
+//! With points the limbs on the way to a site follow their own along with it, and every other limb is held where it is by as
+//! many points as it has: an arm that can reach its hand leaves the trunk alone, and a leg that nothing measures is carried.
 
 use super::{ChainSolver, Problem};
 use crate::body::Body;
 use crate::chain::{joint_turn, place};
 use crate::correspondence::SitePair;
 use crate::geometry::Pose;
-use crate::normal::Normal;
-use crate::terms::{Limits, Prior, Sites, Term};
+use crate::normal::{LimbBlock, Normal};
+use crate::terms::{Limits, Prior, Sites, Surface, Term};
 
 /// Standard deviation of a violated joint limit, radians.
 const LIMIT_SIGMA: f64 = 0.05;
@@ -20,8 +23,10 @@ const DAMPING: f64 = 1e-3;
 const LED: f64 = 2.0;
 /// Scale of the kernel, metres: sites that are led come from far.
 const SCALE: f64 = 0.5;
+/// Share of a point's information across its normal, on limbs that follow: little, an arm slides along itself.
+const SLIDE: f64 = 0.07;
 
-/// Damped Gauss-Newton steps on the sites alone.
+/// Damped Gauss-Newton steps on the sites, and the points where they are matched before.
 #[derive(Debug, Default)]
 pub struct Guide {
     normal: Normal,
@@ -34,20 +39,31 @@ pub struct Guide {
     moved: Vec<Pose>,
     /// The limbs that are led.
     led: Vec<bool>,
+    /// With points: the limbs that follow theirs, and what holds the others.
+    following: Vec<bool>,
+    held: Normal,
 }
 
 impl Guide {
-    /// Makes all limbs follow the sites; false without any.
+    /// Lets all limbs move, against their points; false without sites.
     pub fn leads_all(&mut self, problem: &Problem) -> bool {
+        let count = problem.body.limbs().len();
         self.led.clear();
-        self.led.resize(problem.body.limbs().len(), true);
-        !problem.correspondences.sites.is_empty()
+        self.led.resize(count, true);
+        self.following.clear();
+        self.following.resize(count, false);
+        for pair in problem.correspondences.sites.iter().filter(|pair| pair.given > 0.0) {
+            self.following[pair.limb] = true;
+            lead_from(problem.body, pair.limb, &mut self.following);
+        }
+        self.following.contains(&true)
     }
 
     /// Whether sites farther than `from` metres from where they were seen lead their limbs alone in this frame.
     pub fn leads(&mut self, problem: &Problem, from: f64) -> bool {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
+            self.following.clear();
             self.led.clear();
             self.led.resize(problem.body.limbs().len(), false);
             for pair in problem.correspondences.sites.iter().filter(far) {
@@ -72,8 +88,14 @@ impl Guide {
             .extend(body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * pace));
         let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * pace);
         self.normal.clear(poses.len());
-        let heaviest = correspondences.sites.iter().fold(f64::MIN_POSITIVE, |most, pair| most.max(pair.weight));
+        // Beside points a site within its bias must not count as much as any other.
+        let with_points = !self.following.is_empty();
+        let weights = correspondences.sites.iter().map(|pair| if with_points { pair.given } else { pair.weight });
+        let heaviest = weights.fold(f64::MIN_POSITIVE, f64::max);
         let information = LED / (heaviest * config.point_sigma * config.point_sigma);
+        if with_points {
+            self.add_points(problem, information);
+        }
         let terms: [&dyn Term; 3] = [
             &Sites { correspondences, information, scale: SCALE },
             &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, calm: 0.0 },
@@ -99,6 +121,19 @@ impl Guide {
         for ((pose, before), after) in poses.iter_mut().zip(&self.before).zip(&self.closed) {
             *pose = *after * before.inverse() * *pose;
             pose.rotation = pose.rotation.normalize();
+        }
+    }
+
+    /// Points of the limbs that follow draw them, those of the others hold them where they are.
+    fn add_points(&mut self, problem: &Problem, information: f64) {
+        let Problem { body, correspondences, config, .. } = problem;
+        let surface = |slide| Surface { correspondences, information, slide, scale: config.kernel_start };
+        surface(SLIDE).add(body, &self.closed, &mut self.normal);
+        self.held.clear(self.closed.len());
+        surface(1.0).add(body, &self.closed, &mut self.held);
+        let blocks = self.normal.limbs.iter_mut().zip(&self.held.limbs);
+        for ((block, held), _) in blocks.zip(&self.following).filter(|(_, follows)| !**follows) {
+            *block = LimbBlock { h: held.h, ..LimbBlock::default() };
         }
     }
 }

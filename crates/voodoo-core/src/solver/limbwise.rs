@@ -53,6 +53,10 @@ impl Solver for Limbwise {
         problem.step + 1 < LEAD
     }
 
+    fn leads_with_points(&self) -> bool {
+        true
+    }
+
     fn reads_bands(&self) -> bool {
         true
     }

@@ -57,6 +57,11 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// Whether `lead` wants the points matched at the poses it is given, not only the sites.
+    fn leads_with_points(&self) -> bool {
+        false
+    }
+
     /// Relative changes of the lengths of `pairs` that the correspondences ask for at `poses`, into `change`, which holds how
     /// far the lengths are below the ones set. False when the solver knows none.
     fn lengths(&mut self, _problem: &Problem, _poses: &[Pose], _pairs: &[Pair], _change: &mut [f64]) -> bool {
