@@ -15,8 +15,8 @@ const SUSPICIOUS: f64 = 25.0;
 /// So many near an arm make it suspect whatever else speaks for it.
 const STRIKING: f64 = 40.0;
 /// After so many refusals in a row a chain is tried in every `REST`th frame only: a hidden arm is refused for seconds.
-const TIRED: usize = 8;
-const REST: usize = 3;
+const TIRED: usize = 30;
+const REST: usize = 4;
 /// A chain is idle when the patches that it alone explains are a smaller share of those it shows.
 const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
@@ -258,7 +258,7 @@ impl Tracker {
     fn take_back(&mut self, frame: &Frame, work: &mut Hypotheses) {
         self.poses.clone_from(&work.trial);
         self.predicted.clone_from(&work.kept_predicted);
-        self.match_all(frame, self.config.max_steps);
+        self.match_last(frame);
     }
 
     /// Remembers where the chains end that this frame proves right; a lost body has been anywhere.
@@ -342,7 +342,7 @@ impl Tracker {
         for step in 0..REFINE {
             self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
         }
-        self.match_all(frame, last);
+        self.match_last(frame);
         if self.overall_score(frame) < before - GAIN {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
             // What is as suspect as before is not worth a jump.
