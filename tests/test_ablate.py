@@ -49,7 +49,13 @@ def test_every_variant_differs_in_one_entry():
         assert differing == {variant.name.split(" = ")[0]}
     names = [variant.name for variant in others]
     switches = {key for key, value in base.values().items() if isinstance(value, bool)}
-    assert {name.split(" = ")[0] for name in names} == switches | {"solver", "prediction", "motion_scale", "calm"}
+    assert {name.split(" = ")[0] for name in names} == switches | {
+        "solver",
+        "slide",
+        "prediction",
+        "motion_scale",
+        "calm",
+    }
     assert "hypotheses = false" in names and 'solver = "limbwise"' in names and "prediction = 0.0" in names
     still = [variant.name for variant in variants(voodoo.Config(prediction=0.0))]
     assert not any(name.startswith("prediction") for name in still)

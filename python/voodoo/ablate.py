@@ -16,6 +16,8 @@ from voodoo.running import HumanModel
 from voodoo.sensors.front_end import INPUTS
 
 UNCHANGED = "as configured"
+# Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty weighs nothing.
+_OFF = (("slide", 0.0), ("prediction", 0.0), ("motion_scale", 100.0), ("calm", 0.0))
 _MEASURES = (
     ("error_m", "error", 100.0, "cm", 2),
     ("within_10cm", "within 10 cm", 100.0, "%", 1),
@@ -58,17 +60,14 @@ class Ablation:
 
 
 def variants(base: voodoo.Config) -> list[Variant]:
-    """`base` itself, then every change of one entry: each switch turned over, each other solver, no prediction, no
-    jitter penalty."""
+    """`base` itself, then every change of one entry: each switch turned over, each other solver, and each
+    influence of a certain strength at none."""
     values = base.values()
     changes: list[tuple[str, bool | str | float]] = [
         (key, not value) for key, value in values.items() if isinstance(value, bool)
     ]
     changes += [("solver", word) for word in voodoo.Config.words("solver") if word != values["solver"]]
-    # No prediction; and motion so free that its penalty weighs nothing.
-    changes += [
-        (key, off) for key, off in (("prediction", 0.0), ("motion_scale", 100.0), ("calm", 0.0)) if values[key] != off
-    ]
+    changes += [(key, off) for key, off in _OFF if values[key] != off]
     changed = [Variant(f"{key} = {_toml(value)}", voodoo.Config(**{**values, key: value})) for key, value in changes]
     return [Variant(UNCHANGED, base), *changed]
 

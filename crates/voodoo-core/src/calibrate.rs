@@ -222,6 +222,25 @@ mod tests {
     }
 
     #[test]
+    fn edges_on_one_side_tell_as_far_as_the_axis_is_known() {
+        let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
+        let mut girth = Girth::default();
+        let both = Girth::default().follow(&shape, sides(&shape, 0.02, 0.0).into_iter().flatten()).unwrap();
+        let one = |shape: &_| sides(shape, 0.02, 0.0).into_iter().map(|[left, _]| left).collect::<Vec<_>>();
+        let [_, after_one, ..] = girth.follow(&shape, one(&shape).into_iter()).unwrap();
+        assert!(1.0 < after_one && after_one < both[1], "one side tells less: {after_one}, both {}", both[1]);
+        for _ in 0..100 {
+            let wider = 0.2 - 0.5 * (shape.b0() + shape.b1());
+            let seen = sides(&shape, wider, 0.0).into_iter().map(|[left, _]| left);
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen).unwrap();
+            let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
+            shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
+        }
+        let b = 0.5 * (shape.b0() + shape.b1());
+        assert!(b > 0.19, "width {b}");
+    }
+
+    #[test]
     fn girths_without_edges_stay() {
         let shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
         assert_eq!(Girth::default().follow(&shape, std::iter::empty()), None);

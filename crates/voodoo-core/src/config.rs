@@ -241,6 +241,9 @@ config! {
     band_sigma: f64 = 0.003, "m", 0.00001 ..= 1.0;
     /// Standard deviation of a surface point of weight one, for the whole-body solvers.
     point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
+    /// Share of a surface point's information that holds it along the surface as well, for the whole-body solvers: 0 is
+    /// point-to-plane, 1 point-to-point; a little stops limbs from sliding along themselves.
+    slide: f64 = 0.07, "", 0.0 ..= 1.0;
     /// Greatest distance of a matched point in the first step of a frame, for the whole-body solvers; it narrows.
     gate_start: f64 = 0.30, "m", 0.001 ..= 10.0;
     /// Greatest distance of a matched point once narrowed.

@@ -23,8 +23,6 @@ const DAMPING: f64 = 1e-3;
 const LED: f64 = 2.0;
 /// Scale of the kernel, metres: sites that are led come from far.
 const SCALE: f64 = 0.5;
-/// Share of a point's information across its normal, on limbs that follow: little, an arm slides along itself.
-const SLIDE: f64 = 0.07;
 
 /// Damped Gauss-Newton steps on the sites, and the points where they are matched before.
 #[derive(Debug, Default)]
@@ -128,7 +126,8 @@ impl Guide {
     fn add_points(&mut self, problem: &Problem, information: f64) {
         let Problem { body, correspondences, config, .. } = problem;
         let surface = |slide| Surface { correspondences, information, slide, scale: config.kernel_start };
-        surface(SLIDE).add(body, &self.closed, &mut self.normal);
+        // Limbs that follow may slide along themselves.
+        surface(config.slide).add(body, &self.closed, &mut self.normal);
         self.held.clear(self.closed.len());
         surface(1.0).add(body, &self.closed, &mut self.held);
         let blocks = self.normal.limbs.iter_mut().zip(&self.held.limbs);

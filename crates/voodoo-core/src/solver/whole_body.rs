@@ -8,8 +8,6 @@ use crate::geometry::Pose;
 use crate::normal::Normal;
 use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
-/// Share of a surface point's information across its normal (method section 1: 0.05 to 0.1 stops sliding).
-const SLIDE: f64 = 0.07;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
 /// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter.
@@ -136,7 +134,7 @@ impl WholeBody {
         self.normal.clear(poses.len());
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
         let terms: [&dyn Term; 4] = [
-            &Surface { correspondences, information, slide: SLIDE, scale },
+            &Surface { correspondences, information, slide: config.slide, scale },
             &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE) },
             &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
             &Prior { predicted, root, joints: &self.joint_sigmas, calm },
