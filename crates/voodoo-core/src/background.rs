@@ -81,9 +81,14 @@ fn learnt(depth: f32, z: f32) -> f32 {
 }
 
 impl Backgrounds {
-    /// The background of the image with this index, if its camera has not moved.
-    pub fn of(&self, index: usize, image: &DepthImage) -> Option<&Background> {
-        self.images.get(index).filter(|background| background.fits(image))
+    /// The background of this image, if its camera has not moved.
+    pub fn of(&self, image: &DepthImage) -> Option<&Background> {
+        self.images.iter().find(|background| background.fits(image))
+    }
+
+    /// Whether no depth image was ever seen.
+    pub fn is_empty(&self) -> bool {
+        self.images.is_empty()
     }
 
     /// Forgets everything.
@@ -119,16 +124,12 @@ impl Backgrounds {
     }
 
     /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. A camera that moved
-    /// starts anew with nothing known.
+    /// starts anew with nothing known; one that is silent in this frame is remembered.
     pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> (Range<usize>, Range<usize>)) {
-        self.images.resize_with(frame.images.len(), Background::default);
-        for (image, background) in frame.images.iter().zip(&mut self.images) {
-            if !background.fits(image) {
-                background.world_from_sensor = Some(image.world_from_sensor);
-                background.width = image.width;
-                background.depth.clear();
-                background.depth.resize(image.pixels.len(), 0.0);
-            }
+        for image in frame.images {
+            let known = self.images.iter().position(|background| background.fits(image));
+            let index = known.unwrap_or_else(|| self.start_anew(image, frame));
+            let background = &mut self.images[index];
             let (columns, rows) = window(image);
             background.row = (background.row + 1) % ROW_STEP;
             for row in (background.row..image.height).step_by(ROW_STEP) {
@@ -141,6 +142,21 @@ impl Backgrounds {
                 }
             }
         }
+    }
+
+    /// Nothing is known behind this image any more; in the place of a background that no image of the frame has.
+    fn start_anew(&mut self, image: &DepthImage, frame: &Frame) -> usize {
+        let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
+        let index = self.images.iter().position(gone).unwrap_or(self.images.len());
+        if index == self.images.len() {
+            self.images.push(Background::default());
+        }
+        let background = &mut self.images[index];
+        background.world_from_sensor = Some(image.world_from_sensor);
+        background.width = image.width;
+        background.depth.clear();
+        background.depth.resize(image.pixels.len(), 0.0);
+        index
     }
 }
 
@@ -165,7 +181,8 @@ fn fill_row(row: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
-    use super::fill_row;
+    use super::*;
+    use crate::geometry::Vec3;
 
     #[test]
     fn a_gap_is_filled_from_its_sides() {
@@ -176,5 +193,34 @@ mod tests {
         let mut nothing = [0.0; 3];
         fill_row(&mut nothing);
         assert_eq!(nothing, [0.0; 3]);
+    }
+
+    #[test]
+    fn a_silent_camera_is_remembered_and_a_moved_one_starts_anew() {
+        let pixels = [3.0_f32; 4 * ROW_STEP];
+        let image = |x: f64| DepthImage {
+            pixels: DepthPixels::F32(&pixels),
+            width: 4,
+            height: ROW_STEP,
+            metres_per_unit: 1.0,
+            intrinsics: [4.0, 4.0, 2.0, 4.0],
+            rays: None,
+            world_from_sensor: Pose::from_translation(Vec3::new(x, 0.0, 0.0)),
+            weight: 1.0,
+            source: 0,
+        };
+        let mut backgrounds = Backgrounds::default();
+        let mut learn = |images: &[DepthImage]| {
+            let frame = Frame { images, ..Frame::empty(0.0) };
+            backgrounds.update(&frame, |_| (0..0, 0..0));
+            [0.0, 1.0, 2.0].map(|x| {
+                let learnt = backgrounds.of(&image(x)).map(Background::depth);
+                learnt.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count() / 4)
+            })
+        };
+        assert_eq!(learn(&[image(0.0), image(1.0)]), [Some(1), Some(1), None]);
+        assert_eq!(learn(&[]), [Some(1), Some(1), None]);
+        assert_eq!(learn(&[image(1.0)]), [Some(1), Some(2), None], "the other one is silent");
+        assert_eq!(learn(&[image(2.0), image(1.0)]), [None, Some(3), Some(1)], "the other one moved");
     }
 }

@@ -98,8 +98,8 @@ impl Blobs {
     }
 
     fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
-        for (index, image) in frame.images.iter().enumerate() {
-            let background = backgrounds.of(index, image).map_or(&[][..], Background::depth);
+        for image in frame.images {
+            let background = backgrounds.of(image).map_or(&[][..], Background::depth);
             let step = ((image.pixels.len() as f64 / SAMPLES as f64).sqrt().ceil() as usize).max(1);
             let spread = (step * step) as f64 / (image.intrinsics[0] * image.intrinsics[1] * REFERENCE_PATCH);
             let camera = image.world_from_sensor.translation - origin;

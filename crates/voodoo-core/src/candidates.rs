@@ -82,8 +82,8 @@ impl Candidates {
         };
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
         let gate = Gate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
-        for (index, image) in frame.images.iter().enumerate() {
-            let background = backgrounds.of(index, image).map_or(&[][..], Background::depth);
+        for image in frame.images {
+            let background = backgrounds.of(image).map_or(&[][..], Background::depth);
             self.gather_image(image, background, origin, bounds, &gate, config.max_points);
             self.cameras.push((self.points.len() as u32, image.world_from_sensor.translation - origin));
         }

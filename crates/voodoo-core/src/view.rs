@@ -48,10 +48,10 @@ pub struct Views<'a> {
 impl<'a> Views<'a> {
     /// One after the other.
     pub fn iter(self) -> impl Iterator<Item = View<'a>> {
-        let images = self.frame.images.iter().enumerate().zip(self.cut_out);
-        images.map(move |((index, image), cut_out)| View {
+        let images = self.frame.images.iter().zip(self.cut_out);
+        images.map(move |(image, cut_out)| View {
             image,
-            background: self.backgrounds.of(index, image),
+            background: self.backgrounds.of(image),
             working_from_camera: shifted(&image.world_from_sensor, self.origin),
             cut_out: *cut_out,
         })

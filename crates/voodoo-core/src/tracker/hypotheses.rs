@@ -12,8 +12,9 @@ use crate::view::Views;
 
 /// So many unexplained patches near a chain make it suspect.
 const SUSPICIOUS: f64 = 25.0;
-/// So many near an arm make it suspect whatever else speaks for it.
+/// So many near an arm make it suspect whatever else speaks for it, unless a larger share of the whole frame is unexplained.
 const STRIKING: f64 = 40.0;
+const CLUTTER: f64 = 0.15;
 /// After so many refusals in a row a chain is tried in every `REST`th frame only: a hidden arm is refused for seconds.
 const TIRED: usize = 30;
 const REST: usize = 4;
@@ -24,6 +25,8 @@ const REFUTED: f64 = 0.2;
 /// Either share is of this many patches at least, and has to last for so many frames.
 const LEAST: f64 = 20.0;
 const PATIENCE: usize = 2;
+/// So many frames where nothing but open points speaks against an arm.
+const LONG_PATIENCE: usize = 4;
 /// A hypothesis must explain so many patches more than the current pose.
 const GAIN: f64 = 25.0;
 /// ICP steps that refine the best hypothesis.
@@ -48,6 +51,8 @@ pub(super) struct Hypotheses {
     /// Candidates that no limb explains.
     open: Points,
     open_weight: Vec<f64>,
+    /// So many are open that a heap of them says nothing.
+    cluttered: bool,
     /// Points the chain under test may explain.
     near: Points,
     near_weight: Vec<f64>,
@@ -139,6 +144,8 @@ impl Tracker {
                 work.open_weight.push(f64::from(self.candidates.weight[index]));
             }
         }
+        let all: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+        work.cluttered = work.open_weight.iter().sum::<f64>() > CLUTTER * all;
     }
 
     fn try_chain(&mut self, index: usize, frame: &Frame, pace: f64, work: &mut Hypotheses) -> usize {
@@ -162,8 +169,9 @@ impl Tracker {
             sum
         };
         // Furniture stays open beside legs; nothing else than the arm is expected about an arm.
-        let striking = !chain.leg && open >= STRIKING;
-        if open < SUSPICIOUS || (self.suspect(chain, views, work) == [false; 2] && !striking) {
+        let striking = !chain.leg && !work.cluttered && open >= STRIKING;
+        let suspect = open >= SUSPICIOUS && self.suspect(chain, views, work) != [false; 2];
+        if !suspect && !striking {
             self.idle[index] = 0;
             work.proposed[index] = false;
             work.refused[index] = 0;
@@ -172,7 +180,7 @@ impl Tracker {
         self.idle[index] += 1;
         work.refused[index] += 1;
         let tired = work.refused[index] > TIRED && !work.refused[index].is_multiple_of(REST);
-        if self.idle[index] < PATIENCE || tired {
+        if self.idle[index] < (if suspect { PATIENCE } else { LONG_PATIENCE }) || tired {
             return 0;
         }
         let targets = targets(&work.near, &work.near_weight, root, &mut work.best);

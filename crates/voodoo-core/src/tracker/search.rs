@@ -127,8 +127,10 @@ impl Tracker {
     /// Remembers a tracked body; looks for a lost one, and takes it where it is found.
     pub(super) fn search(&mut self, frame: &Frame) {
         let mut work = std::mem::take(&mut self.search);
+        // A depth camera that is silent for a while is no sign that the body went.
+        let silent = frame.images.is_empty() && !self.backgrounds.is_empty();
         if self.estimate.status == Status::Lost {
-            work.lost += 1;
+            work.lost += usize::from(!silent);
         } else if work.lost < PATIENCE {
             work.lost = 0;
         }
