@@ -1,6 +1,6 @@
 //! Girths. In the first frame the named joints fix pose and lengths, the points around them how thick each limb is and where
 //! its surface lies about the line of its joints. Later frames show sides that were hidden then (a trunk behind hanging
-//! arms): two edges across a limb tell how wide it is, wherever it is.
+//! arms): two edges across a limb tell how wide it is, wherever it is, and one as far as its axis is known.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
