@@ -87,9 +87,9 @@ mod tests {
     #[test]
     fn a_chain_refused_for_long_is_tried_in_every_fourth_frame_until_it_asks() {
         let mut doubt = Doubt::default();
-        let tried: Vec<bool> = (0..60).map(|_| doubt.due(Some(1))).collect();
+        let tried: Vec<bool> = (0..TIRED + 10 * REST).map(|_| doubt.due(Some(1))).collect();
         assert!(tried[..TIRED].iter().all(|due| *due));
-        assert_eq!(tried[TIRED..].iter().filter(|due| **due).count(), 30 / REST);
+        assert_eq!(tried[TIRED..].iter().filter(|due| **due).count(), 10);
         while !doubt.due(Some(1)) {}
         doubt.ask();
         assert!(doubt.due(Some(1)) && doubt.ask());
