@@ -74,13 +74,15 @@ pub fn look(views: Views, limb: &Limb, working_from_limb: &Pose) -> Visibility {
             if ahead.length() < 1e-6 {
                 continue;
             }
+            // A limb seen aslant covers so much less of the image, as the points seen on it do.
+            let aslant = ahead.length() / centre.length();
             let ahead = ahead.normalize();
             let side = Vec3::new(-ahead.y, ahead.x, 0.0);
             for s in ACROSS {
                 let forward = (1.0 - s * s).sqrt();
                 let place = ahead * forward + side * s;
                 let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
-                let patches = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
+                let patches = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length() * aslant
                     / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
                 match sight(&view, point) {
                     None => continue,
@@ -115,4 +117,45 @@ pub fn unexplained(correspondences: &Correspondences, total_weight: f64) -> f64 
         }
     }
     cost
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::background::Backgrounds;
+    use crate::body::{Body, HumanModel};
+    use crate::frame::{DepthImage, DepthPixels, Frame};
+    use crate::geometry::Quat;
+
+    #[test]
+    fn a_limb_seen_aslant_shows_as_much_less_as_its_image_is_shorter() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let limb = &body.limbs()[body.limb_index("l_calf").unwrap()];
+        let pixels = vec![4000_u16; 160 * 120];
+        let images = [DepthImage {
+            pixels: DepthPixels::U16(&pixels),
+            width: 160,
+            height: 120,
+            metres_per_unit: 0.001,
+            intrinsics: [140.0, 140.0, 79.5, 59.5],
+            rays: None,
+            world_from_sensor: Pose::identity(),
+            weight: 1.0,
+            source: 0,
+        }];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let views =
+            Views { frame: &frame, backgrounds: &Backgrounds::default(), cut_out: &[false], origin: Vec3::ZERO };
+        let at = |angle: f64| {
+            let turn = Quat::from_axis_angle(Vec3::Y, angle);
+            let middle = turn * Vec3::new(0.0, 0.0, 0.5 * limb.shape.length());
+            look(views, limb, &Pose::from_parts(Vec3::new(0.0, 0.0, 2.5) - middle, turn))
+        };
+        let across = at(std::f64::consts::FRAC_PI_2);
+        assert!(across.facing > 50.0 && across.contradicted == across.facing, "{across:?}");
+        for angle in [0.2_f64, 0.6, 1.0] {
+            let ratio = at(angle).facing / across.facing;
+            assert!((ratio - angle.sin()).abs() < 0.02, "{angle}: {ratio}");
+        }
+    }
 }

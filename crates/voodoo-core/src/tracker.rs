@@ -389,6 +389,7 @@ mod distances;
 mod doubt;
 mod hypotheses;
 mod named;
+mod places;
 mod report;
 mod scene;
 mod score;

@@ -44,6 +44,11 @@ impl Doubt {
         self.asks
     }
 
+    /// The frame before this one asked for a change.
+    pub(super) fn asked(&self) -> bool {
+        self.asked
+    }
+
     /// Nothing speaks against the chain.
     pub(super) fn none(&self) -> bool {
         self.frames == 0

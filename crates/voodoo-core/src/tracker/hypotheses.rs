@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use super::Tracker;
 use super::doubt::Doubt;
+use super::places::{carry, targets, thin};
+use crate::candidates::shifted;
 use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, Visibility, look};
 use crate::frame::Frame;
@@ -31,10 +33,6 @@ const GAIN: f64 = 25.0;
 const REFINE: usize = 8;
 /// A new configuration that costs more than this, and more than the old one, is no pose of a body.
 const STRAINED: f64 = 60.0;
-/// Places where the end of a chain is tried, size of what stands for one (metres), and patches of it that may be stray.
-const TARGETS: usize = 5;
-const HEAP: f64 = 0.08;
-const STRAY: f64 = 3.0;
 /// Bends about the line from the root of a chain to a new end that are tried, and to the end it had.
 const SWIVELS: usize = 6;
 const SWIVELS_AT_REST: usize = 12;
@@ -63,11 +61,14 @@ pub(super) struct Hypotheses {
     trial: Vec<Pose>,
     kept: Vec<Pose>,
     at_rest: Vec<Pose>,
+    both: Vec<Pose>,
     kept_predicted: Vec<Pose>,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
     /// What past frames said against each chain.
     doubts: Vec<Doubt>,
+    /// The body as the frame wanted it that last asked for a change of each chain, world.
+    wanted: Vec<Vec<Pose>>,
 }
 
 impl Tracker {
@@ -78,8 +79,11 @@ impl Tracker {
         work.ends.resize(self.chains.len(), None);
         work.doubts.clear();
         work.doubts.resize(self.chains.len(), Doubt::default());
+        let room = || Vec::with_capacity(self.body.limbs().len());
+        work.wanted.clear();
+        work.wanted.resize_with(self.chains.len(), room);
         // Room at once, not when the first hard frame comes.
-        for poses in [&mut work.trial, &mut work.kept, &mut work.at_rest, &mut work.kept_predicted] {
+        for poses in [&mut work.trial, &mut work.kept, &mut work.at_rest, &mut work.both, &mut work.kept_predicted] {
             poses.clear();
             poses.reserve(self.body.limbs().len());
         }
@@ -186,9 +190,7 @@ impl Tracker {
                     *best = best.min(distance.abs());
                 }
             }
-            let points: f64 =
-                best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum();
-            points + look(poses).cost() + self.strain(chain, poses)
+            rough_cost(best, weights) + look(poses).cost() + self.strain(chain, poses)
         };
         let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
         let enough = current - GAIN;
@@ -223,18 +225,64 @@ impl Tracker {
             }
         }
         work.others = others;
-        let tried = [(rested, std::mem::take(&mut work.at_rest)), (least < enough, std::mem::take(&mut work.kept))];
+        // What the last frame asked for comes first: two frames that ask for a change shall ask for the same one.
+        let mut wanted = std::mem::take(&mut work.wanted[index]);
+        wanted.iter_mut().for_each(|pose| *pose = shifted(pose, self.origin));
+        let both = rested && self.rest_both(index, views, work);
+        let tried = [
+            (work.doubts[index].asked() && !wanted.is_empty(), wanted),
+            (rested, std::mem::take(&mut work.at_rest)),
+            (least < enough, std::mem::take(&mut work.kept)),
+            (both, std::mem::take(&mut work.both)),
+        ];
         let mut steps = 0;
         for (_, poses) in tried.iter().filter(|(found, _)| *found) {
             if !work.doubts[index].asks() {
                 steps += REFINE;
                 if self.refine(index, frame, pace, poses, work) && !work.doubts[index].ask() {
+                    work.wanted[index].extend(self.poses.iter().map(|pose| shifted(pose, -self.origin)));
                     self.take_back(frame, work);
                 }
             }
         }
-        [(_, work.at_rest), (_, work.kept)] = tried;
+        let wanted;
+        [(_, wanted), (_, work.at_rest), (_, work.kept), (_, work.both)] = tried;
+        if work.wanted[index].is_empty() {
+            // Its memory is kept for the next.
+            work.wanted[index] = wanted;
+            work.wanted[index].clear();
+        }
         steps
+    }
+
+    /// Both legs where they ended when all was well, into `both`, from one of them there in `at_rest`; whether there is another
+    /// and it is in doubt as well. A body that sinks pushes both legs out of place, and each alone is held by the other.
+    fn rest_both(&self, index: usize, views: Views, work: &mut Hypotheses) -> bool {
+        let chain = &self.chains[index];
+        let other = (0..self.chains.len()).find(|other| *other != index && chain.leg && self.chains[*other].leg);
+        let Some(other) = other.filter(|other| !work.doubts[*other].none()) else { return false };
+        let Some(end) = work.ends[other] else { return false };
+        let other = &self.chains[other];
+        let Hypotheses { near, near_weight, best, distances, trial, at_rest, both, .. } = work;
+        let mut least = f64::INFINITY;
+        for swivel in 0..SWIVELS_AT_REST {
+            trial.clone_from(at_rest);
+            other.point_at(&self.body, trial, end - self.origin, TAU * swivel as f64 / SWIVELS_AT_REST as f64);
+            best.fill(f32::INFINITY);
+            for limb in chain.limbs().chain(other.limbs()) {
+                self.body.limbs()[limb].shape.approximate_distances(&trial[limb], near, distances);
+                for (best, distance) in best.iter_mut().zip(distances.iter()) {
+                    *best = best.min(distance.abs());
+                }
+            }
+            let seen: f64 = other.limbs().map(|limb| look(views, &self.body.limbs()[limb], &trial[limb]).cost()).sum();
+            let cost = rough_cost(best, near_weight) + seen + self.strain(other, trial);
+            if cost < least {
+                least = cost;
+                both.clone_from(trial);
+            }
+        }
+        least < f64::INFINITY
     }
 
     /// The poses from before the hypothesis.
@@ -339,60 +387,7 @@ impl Tracker {
     }
 }
 
-/// The chain's relative pose of another time on the parent of now.
-fn carry(chain: &TwoBone, body: &crate::body::Body, then: &[Pose], now: &mut [Pose]) {
-    for limb in chain.limbs() {
-        if let Some((parent, _)) = &body.limbs()[limb].parent {
-            now[limb] = now[*parent] * then[*parent].inverse() * then[limb];
-        }
-    }
-}
-
-/// Where the end of the chain may be: middles of heaps of open points, each as far as can be from the root and the others.
-fn targets(points: &Points, weights: &[f64], root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; TARGETS] {
-    apart.clear();
-    apart.extend((0..points.len()).map(|index| (points.get(index) - root).length() as f32));
-    let (mut targets, mut found) = ([None; TARGETS], 0);
-    while found < TARGETS {
-        let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
-        let place = points.get(next);
-        if f64::from(apart[next]) < HEAP {
-            break;
-        }
-        let (mut sum, mut total) = (Vec3::ZERO, 0.0);
-        for (index, apart) in apart.iter_mut().enumerate() {
-            let point = points.get(index);
-            let distance = (point - place).length();
-            *apart = apart.min(distance as f32);
-            if distance < HEAP {
-                sum += weights[index] * point;
-                total += weights[index];
-            }
-        }
-        // A few stray points are no hand.
-        if total > STRAY {
-            targets[found] = Some(sum / total);
-            found += 1;
-        }
-    }
-    targets
-}
-
-/// Keeps about `most` of the points, evenly, and their total weight.
-pub(super) fn thin(points: &mut Points, weights: &mut Vec<f64>, most: usize) {
-    let count = points.len();
-    if count <= most {
-        return;
-    }
-    let scale = count as f64 / most as f64;
-    for kept in 0..most {
-        let from = (kept as f64 * scale) as usize;
-        let point = points.get(from).to_array().map(|value| value as f32);
-        points.set(kept, point);
-        weights[kept] = weights[from] * scale;
-    }
-    points.x.truncate(most);
-    points.y.truncate(most);
-    points.z.truncate(most);
-    weights.truncate(most);
+/// Cost of points at these distances from the nearest limb of a rough hypothesis.
+fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
+    distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum()
 }

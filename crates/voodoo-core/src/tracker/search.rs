@@ -6,7 +6,7 @@
 //! and does not do (walk backwards) costs as well.
 
 use super::Tracker;
-use super::hypotheses::thin;
+use super::places::thin;
 use super::score::limit_strain;
 use crate::blobs::{Blob, Blobs};
 use crate::candidates::{REFERENCE_PATCH, body_box};
