@@ -3,6 +3,8 @@
 use super::kernel::{BLOCK, Block, Constants, SHORT, Surface, closest};
 use super::{SurfacePoint, TaperedEllipticCylinder};
 use crate::geometry::{Points, Pose, Vec3};
+#[cfg(target_arch = "x86_64")]
+use crate::simd::has_avx512;
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted to find the right basin.
@@ -165,6 +167,16 @@ type Kernel<const N: usize> = fn(&Constants, &Block<N>, &mut Surface<N>);
 /// The fastest kernel this processor can run; the detection is cached by the standard library.
 fn kernel<const N: usize>() -> Kernel<N> {
     #[cfg(target_arch = "x86_64")]
+    if has_avx512() && std::arch::is_x86_feature_detected!("fma") {
+        return |constants, queries, out| {
+            // SAFETY: the function is safe code that only needs AVX-512 and FMA, and this processor was found to have both.
+            #[allow(unsafe_code)]
+            unsafe {
+                closest_avx512(constants, queries, out);
+            }
+        };
+    }
+    #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
         return |constants, queries, out| {
             // SAFETY: the function is safe code that only needs AVX2 and FMA, and this processor was found to have both.
@@ -180,6 +192,12 @@ fn kernel<const N: usize>() -> Kernel<N> {
 /// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
 fn closest_baseline<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
     closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N>(constants, queries, out);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
+fn closest_avx512<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+    closest::<true, N>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
