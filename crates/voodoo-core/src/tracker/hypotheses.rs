@@ -193,7 +193,13 @@ impl Tracker {
         thin(&mut work.near, &mut work.near_weight, SAMPLE);
         self.distances_to_others(chain, &work.near, &mut work.others, &mut work.best);
         let others = std::mem::take(&mut work.others);
-        let score = |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, distances: &mut Vec<f32>| {
+        // No part of the cost is negative: what cannot fall below `least` any more is not looked at further.
+        let score = |poses: &[Pose],
+                     least: f64,
+                     near: &Points,
+                     weights: &[f64],
+                     best: &mut Vec<f32>,
+                     distances: &mut Vec<f32>| {
             best.clone_from(&others);
             for limb in chain.limbs() {
                 self.body.limbs()[limb].shape.approximate_distances(&poses[limb], near, distances);
@@ -203,9 +209,13 @@ impl Tracker {
             }
             let points: f64 =
                 best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum();
-            points + look(poses).cost() + self.strain(chain, poses)
+            if points >= least {
+                return points;
+            }
+            let seen = points + look(poses).cost();
+            if seen >= least { seen } else { seen + self.strain(chain, poses) }
         };
-        let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
+        let current = score(&self.poses, f64::INFINITY, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
         let enough = current - GAIN;
         let Hypotheses { near, near_weight, best, distances, trial, kept, at_rest, .. } = work;
         // The best way to end at a place that costs less than `least`, into `kept`; returns its cost.
@@ -213,7 +223,7 @@ impl Tracker {
             for swivel in 0..ways {
                 trial.clone_from(&self.poses);
                 chain.point_at(&self.body, trial, target, TAU * swivel as f64 / ways as f64);
-                let cost = score(trial, near, near_weight, best, distances);
+                let cost = score(trial, least, near, near_weight, best, distances);
                 if cost < least {
                     least = cost;
                     kept.clone_from(trial);
@@ -231,7 +241,7 @@ impl Tracker {
             // Where the chain was a frame ago, carried by its parent.
             trial.clone_from(&self.poses);
             carry(chain, &self.body, &self.previous, trial);
-            let cost = score(trial, near, near_weight, best, distances);
+            let cost = score(trial, least, near, near_weight, best, distances);
             if cost < least {
                 least = cost;
                 kept.clone_from(trial);
