@@ -34,6 +34,14 @@ impl SurfaceBatch {
         self.region.is_empty()
     }
 
+    /// Makes room for `len` results in all.
+    pub fn reserve(&mut self, len: usize) {
+        self.points.reserve(len);
+        self.normals.reserve(len);
+        self.signed_distance.reserve(len.saturating_sub(self.signed_distance.len()));
+        self.region.reserve(len.saturating_sub(self.region.len()));
+    }
+
     fn resize(&mut self, len: usize) {
         self.points.resize(len);
         self.normals.resize(len);

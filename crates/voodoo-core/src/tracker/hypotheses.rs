@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::Tracker;
+use crate::correspondence::Correspondences;
 use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, Visibility, look};
 use crate::frame::Frame;
@@ -66,6 +67,8 @@ pub(super) struct Hypotheses {
     kept: Vec<Pose>,
     at_rest: Vec<Pose>,
     kept_predicted: Vec<Pose>,
+    /// What was matched before the hypothesis.
+    matched: Correspondences,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
     /// How often each chain was refused a change since it was in order.
@@ -128,6 +131,7 @@ impl Tracker {
         work.own_weight.reserve(most);
         work.others.reserve(most);
         work.distances.reserve(most);
+        work.matched.reserve_as(&self.correspondences);
         work.best.clear();
         work.best.resize(self.candidates.len(), f32::INFINITY);
         for matches in &self.correspondences.limbs {
@@ -255,7 +259,7 @@ impl Tracker {
             if !work.proposed[index] {
                 steps += REFINE;
                 if self.refine(index, frame, pace, poses, work) {
-                    self.take_seconded(index, frame, proposed, work);
+                    self.take_seconded(index, proposed, work);
                 }
             }
         }
@@ -264,19 +268,19 @@ impl Tracker {
     }
 
     /// A change of a chain is made when two frames in a row ask for one: a single frame may be disturbed.
-    fn take_seconded(&mut self, index: usize, frame: &Frame, proposed: bool, work: &mut Hypotheses) {
+    fn take_seconded(&mut self, index: usize, proposed: bool, work: &mut Hypotheses) {
         work.proposed[index] = true;
         work.refused[index] = 0;
         if !proposed {
-            self.take_back(frame, work);
+            self.take_back(work);
         }
     }
 
-    /// The poses from before the hypothesis.
-    fn take_back(&mut self, frame: &Frame, work: &mut Hypotheses) {
+    /// The poses from before the hypothesis, and what was matched there.
+    fn take_back(&mut self, work: &mut Hypotheses) {
         self.poses.clone_from(&work.trial);
         self.predicted.clone_from(&work.kept_predicted);
-        self.match_last(frame);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
     }
 
     /// Remembers where the chains end that this frame proves right; a lost body has been anywhere.
@@ -356,6 +360,7 @@ impl Tracker {
         // The prediction spoke for the old configuration; the new one is what is expected now.
         work.kept_predicted.clone_from(&self.predicted);
         self.predicted.clone_from(hypothesis);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
         let last = self.config.max_steps;
         for step in 0..REFINE {
             self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
@@ -369,7 +374,7 @@ impl Tracker {
                 return true;
             }
         }
-        self.take_back(frame, work);
+        self.take_back(work);
         false
     }
 }
