@@ -13,6 +13,8 @@ pub struct LimbMatches {
     pub candidate: Vec<u32>,
     /// Measured points.
     pub measured: Points,
+    /// Weights as they were given.
+    pub given: Vec<f32>,
     /// Weights.
     pub weight: Vec<f32>,
     /// Closest points, normals, signed distances.
@@ -90,6 +92,7 @@ impl LimbMatches {
     fn reserve(&mut self, len: usize) {
         self.candidate.reserve(len.saturating_sub(self.candidate.len()));
         self.measured.reserve(len);
+        self.given.reserve(len.saturating_sub(self.given.len()));
         self.weight.reserve(len.saturating_sub(self.weight.len()));
         self.surface.reserve(len);
     }

@@ -373,7 +373,7 @@ impl Tracker {
             if assigned {
                 assignment.sample_limb(index, candidates, config, matches);
             }
-            match_limb(&body.limbs()[index], &poses[index], candidates, gate.distance, matches);
+            match_limb(&body.limbs()[index], &poses[index], gate.distance, matches);
             if facing {
                 face_cameras(&body.limbs()[index].shape, &poses[index], candidates, gate.distance, matches);
             }
