@@ -25,16 +25,26 @@ impl Assignment {
     /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
     pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, overlap: Overlap, box_margin: f64) {
         let Self { members, search, nearest, inside } = self;
-        // One more for those in no limb's box, so that the loop below has no branch.
+        // One more for those in no limb's box.
         members.resize_with(poses.len() + 1, Vec::new);
         members.iter_mut().for_each(Vec::clear);
         nearest.resize(candidates.len(), NONE);
         inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
         search.find(body, poses, box_margin, &candidates.clusters, nearest, inside);
         if overlap == Overlap::Exclusive {
-            for (index, (nearest, known)) in (0..).zip(nearest.iter().zip(&candidates.limb)) {
-                let limb = if *known == ANY_LIMB { *nearest } else { u32::from(*known) };
-                members[(limb as usize).min(poses.len())].push(index);
+            let count = candidates.len();
+            let (nearest, known) = (&nearest[..count], &candidates.limb[..count]);
+            let limb_of = |index: usize| {
+                let limb = if known[index] == ANY_LIMB { nearest[index] } else { u32::from(known[index]) };
+                (limb as usize).min(poses.len())
+            };
+            // Those of a row of pixels mostly follow each other: one at a time would wait for the length of the list.
+            let mut start = 0;
+            while start < count {
+                let limb = limb_of(start);
+                let end = (start + 1..count).find(|index| limb_of(*index) != limb).unwrap_or(count);
+                members[limb].extend(start as u32..end as u32);
+                start = end;
             }
             return;
         }
