@@ -98,7 +98,15 @@ impl TaperedEllipticCylinder {
         let queries = [xs, ys, zs];
         let mut doubtful = Doubtful::default();
         self.closest_blocks(world_from_limb, &constants, kernel::<BLOCK>(), queries, 0..whole, &mut doubtful, out);
-        self.closest_blocks(world_from_limb, &constants, kernel::<SHORT>(), queries, whole..xs.len(), &mut doubtful, out);
+        self.closest_blocks(
+            world_from_limb,
+            &constants,
+            kernel::<SHORT>(),
+            queries,
+            whole..xs.len(),
+            &mut doubtful,
+            out,
+        );
         self.settle(world_from_limb, &mut doubtful, out);
     }
 

@@ -110,10 +110,8 @@ impl TaperedEllipticCylinder {
                 let next = foot.angle.turned(step);
                 let bisected = !converging | (from.to(next) <= 0.0) | (next.to(to) <= 0.0);
                 let middle = from.middle(to);
-                let next = Angle {
-                    c: if bisected { middle.c } else { next.c },
-                    s: if bisected { middle.s } else { next.s },
-                };
+                let next =
+                    Angle { c: if bisected { middle.c } else { next.c }, s: if bisected { middle.s } else { next.s } };
                 last_step[lane] = if bisected { from.to(to) } else { step.abs() };
                 let foot = self.foot(next, Vec3::new(x[lane], y[lane], z[lane]));
                 let better = open[lane] & (foot.squared < best.squared[lane]);

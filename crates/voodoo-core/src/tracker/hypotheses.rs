@@ -219,7 +219,8 @@ impl Tracker {
             let seen = points + look(poses).cost();
             if seen >= least { seen } else { seen + self.strain(chain, poses) }
         };
-        let current = score(&self.poses, f64::INFINITY, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
+        let current =
+            score(&self.poses, f64::INFINITY, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
         let enough = current - GAIN;
         let Hypotheses { near, near_weight, best, distances, trial, kept, at_rest, .. } = work;
         // The best way to end at a place that costs less than `least`, into `kept`; returns its cost.
