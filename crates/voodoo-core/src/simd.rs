@@ -29,7 +29,8 @@ pub fn widest<R>(work: impl FnOnce() -> R) -> R {
     work()
 }
 
-/// Whether this processor has the parts of AVX-512 that every one since 2017 has; the detection is cached by the standard library.
+/// Whether this processor has the parts of AVX-512 that are used (all with AVX-512 do, but for Xeon Phi); the detection is
+/// cached by the standard library.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn has_avx512() -> bool {

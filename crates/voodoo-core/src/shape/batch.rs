@@ -299,4 +299,38 @@ mod tests {
         }
         Ok(())
     }
+
+    /// Skipped, as there is nothing to compare, on processors without AVX-512.
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    fn wider_registers_change_no_bit() -> Result<(), crate::shape::ShapeError> {
+        if !has_avx512() || !std::arch::is_x86_feature_detected!("fma") {
+            return Ok(());
+        }
+        let shape = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.027)?;
+        let constants = Constants::new(&shape, &Pose::IDENTITY);
+        let (mut wider, mut wide) = (Surface::ZERO, Surface::ZERO);
+        for queries in shell(&shape) {
+            // SAFETY: the processor was just found to have AVX-512 (hence AVX2) and FMA.
+            unsafe {
+                closest_avx512(&constants, &queries, &mut wider);
+                closest_avx2(&constants, &queries, &mut wide);
+            }
+            let bits = |found: &Surface<BLOCK>| {
+                [
+                    &found.points.x,
+                    &found.points.y,
+                    &found.points.z,
+                    &found.normals.x,
+                    &found.normals.z,
+                    &found.signed_distance,
+                ]
+                .map(|values| values.map(f32::to_bits))
+            };
+            assert_eq!(bits(&wider), bits(&wide));
+            assert_eq!((wider.doubtful, wider.region), (wide.doubtful, wide.region));
+        }
+        Ok(())
+    }
 }
