@@ -239,7 +239,9 @@ class FrontEnd:
         return in_sensor(pose, self._motion.carried(places, stamp - item.stamp, self.tracker.limb_distances))
 
     def _add_skin(self, item: ColorImage, predicted: Mapping[str, FloatArray], depth: DepthImage | None) -> None:
-        skin = self.skin.setdefault(item.sensor, SkinTracker(self.settings.skin))
+        skin = self.skin.get(item.sensor)
+        if skin is None:
+            skin = self.skin[item.sensor] = SkinTracker(self.settings.skin)
         # The picture is older or newer than the frame: the ray is moved along with its site.
         then = self._predictor.predict(item.stamp)
         body = None

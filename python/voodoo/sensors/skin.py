@@ -349,28 +349,27 @@ class SkinTracker:
         _check_image(image, camera)
         places = self._places(camera, pose, estimate.joints)
         focal = math.sqrt(camera.fx * camera.fy)
-        inside = []
-        near = np.zeros(image.shape[:2], dtype=np.uint8)
+        discs = []
+        away = np.ones(image.shape[:2], dtype=np.uint8)
         for site, (pixel, z) in places.items():
             radius = (FACE_M if site.startswith("head") else PALM_M) * focal / z
             centre = (round(pixel[0]), round(pixel[1]))
             if not (-1e4 < centre[0] < 1e4 and -1e4 < centre[1] < 1e4):
                 continue
-            cv2.circle(near, centre, max(round(2.5 * radius), 2), 1, -1)
+            cv2.circle(away, centre, max(round(2.5 * radius), 2), 0, -1)
             if site in self.assigned or not self.settled:
-                place = np.zeros(image.shape[:2], dtype=np.uint8)
-                cv2.circle(place, centre, max(round(0.8 * radius), 1), 1, -1)
-                inside.append(place.astype(bool))
+                discs.append((centre, max(round(0.8 * radius), 1)))
         self._pictures += 1
-        away = near == 0
+        outside = away.view(np.bool_)
         if self._seen is not None:
-            self._learn_static(self._seen, away if self._before is None else away & ~self._before, rate_hz)
+            self._learn_static(self._seen, outside if self._before is None else outside & ~self._before, rate_hz)
         # Light does not change from picture to picture; learning is the dearest part.
         if self.settled and self._pictures % self.settings.learn_every:
             return
+        inside = [cv2.circle(np.zeros_like(away), *disc, 1, -1).view(np.bool_) for disc in discs]
         known = self._colours
         colours = known[1] if known is not None and known[0] is image else Colours.of(image)
-        if self.colour.learn(colours, inside, outside=away, body=self._body):
+        if self.colour.learn(colours, inside, outside=outside, body=self._body):
             self._learnt += 1
 
     def _learn_static(self, seen: Mask, away: Mask, rate_hz: float) -> None:
