@@ -173,10 +173,10 @@ class Camera:
     def _distorted(self, xy: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Pixels (N, 2) of normalized coordinates (N, 2)."""
         if not self.distorted:
-            pixels = np.empty_like(xy)
+            flat = np.empty_like(xy)
             for axis, (focal, centre) in enumerate(((self.fx, self.cx), (self.fy, self.cy))):
-                pixels[:, axis] = xy[:, axis] * focal + centre
-            return pixels
+                flat[:, axis] = xy[:, axis] * focal + centre
+            return flat
         points = np.column_stack([xy, np.ones(len(xy))])[:, None, :]
         zero = np.zeros(3)
         if self.model == "equidistant":

@@ -87,7 +87,7 @@ class Blob:
             velocity = (sight.place - self.sight.place) / elapsed
             if not (sight.deep and self.sight.deep):
                 velocity = velocity - sight.direction * float(velocity @ sight.direction)
-            if float(np.linalg.norm(velocity)) < FASTEST:
+            if math.hypot(*velocity.tolist()) < FASTEST:
                 self.velocity = 0.5 * self.velocity + 0.5 * velocity
         self.sight, self.stamp = sight, stamp
         self.count += 1
@@ -204,7 +204,7 @@ class Blobs:
                         for other in range(len(seen))
                         if able[other]
                         and seen[other].label is None
-                        and float(np.linalg.norm(seen[other].sight.place - blob.sight.place)) > SAME_M
+                        and math.dist(seen[other].sight.place, blob.sight.place) > SAME_M
                     ]
                     if min(rivals, default=np.inf) >= max(ambiguity * near, 0.5 * gate):
                         cost[row, column] = DRIFTED * (near / reach) ** 2

@@ -7,7 +7,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from statistics import median
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -279,7 +279,7 @@ def _behind_edges(nearest: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
         unknown.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3, labelType=cv2.DIST_LABEL_PIXEL
     )
     # Known pixels are numbered row by row, from 1.
-    z = np.concatenate([np.zeros(1, np.float32), nearest[~unknown]]).take(labels)
+    z = np.concatenate([np.zeros(1, np.float32), nearest[~unknown]]).take(np.asarray(labels, dtype=np.int32))
     return np.asarray(z > cv2.erode(z, _AROUND) + _EDGE_M)
 
 

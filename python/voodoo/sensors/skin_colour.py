@@ -53,7 +53,7 @@ class Colours:
     def among(self, table: Mask) -> ByteImage:
         """(H, W): 1 where a picture is lit and its colour is one of a histogram's bins."""
         # Without the wrapper the last axis of an array would be taken for channels.
-        bins = cv2.Mat(table.astype(np.float32), wrap_channels=False)
+        bins = cv2.Mat(table.astype(np.float32), wrap_channels=False)  # type: ignore[no-untyped-call]
         found = np.asarray(cv2.calcBackProject(self.planes, [0, 1, 2], bins, _RANGES, 1.0), dtype=np.uint8)
         return found & self.lit
 

@@ -10,8 +10,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
-from voodoo.sensors.pixels import FloatArray
-
 Mask = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.int32]
 
@@ -55,9 +53,11 @@ def joined(skin: Mask, *, palm_px: float) -> Mask:
     size = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     small = size <= 3.0 * palm_px
     small[0] = False
-    closed = cv2.morphologyEx(small[labels].view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    closed = cv2.morphologyEx(
+        small.take(np.asarray(labels, dtype=np.int32)).view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)
+    )
     result = skin.copy()
-    result[window] |= closed.astype(bool)
+    result[window] |= closed.view(np.bool_)
     return result
 
 
@@ -114,19 +114,19 @@ def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
     outline = max(contours, key=len).reshape(-1, 2).astype(np.float64)
     rows, columns = np.nonzero(mask)
     pixels = np.column_stack([columns, rows]).astype(np.float64)
-    distance = np.linalg.norm(outline - pixels.mean(axis=0), axis=1)
+    distance = np.hypot(*(outline - pixels.mean(axis=0)).T)
     # A tip is farther out than all of the contour around it.
     peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
+    peaks = np.flatnonzero(peak & (distance >= 1.5 * palm_px))
     tips: list[tuple[float, float]] = []
-    taken: list[FloatArray] = []
-    for index in np.argsort(-distance, kind="stable"):
-        if len(tips) == 4 or distance[index] < 1.5 * palm_px:
+    taken: list[list[float]] = []
+    for tip in outline[peaks[np.argsort(-distance[peaks], kind="stable")]].tolist():
+        if len(tips) == 4:
             break
-        tip = outline[index]
-        if not peak[index] or any(float(np.linalg.norm(tip - other)) < 3.0 * palm_px for other in taken):
+        if any(math.dist(tip, other) < 3.0 * palm_px for other in taken):
             continue
         taken.append(tip)
-        near = pixels[np.linalg.norm(pixels - tip, axis=1) < 3.2 * palm_px]
+        near = pixels[np.hypot(*(pixels - tip).T) < 3.2 * palm_px]
         u, v = near.mean(axis=0)
         tips.append((float(u), float(v)))
     return tips
