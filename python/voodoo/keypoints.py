@@ -106,15 +106,19 @@ def site_pixels(
     if rows.shape != (table.count, 3):
         raise MeasurementError(f"keypoints: expected shape ({table.count}, 3) for {layout}, found {rows.shape}")
     values: list[list[float]] = rows.tolist()
-    finite = np.asarray(np.isfinite(rows).all(axis=1)).tolist()
     seen, unseen = [], []
     for part in table.parts:
-        confidence = min(values[index][2] for index in part.shares)
-        if not all(finite[index] for index in part.shares) or confidence < min_confidence or confidence <= 0.0:
+        u = v = total = 0.0
+        confidence = 1.0
+        for index, share in part.shares.items():
+            column, row, believed = values[index]
+            u, v, total = u + share * column, v + share * row, total + believed
+            confidence = min(confidence, believed)
+        # What is not finite anywhere is not in the sums.
+        if not math.isfinite(u + v + total) or confidence < min_confidence or confidence <= 0.0:
             unseen.append(part.site)
-            continue
-        u, v = (sum(share * values[index][axis] for index, share in part.shares.items()) for axis in (0, 1))
-        seen.append(SitePixel(part.site, (u, v), min(confidence, 1.0), part.spread))
+        else:
+            seen.append(SitePixel(part.site, (u, v), confidence, part.spread))
     return seen, unseen
 
 

@@ -157,11 +157,10 @@ class BodyView:
 
     def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
         """Values (N,) of the picture (H, W) at the points, -1 outside."""
-        u, v = np.rint(self.pixels.T).astype(np.intp)
+        u, v = np.rint(self.pixels).astype(np.intp).T
         inside = (u >= 0) & (v >= 0) & (u < image.shape[1]) & (v < image.shape[0])
-        values = np.full(len(u), -1, dtype=np.int32)
-        values[inside] = image[v[inside], u[inside]]
-        return values
+        place = np.where(inside, v * image.shape[1] + u, 0)
+        return np.where(inside, image.take(place), np.int32(-1))
 
 
 class StillDepth:
@@ -263,7 +262,10 @@ def body_view(
     for image in (grown, before):
         if image is not None:
             image[window] &= ~edges
-    return BodyView(grown, pixels[inside], points[inside, 2], None if still is None else still[inside], before)
+    depths = points[:, 2]
+    if len(inside) < len(points):
+        pixels, depths, still = pixels[inside], depths[inside], None if still is None else still[inside]
+    return BodyView(grown, pixels, depths, still, before)
 
 
 def _behind_edges(nearest: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:

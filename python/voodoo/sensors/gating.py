@@ -88,7 +88,7 @@ class SitePredictor:
     def update(self, stamp: float, joints: Mapping[str, npt.NDArray[np.float64]]) -> None:
         """Take up an estimate; a NaN stamp (after a reset) forgets the velocity."""
         names = tuple(joints)
-        positions = np.array([joints[name] for name in names], dtype=np.float64).reshape(-1, 3)
+        positions = np.array(list(joints.values()), dtype=np.float64).reshape(-1, 3)
         velocity = np.zeros_like(positions)
         if stamp > self._stamp:
             before = self._positions

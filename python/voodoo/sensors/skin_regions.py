@@ -111,13 +111,12 @@ def _length(mask: Mask) -> float:
 def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
     """Middles of the parts of a region around its tips, farthest first, at most four."""
     contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    outline = max(contours, key=len).reshape(-1, 2).astype(np.float64)
-    rows, columns = np.nonzero(mask)
-    pixels = np.column_stack([columns, rows]).astype(np.float64)
-    distance = np.hypot(*(outline - pixels.mean(axis=0)).T)
+    outline = max(contours, key=len).reshape(-1, 2)
+    v, u = np.nonzero(mask)
+    distance = (outline[:, 0] - u.mean()) ** 2 + (outline[:, 1] - v.mean()) ** 2
     # A tip is farther out than all of the contour around it.
     peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
-    peaks = np.flatnonzero(peak & (distance >= 1.5 * palm_px))
+    peaks = np.flatnonzero(peak & (distance >= (1.5 * palm_px) ** 2))
     tips: list[tuple[float, float]] = []
     taken: list[list[float]] = []
     for tip in outline[peaks[np.argsort(-distance[peaks], kind="stable")]].tolist():
@@ -126,7 +125,6 @@ def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
         if any(math.dist(tip, other) < 3.0 * palm_px for other in taken):
             continue
         taken.append(tip)
-        near = pixels[np.hypot(*(pixels - tip).T) < 3.2 * palm_px]
-        u, v = near.mean(axis=0)
-        tips.append((float(u), float(v)))
+        near = (u - tip[0]) ** 2 + (v - tip[1]) ** 2 < (3.2 * palm_px) ** 2
+        tips.append((float(u[near].mean()), float(v[near].mean())))
     return tips
