@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 from typing import TypeAlias
 
 import numpy as np
@@ -349,8 +350,8 @@ def nearest_person(
         if not seen:
             continue
         pixels = camera.project(in_sensor(pose, [predicted[item.site] for item in seen]))
-        distance = np.linalg.norm(pixels - [item.pixel for item in seen], axis=1)
-        distance = distance[np.isfinite(distance)]
-        if len(distance) and float(np.median(distance)) < least:
-            best, least = person, float(np.median(distance))
+        distance = np.hypot(*(pixels - [item.pixel for item in seen]).T)
+        distances = distance[np.isfinite(distance)].tolist()
+        if distances and (middle := median(distances)) < least:
+            best, least = person, middle
     return best

@@ -308,13 +308,15 @@ def _beyond(
     """(H, W) of the colour image: True where the depth camera does not look, at the distance of the body."""
     z = max(median(in_sensor(world_from_depth, places)[:, 2].tolist()), 0.1)
     right, bottom = depth_camera.width - 1, depth_camera.height - 1
-    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]].astype(np.float64)
-    corners = np.column_stack([rays * z, np.full(4, z)]) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
+    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]]
+    corners = np.ones((4, 3))
+    corners[:, :2] = rays
+    corners = (z * corners) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
     outline = color_camera.project(in_sensor(world_from_color, corners))
     # The corners are the centres of the outermost pixels.
     middle = outline.mean(axis=0)
     outline = middle + (outline - middle) * (1.0 + 4.0 / min(depth_camera.width, depth_camera.height))
     away = np.ones((color_camera.height, color_camera.width), dtype=np.uint8)
     if np.isfinite(outline).all():
-        cv2.fillConvexPoly(away, np.clip(np.round(outline), -9999, 9999).astype(np.int32), 0)
+        cv2.fillConvexPoly(away, outline.round().clip(-9999, 9999).astype(np.int32), 0)
     return away.view(np.bool_)
