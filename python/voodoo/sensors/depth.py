@@ -150,8 +150,8 @@ class BodyView:
     def _near(
         self, pixel: tuple[float, float], radius: float, among: npt.NDArray[np.intp] | None
     ) -> npt.NDArray[np.intp]:
-        pixels = self.pixels if among is None else self.pixels[among]
-        u, v = pixels[:, 0] - pixel[0], pixels[:, 1] - pixel[1]
+        u, v = (self.pixels[:, axis] if among is None else self.pixels[among, axis] for axis in (0, 1))
+        u, v = u - pixel[0], v - pixel[1]
         inside = np.flatnonzero(u * u + v * v < radius**2)
         return inside if among is None else among[inside]
 

@@ -38,13 +38,14 @@ def elsewhere(
     """(S, B): whether a sight is the surface of a limb other than a hand's own forearm, of a bare one if that is lost."""
     result = np.zeros((len(sites), len(sights)), dtype=np.bool_)
     deep = np.array([sight.deep for sight in sights])
+    away = np.array(list(limbs.values()))
     for row, site in enumerate(sites):
-        own = [name for name in limbs if name.startswith(site[0]) and name.endswith(("forearm", "hand"))]
-        if not own or site.startswith("head"):
+        own = np.array([name.startswith(site[0]) and name.endswith(("forearm", "hand")) for name in limbs])
+        if not own.any() or site.startswith("head"):
             continue
-        names = [name for name in limbs if name not in own and (site not in lost or name.endswith(BARE))]
-        others = np.min([limbs[name] for name in names], axis=0, initial=np.inf)
-        own_away = np.min([limbs[name] for name in own], axis=0)
+        rest = ~own & [site not in lost or name.endswith(BARE) for name in limbs]
+        others = away[rest].min(axis=0, initial=np.inf)
+        own_away = away[own].min(axis=0)
         result[row] = deep & (others < ON_LIMB_M) & (own_away > others + OFF_LIMB_M)
     return result
 

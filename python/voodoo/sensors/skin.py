@@ -276,14 +276,15 @@ class SkinTracker:
         forearm is lost may also hang before trunk or legs: those have no skin to show.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
-        away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
+        distances = np.array(list(limbs.values())) if limbs else np.zeros((1, len(sights)))
+        away = distances.min(axis=0)
         outside = away > self.settings.unexplained
         places = np.array([sight.place for sight in sights])
         deep, hand = (np.array([getattr(sight, name) for sight in sights]) for name in ("deep", "hand"))
         free = ~specks & deep & [sight.region not in owned for sight in sights]
         scene = np.array([sight.still for sight in sights]) & outside
-        bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]
-        dressed = ((np.min(bare, axis=0) if bare else away) > BARE_M) & (away > STANDS_OUT_M)
+        bare = [row for row, name in enumerate(limbs) if name.endswith(BARE)]
+        dressed = ((distances[bare].min(axis=0) if bare else away) > BARE_M) & (away > STANDS_OUT_M)
         far = np.array([free & (outside | (dressed if site in lost else False)) for site in sites])
         allowed = np.where(scene, 0.0, 1.0 + far)
         for row, site in enumerate(sites):
