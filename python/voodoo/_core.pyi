@@ -17,6 +17,7 @@ __all__ = [
     "View",
     "__version__",
     "config_fields",
+    "nearest_surface",
     "points_within",
     "render_depth",
     "splat",
@@ -102,6 +103,29 @@ def splat(
     Returns:
         (height, width) 1 where points are; the same of the marked ones; which lie in the picture; and, from the pixel (row,
         column) on, the depth of the nearest one in each, infinite where none is.
+
+    Raises:
+        MeasurementError: other shapes.
+    """
+
+def nearest_surface(
+    pixels: npt.NDArray[np.float64],
+    depths: npt.NDArray[np.float64],
+    still: npt.NDArray[np.bool_] | None,
+    *,
+    pixel: tuple[float, float],
+    radius: float,
+    among: npt.NDArray[np.bool_] | None = None,
+) -> tuple[float, bool] | None:
+    """Depth [m] of the nearest surface around a place in a picture, and whether most of it is still; None with less than three
+    points there. Where three of the points `among` are there, only those count.
+
+    Args:
+        pixels, depths: (N, 2) and (N,) [m], what was measured.
+        still: (N,) which may be the still scene; None: not known.
+        pixel: the place.
+        radius: [px].
+        among: (N,).
 
     Raises:
         MeasurementError: other shapes.

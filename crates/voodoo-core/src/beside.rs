@@ -157,3 +157,59 @@ impl Splats {
         Ok(Self { seen, marked, inside, rows, columns, nearest })
     }
 }
+
+/// Places of a picture, and what was measured there.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured<'a> {
+    /// Columns and rows.
+    pub places: &'a [[f64; 2]],
+    /// Depths, metres.
+    pub depths: &'a [f64],
+    /// Which may be the still scene.
+    pub still: Option<&'a [bool]>,
+}
+
+/// Surfaces farther behind the nearest one than this are others, metres.
+const ONE_SURFACE: f64 = 0.1;
+
+impl Measured<'_> {
+    /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
+    /// three points there. Where three of the points `among` are there, only those count.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when there are not as many depths, or marks, as places.
+    pub fn surface(
+        &self,
+        place: [f64; 2],
+        radius: f64,
+        among: Option<&[bool]>,
+    ) -> Result<Option<(f64, bool)>, TrackError> {
+        let count = self.places.len();
+        let marks = [self.still, among];
+        if self.depths.len() != count || marks.iter().flatten().any(|marks| marks.len() != count) {
+            let found = format!("{} depths, {:?} marks", self.depths.len(), marks.map(|marks| marks.map(<[_]>::len)));
+            return Err(TrackError::measurement("depths", "as many depths, and marks, as pixels", found));
+        }
+        let (mut near, mut chosen) = (Vec::new(), Vec::new());
+        for (index, other) in self.places.iter().enumerate() {
+            let (u, v) = (other[0] - place[0], other[1] - place[1]);
+            if u * u + v * v < radius * radius {
+                near.push(index);
+                if among.is_some_and(|among| among[index]) {
+                    chosen.push(index);
+                }
+            }
+        }
+        if chosen.len() >= 3 {
+            near = chosen;
+        }
+        if near.len() < 3 {
+            return Ok(None);
+        }
+        near.sort_unstable_by(|a, b| self.depths[*a].total_cmp(&self.depths[*b]));
+        let fifth = self.depths[near[(near.len() - 1) / 5]];
+        near.retain(|index| (self.depths[*index] - fifth).abs() < ONE_SURFACE);
+        let still = self.still.map_or(0, |still| near.iter().filter(|index| still[**index]).count());
+        Ok(near.get(near.len() / 2).map(|middle| (self.depths[*middle], 2 * still > near.len())))
+    }
+}

@@ -4,7 +4,7 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use voodoo_core::beside::{Splats, Window};
+use voodoo_core::beside::{Measured, Splats, Window};
 
 use crate::errors::{IntoPy, exception};
 
@@ -62,17 +62,10 @@ pub fn splat<'py>(
     height: usize,
     width: usize,
 ) -> PyResult<Splatted<'py>> {
-    let columns = [(&pixels, 2), (&points, 3)];
-    if let Some((array, count)) = columns.into_iter().find(|(array, count)| array.dims()[1] != *count) {
-        let shape = array.dims();
-        let text = format!("points: expected shape (N, {count}), found ({}, {})", shape[0], shape[1]);
-        return Err(exception(py, "MeasurementError", text));
-    }
+    columns(py, "pixels", &pixels, 2)?;
+    columns(py, "points", &points, 3)?;
     let (places, points) = (pixels.as_slice()?.as_chunks().0, points.as_slice()?.as_chunks().0);
-    let marks = match &marks {
-        Some(marks) => Some(marks.as_slice()?),
-        None => None,
-    };
+    let marks = marks.as_ref().map(|marks| marks.as_slice()).transpose()?;
     let found = py.detach(|| Splats::new(places, points, marks, [height, width]));
     let Splats { seen, marked, inside, rows, columns, nearest } = found.map_err(|error| error.into_py(py))?;
     let marked = match marks {
@@ -86,4 +79,32 @@ pub fn splat<'py>(
         (rows.start, columns.start),
         PyArray1::from_vec(py, nearest).reshape([rows.len(), columns.len()])?,
     ))
+}
+
+/// Depth of the nearest surface around a place in a picture and whether most of it is still; none with too few points.
+#[pyfunction]
+#[pyo3(signature = (pixels, depths, still, *, pixel, radius, among=None))]
+pub fn nearest_surface<'py>(
+    py: Python<'py>,
+    pixels: PyReadonlyArray2<'py, f64>,
+    depths: PyReadonlyArray1<'py, f64>,
+    still: Option<PyReadonlyArray1<'py, bool>>,
+    pixel: [f64; 2],
+    radius: f64,
+    among: Option<PyReadonlyArray1<'py, bool>>,
+) -> PyResult<Option<(f64, bool)>> {
+    columns(py, "pixels", &pixels, 2)?;
+    let still = still.as_ref().map(|marks| marks.as_slice()).transpose()?;
+    let among = among.as_ref().map(|marks| marks.as_slice()).transpose()?;
+    let measured = Measured { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
+    measured.surface(pixel, radius, among).map_err(|error| error.into_py(py))
+}
+
+fn columns(py: Python<'_>, name: &str, array: &PyReadonlyArray2<'_, f64>, count: usize) -> PyResult<()> {
+    let shape = array.dims();
+    if shape[1] == count {
+        return Ok(());
+    }
+    let text = format!("{name}: expected shape (N, {count}), found ({}, {})", shape[0], shape[1]);
+    Err(exception(py, "MeasurementError", text))
 }

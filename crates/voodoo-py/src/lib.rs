@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::beside::{points_within, splat};
+    use super::beside::{nearest_surface, points_within, splat};
     #[pymodule_export]
     use super::body::PyBody;
     #[pymodule_export]

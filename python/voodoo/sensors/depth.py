@@ -134,26 +134,7 @@ class BodyView:
     ) -> tuple[float, bool] | None:
         """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
         less than three points there. Where three of the points `among` (N,) are there, only those count."""
-        near = self._near(pixel, radius, None if among is None else np.flatnonzero(among))
-        if len(near) < 3 and among is not None:
-            near = self._near(pixel, radius, None)
-        if len(near) < 3:
-            return None
-        depths = self.depths[near]
-        fifth = (len(near) - 1) // 5
-        surface = np.abs(depths - np.partition(depths, fifth)[fifth]) < 0.1
-        depths = depths[surface]
-        still = self.still is not None and 2 * int(np.count_nonzero(self.still[near][surface])) > len(depths)
-        half = len(depths) // 2
-        return float(np.partition(depths, half)[half]), still
-
-    def _near(
-        self, pixel: tuple[float, float], radius: float, among: npt.NDArray[np.intp] | None
-    ) -> npt.NDArray[np.intp]:
-        u, v = (self.pixels[:, axis] if among is None else self.pixels[among, axis] for axis in (0, 1))
-        u, v = u - pixel[0], v - pixel[1]
-        inside = np.flatnonzero(u * u + v * v < radius**2)
-        return inside if among is None else among[inside]
+        return _core.nearest_surface(self.pixels, self.depths, self.still, pixel=pixel, radius=radius, among=among)
 
     def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
         """Values (N,) of the picture (H, W) at the points, -1 outside."""
@@ -262,7 +243,7 @@ def body_view(
     for image in (grown, before):
         if image is not None:
             image[window] &= ~edges
-    depths = points[:, 2]
+    depths = points[:, 2].copy()
     if len(inside) < len(points):
         pixels, depths, still = pixels[inside], depths[inside], None if still is None else still[inside]
     return BodyView(grown, pixels, depths, still, before)
