@@ -66,8 +66,6 @@ pub struct Tracker {
     /// Arms and legs.
     chains: Vec<TwoBone>,
     judgement: Judgement,
-    /// For how many frames each of them has explained little of its own.
-    idle: Vec<usize>,
     estimate: Estimate,
 }
 
@@ -109,7 +107,6 @@ impl Tracker {
             change: Vec::new(),
             chains: Vec::new(),
             judgement: Judgement::default(),
-            idle: Vec::new(),
             estimate: Estimate::default(),
         })
     }
@@ -388,6 +385,7 @@ impl Tracker {
 
 mod changes;
 mod distances;
+mod doubt;
 mod hypotheses;
 mod named;
 mod report;

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::Tracker;
+use super::doubt::Doubt;
 use crate::correspondence::Correspondences;
 use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, Visibility, look};
@@ -16,9 +17,6 @@ const SUSPICIOUS: f64 = 25.0;
 /// So many near an arm make it suspect whatever else speaks for it, unless a larger share of the whole frame is unexplained.
 const STRIKING: f64 = 40.0;
 const CLUTTER: f64 = 0.15;
-/// After so many refusals in a row a chain is tried in every `REST`th frame only: a hidden arm is refused for seconds.
-const TIRED: usize = 30;
-const REST: usize = 4;
 /// A chain is idle when the patches that it alone explains are a smaller share of those it shows.
 const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
@@ -71,23 +69,18 @@ pub(super) struct Hypotheses {
     matched: Correspondences,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
-    /// How often each chain was refused a change since it was in order.
-    refused: Vec<usize>,
-    /// Chains of which the last frame asked for a change.
-    proposed: Vec<bool>,
+    /// What past frames said against each chain.
+    doubts: Vec<Doubt>,
 }
 
 impl Tracker {
     pub(super) fn prepare_hypotheses(&mut self) {
         self.chains = TwoBone::of(&self.body);
-        self.idle = vec![0; self.chains.len()];
         let work = &mut self.hypotheses;
         work.ends.clear();
         work.ends.resize(self.chains.len(), None);
-        work.refused.clear();
-        work.refused.resize(self.chains.len(), 0);
-        work.proposed.clear();
-        work.proposed.resize(self.chains.len(), false);
+        work.doubts.clear();
+        work.doubts.resize(self.chains.len(), Doubt::default());
         // Room at once, not when the first hard frame comes.
         for poses in [&mut work.trial, &mut work.kept, &mut work.at_rest, &mut work.kept_predicted] {
             poses.clear();
@@ -175,16 +168,8 @@ impl Tracker {
         // Furniture stays open beside legs; nothing else than the arm is expected about an arm.
         let striking = !chain.leg && !work.cluttered && open >= STRIKING;
         let suspect = open >= SUSPICIOUS && self.suspect(chain, views, work) != [false; 2];
-        if !suspect && !striking {
-            self.idle[index] = 0;
-            work.proposed[index] = false;
-            work.refused[index] = 0;
-            return 0;
-        }
-        self.idle[index] += 1;
-        work.refused[index] += 1;
-        let tired = work.refused[index] > TIRED && !work.refused[index].is_multiple_of(REST);
-        if self.idle[index] < (if suspect { PATIENCE } else { LONG_PATIENCE }) || tired {
+        let patience = if suspect { Some(PATIENCE) } else { striking.then_some(LONG_PATIENCE) };
+        if !work.doubts[index].due(patience) {
             return 0;
         }
         let targets = targets(&work.near, &work.near_weight, root, &mut work.best);
@@ -253,28 +238,18 @@ impl Tracker {
             }
         }
         work.others = others;
-        let proposed = std::mem::take(&mut work.proposed[index]);
         let tried = [(rested, std::mem::take(&mut work.at_rest)), (least < enough, std::mem::take(&mut work.kept))];
         let mut steps = 0;
         for (_, poses) in tried.iter().filter(|(found, _)| *found) {
-            if !work.proposed[index] {
+            if !work.doubts[index].asks() {
                 steps += REFINE;
-                if self.refine(index, frame, pace, poses, work) {
-                    self.take_seconded(index, proposed, work);
+                if self.refine(index, frame, pace, poses, work) && !work.doubts[index].ask() {
+                    self.take_back(work);
                 }
             }
         }
         [(_, work.at_rest), (_, work.kept)] = tried;
         steps
-    }
-
-    /// A change of a chain is made when two frames in a row ask for one: a single frame may be disturbed.
-    fn take_seconded(&mut self, index: usize, proposed: bool, work: &mut Hypotheses) {
-        work.proposed[index] = true;
-        work.refused[index] = 0;
-        if !proposed {
-            self.take_back(work);
-        }
     }
 
     /// The poses from before the hypothesis, and what was matched there.
@@ -291,7 +266,7 @@ impl Tracker {
         }
         let measured = |limb: usize| self.estimate.limb_status[limb] == LimbStatus::Measured;
         for (index, chain) in self.chains.iter().enumerate() {
-            if self.idle[index] == 0 && chain.limbs().all(measured) {
+            if self.hypotheses.doubts[index].none() && chain.limbs().all(measured) {
                 self.hypotheses.ends[index] = Some(chain.end(&self.poses) + self.origin);
             }
         }
