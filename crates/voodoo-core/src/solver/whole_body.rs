@@ -63,6 +63,10 @@ impl Solver for WholeBody {
     }
 
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
+        // What may always be off, and pulls, holds limbs where their points are not: no frame to learn lengths from.
+        if problem.correspondences.sites.iter().any(|pair| pair.bias > 0.0 && pair.weight > 0.0) {
+            return false;
+        }
         self.sum_terms(problem, poses);
         let Self { normal, chain, lengths, .. } = self;
         chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
