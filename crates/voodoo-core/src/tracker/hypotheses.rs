@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::Tracker;
+use crate::correspondence::Correspondences;
 use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, Visibility, look};
 use crate::frame::Frame;
@@ -66,6 +67,8 @@ pub(super) struct Hypotheses {
     kept: Vec<Pose>,
     at_rest: Vec<Pose>,
     kept_predicted: Vec<Pose>,
+    /// What was matched before the hypothesis.
+    matched: Correspondences,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
     /// How often each chain was refused a change since it was in order.
@@ -128,6 +131,7 @@ impl Tracker {
         work.own_weight.reserve(most);
         work.others.reserve(most);
         work.distances.reserve(most);
+        work.matched.reserve_as(&self.correspondences);
         work.best.clear();
         work.best.resize(self.candidates.len(), f32::INFINITY);
         for matches in &self.correspondences.limbs {
@@ -193,7 +197,13 @@ impl Tracker {
         thin(&mut work.near, &mut work.near_weight, SAMPLE);
         self.distances_to_others(chain, &work.near, &mut work.others, &mut work.best);
         let others = std::mem::take(&mut work.others);
-        let score = |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, distances: &mut Vec<f32>| {
+        // No part of the cost is negative: what cannot fall below `least` any more is not looked at further.
+        let score = |poses: &[Pose],
+                     least: f64,
+                     near: &Points,
+                     weights: &[f64],
+                     best: &mut Vec<f32>,
+                     distances: &mut Vec<f32>| {
             best.clone_from(&others);
             for limb in chain.limbs() {
                 self.body.limbs()[limb].shape.approximate_distances(&poses[limb], near, distances);
@@ -203,9 +213,14 @@ impl Tracker {
             }
             let points: f64 =
                 best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum();
-            points + look(poses).cost() + self.strain(chain, poses)
+            if points >= least {
+                return points;
+            }
+            let seen = points + look(poses).cost();
+            if seen >= least { seen } else { seen + self.strain(chain, poses) }
         };
-        let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
+        let current =
+            score(&self.poses, f64::INFINITY, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
         let enough = current - GAIN;
         let Hypotheses { near, near_weight, best, distances, trial, kept, at_rest, .. } = work;
         // The best way to end at a place that costs less than `least`, into `kept`; returns its cost.
@@ -213,7 +228,7 @@ impl Tracker {
             for swivel in 0..ways {
                 trial.clone_from(&self.poses);
                 chain.point_at(&self.body, trial, target, TAU * swivel as f64 / ways as f64);
-                let cost = score(trial, near, near_weight, best, distances);
+                let cost = score(trial, least, near, near_weight, best, distances);
                 if cost < least {
                     least = cost;
                     kept.clone_from(trial);
@@ -231,7 +246,7 @@ impl Tracker {
             // Where the chain was a frame ago, carried by its parent.
             trial.clone_from(&self.poses);
             carry(chain, &self.body, &self.previous, trial);
-            let cost = score(trial, near, near_weight, best, distances);
+            let cost = score(trial, least, near, near_weight, best, distances);
             if cost < least {
                 least = cost;
                 kept.clone_from(trial);
@@ -245,7 +260,7 @@ impl Tracker {
             if !work.proposed[index] {
                 steps += REFINE;
                 if self.refine(index, frame, pace, poses, work) {
-                    self.take_seconded(index, frame, proposed, work);
+                    self.take_seconded(index, proposed, work);
                 }
             }
         }
@@ -254,19 +269,19 @@ impl Tracker {
     }
 
     /// A change of a chain is made when two frames in a row ask for one: a single frame may be disturbed.
-    fn take_seconded(&mut self, index: usize, frame: &Frame, proposed: bool, work: &mut Hypotheses) {
+    fn take_seconded(&mut self, index: usize, proposed: bool, work: &mut Hypotheses) {
         work.proposed[index] = true;
         work.refused[index] = 0;
         if !proposed {
-            self.take_back(frame, work);
+            self.take_back(work);
         }
     }
 
-    /// The poses from before the hypothesis.
-    fn take_back(&mut self, frame: &Frame, work: &mut Hypotheses) {
+    /// The poses from before the hypothesis, and what was matched there.
+    fn take_back(&mut self, work: &mut Hypotheses) {
         self.poses.clone_from(&work.trial);
         self.predicted.clone_from(&work.kept_predicted);
-        self.match_last(frame);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
     }
 
     /// Remembers where the chains end that this frame proves right; a lost body has been anywhere.
@@ -346,6 +361,7 @@ impl Tracker {
         // The prediction spoke for the old configuration; the new one is what is expected now.
         work.kept_predicted.clone_from(&self.predicted);
         self.predicted.clone_from(hypothesis);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
         let last = self.config.max_steps;
         for step in 0..REFINE {
             self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
@@ -359,7 +375,7 @@ impl Tracker {
                 return true;
             }
         }
-        self.take_back(frame, work);
+        self.take_back(work);
         false
     }
 }
