@@ -267,6 +267,7 @@ class FrontEnd:
             surface=self._limb_distances,
             lost=self._hands(skin.settings.sites, "forearm", measured=False) if depth is not None else (),
             held=self._hands(skin.settings.sites, "upperarm", measured=True) if depth is not None else (),
+            shown=self._shown(skin.settings.sites) if depth is not None else (),
             source=item.sensor,
         )
         self.rays += [ray.moved(predicted[ray.site] - then[ray.site]) for ray in rays]
@@ -276,6 +277,11 @@ class FrontEnd:
         status = self.tracker.estimate.limb_status
         known = {site: status.get(f"{site[:2]}{limb}") for site in sites}
         return {site for site, value in known.items() if value is not None and (value == "measured") == measured}
+
+    def _shown(self, sites: Iterable[str]) -> set[str]:
+        """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
+        measured = self.tracker.estimate.limb_status.get("head") == "measured"
+        return {site for site in sites if measured and site.startswith("head")}
 
     def _limb_distances(self, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
         return dict(zip(self.tracker.estimate.limb_names, self.tracker.limb_distances(places), strict=True))

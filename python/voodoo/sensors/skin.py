@@ -62,6 +62,8 @@ class SkinSettings:
     Args:
         sites: site -> how far [m] a region's middle may always be from it, see `SiteRay.bias`. A face is the front of the
             head.
+        shown_bias: the same while a depth camera shows the site's limb: a face is always to the same side of the head's
+            middle, and would pull for ever at a head that is where it was seen.
         gate: a new region farther than this from the predicted site is not it [m]; one that has its name keeps it.
         lost_gate: see gate_growth [m].
         gate_growth: a gate grows by this while its site is not seen [m/s], up to `lost_gate`, or to `widest_gate` for a
@@ -81,6 +83,7 @@ class SkinSettings:
     sites: Mapping[str, float] = field(
         default_factory=lambda: {"head_center": 0.06, "l_hand": 0.06, "r_hand": 0.06},
     )
+    shown_bias: Mapping[str, float] = field(default_factory=lambda: {"head_center": 0.12})
     gate: float = 0.12
     lost_gate: float = 0.35
     gate_growth: float = 1.0
@@ -95,6 +98,7 @@ class SkinSettings:
     def __post_init__(self) -> None:
         """Check the numbers."""
         numbers = {"gate": self.gate, "lost_gate": self.lost_gate, "static_seconds": self.static_seconds, **self.sites}
+        numbers |= {f"shown_bias {site}": bias for site, bias in self.shown_bias.items()}
         numbers |= {"gate_growth": self.gate_growth, "widest_gate": self.widest_gate, "unexplained": self.unexplained}
         numbers["learn_every"] = float(self.learn_every)
         for name, value in numbers.items():
@@ -144,6 +148,7 @@ class SkinTracker:
         surface: Surface | None = None,
         lost: Collection[str] = (),
         held: Collection[str] = (),
+        shown: Collection[str] = (),
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -160,6 +165,7 @@ class SkinTracker:
                 `Tracker.limb_distances`.
             lost: sites whose limb the other sensors do not show where the body has it.
             held: sites whose upper arm they do show there: its hand is a forearm away from that elbow.
+            shown: sites whose own limb they show there, see `SkinSettings.shown_bias`.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -252,6 +258,8 @@ class SkinTracker:
                 place = of_pieces(place, list(inside[row, able]), predicted[site])
                 direction = (place - origin) / float(np.linalg.norm(place - origin))
             bias = self.settings.sites[site]
+            if site in shown:
+                bias = max(bias, self.settings.shown_bias.get(site, bias))
             ray = SiteRay(site, origin, direction, across, source, bias=bias, place=place)
             rays.append(ray.moved(to_palm(site, predicted)))
         return rays
