@@ -210,7 +210,8 @@ impl Tracker {
             } else {
                 self.match_again(frame, steps);
             }
-            let distance = self.solve(pace, steps);
+            let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+            self.solve(pace, steps);
             steps += 1;
             if (previous - distance).abs() < self.config.min_change {
                 break;
@@ -313,15 +314,14 @@ impl Tracker {
         }
     }
 
-    /// One ICP step (2-7); returns the mean squared distance it started from.
-    fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) -> f64 {
+    /// One ICP step (2-7).
+    fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) {
         self.match_all(frame, step);
-        self.solve(pace, step)
+        self.solve(pace, step);
     }
 
-    /// Moves the body to what was matched; returns the mean squared distance before.
-    fn solve(&mut self, pace: f64, step: usize) -> f64 {
-        let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+    /// Moves the body to what was matched.
+    fn solve(&mut self, pace: f64, step: usize) {
         // 6 Elastic bands on both limbs.
         if self.solver.reads_bands() {
             self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
@@ -329,7 +329,6 @@ impl Tracker {
         // 7 Fit the model.
         let Self { body, correspondences, predicted, config, solver, poses, .. } = self;
         solver.solve(&Problem { body, correspondences, predicted, step, pace, config }, poses);
-        distance
     }
 
     /// Sets the predicted poses, and the current ones to them where the solver wants it; the current ones become the previous.
@@ -371,7 +370,7 @@ impl Tracker {
             if assigned {
                 assignment.sample_limb(index, candidates, config, matches);
             }
-            match_limb(&body.limbs()[index], &poses[index], candidates, gate.distance, matches);
+            match_limb(&body.limbs()[index], &poses[index], gate.distance, matches);
             if facing {
                 face_cameras(&body.limbs()[index].shape, &poses[index], candidates, gate.distance, matches);
             }

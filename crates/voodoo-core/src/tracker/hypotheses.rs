@@ -6,6 +6,7 @@ use super::Tracker;
 use super::doubt::Doubt;
 use super::places::{carry, targets, thin};
 use crate::candidates::shifted;
+use crate::correspondence::Correspondences;
 use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, Visibility, look};
 use crate::frame::Frame;
@@ -63,12 +64,15 @@ pub(super) struct Hypotheses {
     at_rest: Vec<Pose>,
     both: Vec<Pose>,
     kept_predicted: Vec<Pose>,
+    /// What was matched before the hypothesis.
+    matched: Correspondences,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
     /// What past frames said against each chain.
     doubts: Vec<Doubt>,
     /// The body as the frame wanted it that last asked for a change of each chain, world.
     wanted: Vec<Vec<Pose>>,
+    asked_for: Vec<Pose>,
 }
 
 impl Tracker {
@@ -83,7 +87,14 @@ impl Tracker {
         work.wanted.clear();
         work.wanted.resize_with(self.chains.len(), room);
         // Room at once, not when the first hard frame comes.
-        for poses in [&mut work.trial, &mut work.kept, &mut work.at_rest, &mut work.both, &mut work.kept_predicted] {
+        for poses in [
+            &mut work.trial,
+            &mut work.kept,
+            &mut work.at_rest,
+            &mut work.both,
+            &mut work.kept_predicted,
+            &mut work.asked_for,
+        ] {
             poses.clear();
             poses.reserve(self.body.limbs().len());
         }
@@ -125,6 +136,7 @@ impl Tracker {
         work.own_weight.reserve(most);
         work.others.reserve(most);
         work.distances.reserve(most);
+        work.matched.reserve_as(&self.correspondences);
         work.best.clear();
         work.best.resize(self.candidates.len(), f32::INFINITY);
         for matches in &self.correspondences.limbs {
@@ -182,7 +194,13 @@ impl Tracker {
         thin(&mut work.near, &mut work.near_weight, SAMPLE);
         self.distances_to_others(chain, &work.near, &mut work.others, &mut work.best);
         let others = std::mem::take(&mut work.others);
-        let score = |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, distances: &mut Vec<f32>| {
+        // No part of the cost is negative: what cannot fall below `least` any more is not looked at further.
+        let score = |poses: &[Pose],
+                     least: f64,
+                     near: &Points,
+                     weights: &[f64],
+                     best: &mut Vec<f32>,
+                     distances: &mut Vec<f32>| {
             best.clone_from(&others);
             for limb in chain.limbs() {
                 self.body.limbs()[limb].shape.approximate_distances(&poses[limb], near, distances);
@@ -190,9 +208,15 @@ impl Tracker {
                     *best = best.min(distance.abs());
                 }
             }
-            rough_cost(best, weights) + look(poses).cost() + self.strain(chain, poses)
+            let points = rough_cost(best, weights);
+            if points >= least {
+                return points;
+            }
+            let seen = points + look(poses).cost();
+            if seen >= least { seen } else { seen + self.strain(chain, poses) }
         };
-        let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
+        let current =
+            score(&self.poses, f64::INFINITY, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
         let enough = current - GAIN;
         let Hypotheses { near, near_weight, best, distances, trial, kept, at_rest, .. } = work;
         // The best way to end at a place that costs less than `least`, into `kept`; returns its cost.
@@ -200,7 +224,7 @@ impl Tracker {
             for swivel in 0..ways {
                 trial.clone_from(&self.poses);
                 chain.point_at(&self.body, trial, target, TAU * swivel as f64 / ways as f64);
-                let cost = score(trial, near, near_weight, best, distances);
+                let cost = score(trial, least, near, near_weight, best, distances);
                 if cost < least {
                     least = cost;
                     kept.clone_from(trial);
@@ -218,7 +242,7 @@ impl Tracker {
             // Where the chain was a frame ago, carried by its parent.
             trial.clone_from(&self.poses);
             carry(chain, &self.body, &self.previous, trial);
-            let cost = score(trial, near, near_weight, best, distances);
+            let cost = score(trial, least, near, near_weight, best, distances);
             if cost < least {
                 least = cost;
                 kept.clone_from(trial);
@@ -240,18 +264,14 @@ impl Tracker {
             if !work.doubts[index].asks() {
                 steps += REFINE;
                 if self.refine(index, frame, pace, poses, work) && !work.doubts[index].ask() {
-                    work.wanted[index].extend(self.poses.iter().map(|pose| shifted(pose, -self.origin)));
-                    self.take_back(frame, work);
+                    work.asked_for.extend(self.poses.iter().map(|pose| shifted(pose, -self.origin)));
+                    self.take_back(work);
                 }
             }
         }
-        let wanted;
-        [(_, wanted), (_, work.at_rest), (_, work.kept), (_, work.both)] = tried;
-        if work.wanted[index].is_empty() {
-            // Its memory is kept for the next.
-            work.wanted[index] = wanted;
-            work.wanted[index].clear();
-        }
+        [(_, work.wanted[index]), (_, work.at_rest), (_, work.kept), (_, work.both)] = tried;
+        std::mem::swap(&mut work.wanted[index], &mut work.asked_for);
+        work.asked_for.clear();
         steps
     }
 
@@ -285,11 +305,11 @@ impl Tracker {
         least < f64::INFINITY
     }
 
-    /// The poses from before the hypothesis.
-    fn take_back(&mut self, frame: &Frame, work: &mut Hypotheses) {
+    /// The poses from before the hypothesis, and what was matched there.
+    fn take_back(&mut self, work: &mut Hypotheses) {
         self.poses.clone_from(&work.trial);
         self.predicted.clone_from(&work.kept_predicted);
-        self.match_last(frame);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
     }
 
     /// Remembers where the chains end that this frame proves right; a lost body has been anywhere.
@@ -369,6 +389,7 @@ impl Tracker {
         // The prediction spoke for the old configuration; the new one is what is expected now.
         work.kept_predicted.clone_from(&self.predicted);
         self.predicted.clone_from(hypothesis);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
         let last = self.config.max_steps;
         for step in 0..REFINE {
             self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
@@ -382,7 +403,7 @@ impl Tracker {
                 return true;
             }
         }
-        self.take_back(frame, work);
+        self.take_back(work);
         false
     }
 }
