@@ -17,7 +17,7 @@ from voodoo.recordings import ColorImage, DepthImage, RecordedFrame, Recording
 from voodoo.results import Track
 from voodoo.sensors.background import StillBackground
 from voodoo.sensors.front_end import LEVEL_FRAMES
-from voodoo.silhouettes import StillScene, from_depth, metres, surroundings
+from voodoo.silhouettes import StillScene, from_depth, surroundings
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Pictures: TypeAlias = Literal["depth", "color", "none"]
@@ -167,15 +167,13 @@ def _silhouettes(
     found = []
     for item in recorded.measurements:
         scene = scenes.get(item.sensor)
-        depth = None
         if isinstance(item, DepthImage) and isinstance(scene, StillScene):
             mask = from_depth(item, sites, scene=scene, level=level)
-            depth = None if item.camera.distorted else metres(item)
         elif isinstance(item, ColorImage) and isinstance(scene, StillBackground):
             mask = scene.mask(item.image)
         else:
             continue
-        found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor, depth=depth))
+        found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor))
     return found
 
 
