@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import voodoo
+from scene import rest_pose, standing_joints, surface
 from voodoo import Camera, MeasurementError
 from voodoo.sensors.assignment import assign
 from voodoo.sensors.depth import BodyView, DepthFilter, StillDepth, body_view
@@ -163,6 +164,29 @@ def test_within_its_bias_a_cue_says_nothing(solver):
     assert moved[0.04] < 1e-4 < 2e-3 < moved[0.15]
 
 
+def test_a_biased_cue_pulls_but_teaches_no_length():
+    person = voodoo.Body.human(height=1.75)
+    points = surface(person, rest_pose(person), 3000)
+    larger = {name: 1.03 * place for name, place in standing_joints(person).items()}
+
+    def lengths(**cue):
+        tracker = voodoo.Tracker(person)
+        hand = np.array(tracker.reset(joints=larger, fit_sizes=True).joints["l_hand"])
+        frame = voodoo.Frame(stamp=1.0)
+        frame.add_points(points, world_from_sensor=np.eye(4))
+        if cue:
+            frame.add_position("l_hand", hand - (0.0, 0.0, 0.10), **cue)
+        tracker.step(frame)
+        return np.array([limb.shape.length for limb in tracker.body.limbs])
+
+    alone = lengths()
+    # At 10 cm both pull with the same force. What is left of the biased one is that it has moved the limbs.
+    biased, unbiased = (
+        np.abs(lengths(**cue) / alone - 1.0).max() for cue in ({"weight": 20.0, "bias": 0.05}, {"weight": 10.0})
+    )
+    assert biased < 0.004 < 0.010 < unbiased
+
+
 def standing(solver):
     body = voodoo.Body.human(height=1.75)
     tracker = voodoo.Tracker(body, config=voodoo.Config(solver=solver))
@@ -174,6 +198,21 @@ def standing(solver):
     }
     tracker.reset(joints=joints)
     return tracker
+
+
+def test_a_face_pulls_less_at_a_head_that_depth_shows():
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    image, joints = picture(head, left, right, seed=9), Pose(head, left, right).joints
+    found = {}
+    for shown in ((), ("head_center", "l_hand")):
+        rays = skin.observe(image, CAMERA, POSE, joints, shown=shown)
+        found[shown] = {ray.site: ray.bias for ray in rays}
+    settings = SkinSettings()
+    assert found[()] == dict(settings.sites)
+    assert found["head_center", "l_hand"] == dict(settings.sites) | dict(settings.shown_bias)
+    with pytest.raises(MeasurementError, match="shown_bias head_center"):
+        SkinSettings(shown_bias={"head_center": -0.1})
 
 
 @pytest.mark.parametrize("bias", [-0.1, np.nan])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import voodoo
-from voodoo.errors import BodyError, MeasurementError, RecordingError, VoodooError
+from voodoo.errors import BodyError, ConfigError, MeasurementError, RecordingError, VoodooError
 from voodoo.inputs import join
 from voodoo.keypoints import KeypointSensor
 from voodoo.markers import read_trc
@@ -41,6 +41,19 @@ def skin(image, camera=CAMERA):
             "image: expected 24 rows of 32 pixels, as its camera has, found shape [24, 33]",
         ),
         (lambda: depth(np.zeros((24, 32), np.uint16), None), MeasurementError, "camera: expected a Camera"),
+        (lambda: voodoo.Tracker(None), BodyError, "body: expected a voodoo.Body, found NoneType"),
+        (
+            lambda: voodoo.Tracker(voodoo.Body.human(height=1.7), config={}),
+            ConfigError,
+            "config: expected a voodoo.Config, found dict",
+        ),
+        (lambda: voodoo.Body.from_toml(None), BodyError, "body: expected TOML text, found NoneType"),
+        (
+            lambda: voodoo.render_depth(voodoo.Body.human(height=1.7), [HERE], camera=CAMERA),
+            BodyError,
+            "world_from_limb: expected a mapping of limbs to poses, found list",
+        ),
+        (lambda: open_recording(None), RecordingError, "path: expected a file or folder, found NoneType"),
         (lambda: sensor(layout="coco"), MeasurementError, "layout 'coco': expected one of coco17"),
         (
             lambda: sensor(camera=None),

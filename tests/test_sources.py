@@ -13,6 +13,7 @@ from voodoo.metrics import JOINTS
 from voodoo.recordings import ColorImage, DepthImage, LaserScan, RecordedFrame, open_recording, sample_path
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+from voodoo.sensors.skin import SkinSettings
 
 FRAMES = 40
 
@@ -239,6 +240,22 @@ def test_a_frozen_colour_camera_is_left_out(whole):
         front_end.step(RecordedFrame(recorded.stamp, tuple(freeze(index, list(recorded.measurements)))))
         named += any("color" in name for name in front_end.frozen)
     assert named > 20
+
+
+def test_a_face_pulls_less_while_depth_shows_the_head():
+    recording = open_recording(sample_path())
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    biases = set()
+    for recorded, _ in zip(paired(recording), range(12), strict=False):
+        shown = tracker.estimate.limb_status["head"] == "measured"
+        front_end.step(recorded)
+        biases |= {(shown, ray.bias) for ray in front_end.rays if ray.site == "head_center"}
+        hands = {ray.bias for ray in front_end.rays if ray.site != "head_center"}
+        assert hands <= {SkinSettings().sites["l_hand"]}
+    expected = {True: SkinSettings().shown_bias["head_center"], False: SkinSettings().sites["head_center"]}
+    assert (True, expected[True]) in biases and all(bias == expected[shown] for shown, bias in biases)
 
 
 def test_what_is_out_of_a_cameras_range_is_not_used():

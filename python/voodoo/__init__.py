@@ -1,5 +1,6 @@
 """voodoo: the 3-D pose of a person, or any articulated body, every frame, on a plain CPU, from what the robot has."""
 
+from voodoo import ik
 from voodoo._core import ClosestPoints, Estimate, Frame, TaperedEllipticCylinder, __version__
 from voodoo.body import Body, Joint, Limb
 from voodoo.camera import Camera
@@ -28,6 +29,7 @@ __all__ = [
     "Tracker",
     "VoodooError",
     "__version__",
+    "ik",
     "open_recording",
     "render_depth",
 ]

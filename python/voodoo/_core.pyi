@@ -17,7 +17,10 @@ __all__ = [
     "View",
     "__version__",
     "config_fields",
+    "nearest_surface",
+    "points_within",
     "render_depth",
+    "splat",
 ]
 
 __version__: str
@@ -48,6 +51,85 @@ def render_depth(
     world_from_sensor: npt.NDArray[np.float64] | None = None,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int16]]:
     """Depth (height, width) [m], 0 where nothing is seen, and index of the limb, -1 for none; see voodoo.render_depth."""
+
+def points_within(
+    depth: npt.NDArray[np.float32],
+    rays: npt.NDArray[np.float32],
+    *,
+    step: int,
+    rows: tuple[int, int],
+    columns: tuple[int, int],
+    low: npt.NDArray[np.float64],
+    high: npt.NDArray[np.float64],
+    world_from_sensor: npt.NDArray[np.float64],
+    other_from_sensor: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.intp]]:
+    """Points (N, 3) of a depth image within a box, in another camera's frame [m], and the index of each one's pixel.
+
+    Args:
+        depth: (h, w) along the optical axis [m]; what is not finite and above zero is no return.
+        rays: (H, W, 2) of the camera; `depth` has every `step`-th row and column of it.
+        step: see rays.
+        rows, columns: of `depth`, from and up to.
+        low, high: corners (3,) of the box in the world [m].
+        world_from_sensor, other_from_sensor: (4, 4).
+
+    Raises:
+        MeasurementError: sizes that do not fit together.
+    """
+
+def splat(
+    pixels: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    marks: npt.NDArray[np.bool_] | None,
+    *,
+    height: int,
+    width: int,
+) -> tuple[
+    npt.NDArray[np.uint8],
+    npt.NDArray[np.uint8] | None,
+    npt.NDArray[np.intp],
+    tuple[int, int],
+    npt.NDArray[np.float32],
+]:
+    """Where points are in a picture.
+
+    Args:
+        pixels: (N, 2) where they are, NaN = nowhere.
+        points: (N, 3) in the camera's frame [m].
+        marks: (N,) of some of them.
+        height, width: of the picture.
+
+    Returns:
+        (height, width) 1 where points are; the same of the marked ones; which lie in the picture; and, from the pixel (row,
+        column) on, the depth of the nearest one in each, infinite where none is.
+
+    Raises:
+        MeasurementError: other shapes.
+    """
+
+def nearest_surface(
+    pixels: npt.NDArray[np.float64],
+    depths: npt.NDArray[np.float64],
+    still: npt.NDArray[np.bool_] | None,
+    *,
+    pixel: tuple[float, float],
+    radius: float,
+    among: npt.NDArray[np.bool_] | None = None,
+) -> tuple[float, bool] | None:
+    """Depth [m] of the nearest surface around a place in a picture, and whether most of it is still; None with less than three
+    points there. Where three of the points `among` are there, only those count.
+
+    Args:
+        pixels, depths: (N, 2) and (N,) [m], what was measured.
+        still: (N,) which may be the still scene; None: not known.
+        pixel: the place.
+        radius: [px].
+        among: (N,).
+
+    Raises:
+        MeasurementError: other shapes.
+    """
 
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""

@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 from typing import TypeAlias
 
 import numpy as np
@@ -19,7 +20,7 @@ from voodoo.errors import MeasurementError, RecordingError, reading
 from voodoo.keypoint_layouts import LAYOUTS, Layout
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import checked_camera, in_sensor, rigid, world_rays
+from voodoo.sensors.pixels import checked_camera, in_sensor, ray_distance, rigid, world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -105,17 +106,20 @@ def site_pixels(
         raise MeasurementError(f"keypoints: expected numbers (u, v, confidence), found {keypoints!r}") from error
     if rows.shape != (table.count, 3):
         raise MeasurementError(f"keypoints: expected shape ({table.count}, 3) for {layout}, found {rows.shape}")
+    values: list[list[float]] = rows.tolist()
     seen, unseen = [], []
     for part in table.parts:
-        index = list(part.shares)
-        shares = np.array(list(part.shares.values()))
-        chosen = rows[index]
-        confidence = float(chosen[:, 2].min())
-        if not np.isfinite(chosen).all() or confidence < min_confidence or confidence <= 0.0:
+        u = v = total = 0.0
+        confidence = 1.0
+        for index, share in part.shares.items():
+            column, row, believed = values[index]
+            u, v, total = u + share * column, v + share * row, total + believed
+            confidence = min(confidence, believed)
+        # What is not finite anywhere is not in the sums.
+        if not math.isfinite(u + v + total) or confidence < min_confidence or confidence <= 0.0:
             unseen.append(part.site)
-            continue
-        u, v = shares @ chosen[:, :2]
-        seen.append(SitePixel(part.site, (float(u), float(v)), min(confidence, 1.0), part.spread))
+        else:
+            seen.append(SitePixel(part.site, (u, v), confidence, part.spread))
     return seen, unseen
 
 
@@ -228,19 +232,23 @@ class KeypointSensor:
         if not seen:
             return KeypointReport(unseen=tuple(unseen)), rays, points
         origin, directions = world_rays(self.camera, pose, [item.pixel for item in seen])
-        depths = in_sensor(pose, [predicted[item.site] for item in seen])[:, 2]
-        for item, direction, z in zip(seen, directions, depths, strict=True):
-            if not np.isfinite(direction).all() or z <= 0.0:
+        sites = np.array([predicted[item.site] for item in seen], dtype=np.float64)
+        depths = in_sensor(pose, sites)[:, 2]
+        usable = np.isfinite(directions).all(axis=1) & (depths > 0.0)
+        off = ray_distance(origin, directions, sites)
+        for item, direction, site, z, away, able in zip(
+            seen, directions, sites, depths.tolist(), off.tolist(), usable.tolist(), strict=True
+        ):
+            if not able:
                 dropped.append(item.site)
                 continue
-            site = np.asarray(predicted[item.site], dtype=np.float64)
-            sigma = self._sigma(item, float(z))
+            sigma = self._sigma(item, z)
             if depth is not None:
                 point = self._point(item, direction, pose, depth, metres_per_unit)
                 if point is not None and (gate is None or gate.accepts_point(item.site, site, point, stamp)):
                     points[item.site] = (point, max(sigma, POINT_SIGMA_M))
                     continue
-            if gate is None or gate.accepts_ray(item.site, site, origin, direction, stamp, self.source):
+            if gate is None or gate.accepts(item.site, away, stamp, self.source):
                 hidden = (before or {}).get(item.site, 0.0) - _behind_surface(item.site)
                 sigma = math.hypot(sigma, GUESSED * max(hidden, 0.0))
                 rays.append(SiteRay(item.site, origin, direction, sigma, self.source))
@@ -342,8 +350,8 @@ def nearest_person(
         if not seen:
             continue
         pixels = camera.project(in_sensor(pose, [predicted[item.site] for item in seen]))
-        distance = np.linalg.norm(pixels - [item.pixel for item in seen], axis=1)
-        distance = distance[np.isfinite(distance)]
-        if len(distance) and float(np.median(distance)) < least:
-            best, least = person, float(np.median(distance))
+        distance = np.hypot(*(pixels - [item.pixel for item in seen]).T)
+        distances = distance[np.isfinite(distance)].tolist()
+        if distances and (middle := median(distances)) < least:
+            best, least = person, middle
     return best

@@ -54,6 +54,10 @@ def render_depth(
         BodyError: a limb is missing or unknown.
         MeasurementError: a matrix is not rigid.
     """
+    if not isinstance(world_from_limb, Mapping):
+        raise BodyError(
+            f"world_from_limb: expected a mapping of limbs to poses, found {type(world_from_limb).__name__}"
+        )
     if set(world_from_limb) != set(body.limb_names):
         raise BodyError(
             f"world_from_limb: expected the limbs {', '.join(body.limb_names)}, found {', '.join(world_from_limb)}"

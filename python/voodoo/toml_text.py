@@ -25,6 +25,8 @@ def parse_toml(text: str, *, source: str, error: type[VoodooError]) -> dict[str,
     Raises:
         VoodooError: of the class `error`, naming the source and the place of the syntax error.
     """
+    if not isinstance(text, str):
+        raise error(f"{source}: expected TOML text, found {type(text).__name__}")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:

@@ -11,6 +11,7 @@ from voodoo import _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
 from voodoo.body import Body, Joint, checked_joints
 from voodoo.config import Config
+from voodoo.errors import BodyError, ConfigError
 
 
 class Tracker:
@@ -22,7 +23,16 @@ class Tracker:
     """
 
     def __init__(self, body: Body, *, config: Config | None = None) -> None:
-        """Make a tracker without a pose; `reset` gives it one."""
+        """Make a tracker without a pose; `reset` gives it one.
+
+        Raises:
+            BodyError: `body` is not a Body.
+            ConfigError: `config` is not a Config.
+        """
+        if not isinstance(body, Body):
+            raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
+        if config is not None and not isinstance(config, Config):
+            raise ConfigError(f"config: expected a voodoo.Config, found {type(config).__name__}")
         self.config = Config() if config is None else config
         self._core = _core.Tracker(body.core, self.config.values())
 
@@ -57,8 +67,6 @@ class Tracker:
             BodyError: a limb is missing or unknown.
             MeasurementError: a matrix is not rigid.
         """
-        from voodoo.errors import BodyError
-
         names = self.body.limb_names
         if set(world_from_limb) != set(names):
             raise BodyError(

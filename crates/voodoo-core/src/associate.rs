@@ -4,7 +4,7 @@ use crate::body::{Body, Limb};
 use crate::candidates::{ANY_LIMB, Candidates};
 use crate::config::{Config, Overlap};
 use crate::correspondence::LimbMatches;
-use crate::geometry::Pose;
+use crate::geometry::{Points, Pose};
 use crate::nearest::{NONE, Nearest};
 use crate::shape::Region;
 use crate::simd::widest;
@@ -25,15 +25,32 @@ impl Assignment {
     /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
     pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, overlap: Overlap, box_margin: f64) {
         let Self { members, search, nearest, inside } = self;
-        members.resize_with(poses.len(), Vec::new);
+        // One more for those in no limb's box.
+        members.resize_with(poses.len() + 1, Vec::new);
         members.iter_mut().for_each(Vec::clear);
         nearest.resize(candidates.len(), NONE);
         inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
         search.find(body, poses, box_margin, &candidates.clusters, nearest, inside);
+        if overlap == Overlap::Exclusive {
+            let count = candidates.len();
+            let (nearest, known) = (&nearest[..count], &candidates.limb[..count]);
+            let limb_of = |index: usize| {
+                let limb = if known[index] == ANY_LIMB { nearest[index] } else { u32::from(known[index]) };
+                (limb as usize).min(poses.len())
+            };
+            // Those of a row of pixels mostly follow each other: one at a time would wait for the length of the list.
+            let mut start = 0;
+            while start < count {
+                let limb = limb_of(start);
+                let end = (start + 1..count).find(|index| limb_of(*index) != limb).unwrap_or(count);
+                members[limb].extend(start as u32..end as u32);
+                start = end;
+            }
+            return;
+        }
         for (index, (nearest, known)) in (0..).zip(nearest.iter().zip(&candidates.limb)) {
             match *known {
                 ANY_LIMB if *nearest == NONE => {}
-                ANY_LIMB if overlap == Overlap::Exclusive => members[*nearest as usize].push(index),
                 ANY_LIMB => {
                     let inside = &inside[index as usize * poses.len()..][..poses.len()];
                     for (limb, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
@@ -58,31 +75,40 @@ impl Assignment {
         } else {
             matches.candidate.extend((0..kept).map(|sample| members[sample * members.len() / kept]));
         }
-        pick(&matches.candidate, &candidates.points.x, &mut matches.measured.x);
-        pick(&matches.candidate, &candidates.points.y, &mut matches.measured.y);
-        pick(&matches.candidate, &candidates.points.z, &mut matches.measured.z);
+        pick(candidates, matches);
     }
 }
 
-fn pick(candidates: &[u32], from: &[f32], to: &mut Vec<f32>) {
-    to.clear();
-    to.extend(candidates.iter().map(|candidate| from[*candidate as usize]));
+/// Copies places and weights of a limb's sampled candidates.
+fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
+    let LimbMatches { candidate, measured, given, .. } = matches;
+    measured.resize(candidate.len());
+    given.resize(candidate.len(), 0.0);
+    // Columns of one length: one check of the index serves them all.
+    let count = candidates.len();
+    let Points { x, y, z } = &candidates.points;
+    let (x, y, z, weight) = (&x[..count], &y[..count], &z[..count], &candidates.weight[..count]);
+    let places = measured.x.iter_mut().zip(&mut measured.y).zip(&mut measured.z).zip(given);
+    for (index, (((to_x, to_y), to_z), given)) in candidate.iter().zip(places) {
+        let index = *index as usize;
+        (*to_x, *to_y, *to_z, *given) = (x[index], y[index], z[index], weight[index]);
+    }
 }
 
 /// Step 4: finds the closest points of a limb's sampled candidates; those too far or on a cap that faces a joint get weight
 /// zero.
-pub fn match_limb(limb: &Limb, pose: &Pose, candidates: &Candidates, max_distance: f64, matches: &mut LimbMatches) {
-    pick(&matches.candidate, &candidates.weight, &mut matches.weight);
+pub fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, matches: &mut LimbMatches) {
     limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
     let (refused, limit) = (refused_regions(limb), max_distance as f32);
-    let LimbMatches { weight, surface, .. } = matches;
+    let LimbMatches { weight, given, surface, .. } = matches;
+    weight.resize(given.len(), 0.0);
     widest(
         #[inline(always)]
         || {
-            let found = surface.signed_distance.iter().zip(&surface.region);
-            for (weight, (distance, region)) in weight.iter_mut().zip(found) {
+            let found = given.iter().zip(&surface.signed_distance).zip(&surface.region);
+            for (weight, ((given, distance), region)) in weight.iter_mut().zip(found) {
                 let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
-                *weight = if kept { *weight } else { 0.0 };
+                *weight = if kept { *given } else { 0.0 };
             }
         },
     );

@@ -188,6 +188,16 @@ impl Grid {
 /// Pixels of a row that are looked at together.
 const STRETCH: usize = 32;
 
+/// Visits every `stride`th value with its place in `to`; neighbours fill whole registers.
+#[inline(always)]
+fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, &T)) {
+    if stride == 1 {
+        to.iter_mut().zip(from).for_each(|(to, value)| visit(to, value));
+    } else {
+        to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, value)| visit(to, value));
+    }
+}
+
 /// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
 struct Stretch {
     x: [f32; STRETCH],
@@ -204,18 +214,16 @@ impl Stretch {
         let mut z = [0.0; STRETCH];
         match image.pixels {
             DepthPixels::U16(pixels) => {
-                let pixels = pixels[first..].iter().step_by(stride);
-                z[..count].iter_mut().zip(pixels).for_each(|(z, pixel)| *z = f32::from(*pixel) * scale);
+                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = f32::from(*pixel) * scale);
             }
             DepthPixels::F32(pixels) => {
-                let pixels = pixels[first..].iter().step_by(stride);
-                z[..count].iter_mut().zip(pixels).for_each(|(z, pixel)| *z = *pixel * scale);
+                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = *pixel * scale);
             }
         }
         if !background.is_empty() {
-            for (z, depth) in z[..count].iter_mut().zip(background[first..].iter().step_by(stride)) {
+            every(&background[first..], stride, &mut z[..count], |z, depth| {
                 *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
-            }
+            });
         }
         let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
         let mut x = [0.0; STRETCH];

@@ -13,6 +13,8 @@ pub struct LimbMatches {
     pub candidate: Vec<u32>,
     /// Measured points.
     pub measured: Points,
+    /// Weights as they were given.
+    pub given: Vec<f32>,
     /// Weights.
     pub weight: Vec<f32>,
     /// Closest points, normals, signed distances.
@@ -86,6 +88,15 @@ pub struct Correspondences {
 }
 
 impl LimbMatches {
+    /// Makes room for `len` pairs in all.
+    fn reserve(&mut self, len: usize) {
+        self.candidate.reserve(len.saturating_sub(self.candidate.len()));
+        self.measured.reserve(len);
+        self.given.reserve(len.saturating_sub(self.given.len()));
+        self.weight.reserve(len.saturating_sub(self.weight.len()));
+        self.surface.reserve(len);
+    }
+
     /// Sum of the weights, and weighted sum of the squared distances.
     pub fn weighed(&self) -> (f64, f64) {
         let square = |weight, distance| f64::from(weight) * f64::from(distance) * f64::from(distance);
@@ -136,6 +147,14 @@ fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, 
 }
 
 impl Correspondences {
+    /// Makes as much room for surface matches as `other` has.
+    pub fn reserve_as(&mut self, other: &Self) {
+        self.limbs.resize_with(other.limbs.len(), LimbMatches::default);
+        for (own, other) in self.limbs.iter_mut().zip(&other.limbs) {
+            own.reserve(other.candidate.capacity());
+        }
+    }
+
     /// Measured weight of a limb: its points and its sites.
     pub fn measured_weight(&self, limb: usize) -> f64 {
         let sites: f64 = self.sites.iter().filter(|pair| pair.limb == limb).map(|pair| pair.weight).sum();

@@ -9,6 +9,7 @@
 
 pub mod associate;
 pub mod background;
+pub mod beside;
 mod blobs;
 pub mod body;
 mod calibrate;

@@ -73,17 +73,23 @@ impl Nearest {
         // What the expected limb leaves decides which others are worth a look. After a reset there may be fewer limbs.
         let first = (expected[index] as usize).min(limbs.len() - 1);
         best.offer(first as u32, &limbs[first].squares(cluster));
-        let mut worst = best.worst();
-        for (limb, least) in least.as_flattened()[..limbs.len()].iter().enumerate() {
-            if !inside.is_empty() {
-                let squares = limbs[limb].squares(cluster);
+        if inside.is_empty() {
+            for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
+                let mut wanted = within(least, best.worst());
+                wanted &= !(1_u32.checked_shl((first as u32).wrapping_sub(start)).unwrap_or(0));
+                while wanted != 0 {
+                    let limb = start + wanted.trailing_zeros();
+                    best.offer(limb, &limbs[limb as usize].squares(cluster));
+                    wanted &= wanted - 1;
+                }
+            }
+        } else {
+            for (limb, shape) in limbs.iter().enumerate() {
+                let squares = shape.squares(cluster);
                 best.offer(limb as u32, &squares);
                 for (which, square) in cluster.which.iter().zip(squares) {
                     inside[*which as usize * limbs.len() + limb] = square < OUTSIDE;
                 }
-            } else if *least <= worst && limb != first {
-                best.offer(limb as u32, &limbs[limb].squares(cluster));
-                worst = best.worst();
             }
         }
         if best.limb[CLUSTER / 2] != NONE {
@@ -91,6 +97,16 @@ impl Nearest {
         }
         best.limb
     }
+}
+
+/// Which values are at most `worst`, one bit each; [`OUTSIDE`] never is.
+#[inline(always)]
+fn within(values: &Lanes, worst: f32) -> u32 {
+    let mut bits = 0;
+    for lane in 0..LANES {
+        bits |= u32::from(values[lane] <= worst) << lane;
+    }
+    bits
 }
 
 /// The nearest limb of every point so far; of two that are as near, the first.

@@ -1,19 +1,41 @@
 //! Run-time choice of instruction set for loops that the compiler vectorises.
 
-/// Runs `work`, compiled for AVX2 where this processor has it; write `widest(#[inline(always)] || ...)`.
+/// Runs `work`, compiled for AVX-512 or AVX2 where this processor has it; write `widest(#[inline(always)] || ...)`.
 ///
 /// Fused multiply-add is left out on purpose: without it the result is the same, bit by bit, on every processor.
 #[inline(always)]
 pub fn widest<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
+    {
+        #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+        fn wider<R>(work: impl FnOnce() -> R) -> R {
+            work()
+        }
         #[target_feature(enable = "avx2")]
         fn wide<R>(work: impl FnOnce() -> R) -> R {
             work()
         }
-        // SAFETY: `wide` is safe code that only needs AVX2, and this processor was found to have it.
-        #[allow(unsafe_code)]
-        return unsafe { wide(work) };
+        if has_avx512() {
+            // SAFETY: `wider` is safe code that only needs these parts of AVX-512, and this processor was found to have them.
+            #[allow(unsafe_code)]
+            return unsafe { wider(work) };
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: `wide` is safe code that only needs AVX2, and this processor was found to have it.
+            #[allow(unsafe_code)]
+            return unsafe { wide(work) };
+        }
     }
     work()
+}
+
+/// Whether this processor has the parts of AVX-512 that are used (all with AVX-512 do, but for Xeon Phi); the detection is
+/// cached by the standard library.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+pub fn has_avx512() -> bool {
+    std::arch::is_x86_feature_detected!("avx512f")
+        && std::arch::is_x86_feature_detected!("avx512bw")
+        && std::arch::is_x86_feature_detected!("avx512dq")
+        && std::arch::is_x86_feature_detected!("avx512vl")
 }

@@ -66,8 +66,6 @@ pub struct Tracker {
     /// Arms and legs.
     chains: Vec<TwoBone>,
     judgement: Judgement,
-    /// For how many frames each of them has explained little of its own.
-    idle: Vec<usize>,
     estimate: Estimate,
 }
 
@@ -109,7 +107,6 @@ impl Tracker {
             change: Vec::new(),
             chains: Vec::new(),
             judgement: Judgement::default(),
-            idle: Vec::new(),
             estimate: Estimate::default(),
         })
     }
@@ -213,7 +210,8 @@ impl Tracker {
             } else {
                 self.match_again(frame, steps);
             }
-            let distance = self.solve(pace, steps);
+            let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+            self.solve(pace, steps);
             steps += 1;
             if (previous - distance).abs() < self.config.min_change {
                 break;
@@ -316,15 +314,14 @@ impl Tracker {
         }
     }
 
-    /// One ICP step (2-7); returns the mean squared distance it started from.
-    fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) -> f64 {
+    /// One ICP step (2-7).
+    fn match_and_solve(&mut self, frame: &Frame, pace: f64, step: usize) {
         self.match_all(frame, step);
-        self.solve(pace, step)
+        self.solve(pace, step);
     }
 
-    /// Moves the body to what was matched; returns the mean squared distance before.
-    fn solve(&mut self, pace: f64, step: usize) -> f64 {
-        let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+    /// Moves the body to what was matched.
+    fn solve(&mut self, pace: f64, step: usize) {
         // 6 Elastic bands on both limbs.
         if self.solver.reads_bands() {
             self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
@@ -332,7 +329,6 @@ impl Tracker {
         // 7 Fit the model.
         let Self { body, correspondences, predicted, config, solver, poses, .. } = self;
         solver.solve(&Problem { body, correspondences, predicted, step, pace, config }, poses);
-        distance
     }
 
     /// Sets the predicted poses, and the current ones to them where the solver wants it; the current ones become the previous.
@@ -374,7 +370,7 @@ impl Tracker {
             if assigned {
                 assignment.sample_limb(index, candidates, config, matches);
             }
-            match_limb(&body.limbs()[index], &poses[index], candidates, gate.distance, matches);
+            match_limb(&body.limbs()[index], &poses[index], gate.distance, matches);
             if facing {
                 face_cameras(&body.limbs()[index].shape, &poses[index], candidates, gate.distance, matches);
             }
@@ -389,6 +385,7 @@ impl Tracker {
 
 mod changes;
 mod distances;
+mod doubt;
 mod hypotheses;
 mod named;
 mod report;

@@ -74,7 +74,8 @@ impl View<'_> {
         if !(column >= 0.0 && row >= 0.0 && column < image.width as f64 && row < image.height as f64) {
             return Pixel::Unknown;
         }
-        let index = row as usize * image.width + column as usize;
+        // Within the image; a signed cast costs least.
+        let index = row as i32 as usize * image.width + column as i32 as usize;
         let z = f64::from(image.pixels.get(index)) * image.metres_per_unit;
         if z.is_nan() || z <= 0.0 {
             return if self.cut_out { Pixel::Scene(f64::INFINITY) } else { Pixel::Unknown };

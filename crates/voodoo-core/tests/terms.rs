@@ -101,7 +101,7 @@ proptest! {
                 SitePair { limb: site.limb, x, p, weight: 1.0, given: 1.0, bias: 0.0, across: Mat3::IDENTITY, information, source: 0 }
             }).collect();
             let correspondences = Correspondences { sites: pairs, ..Default::default() };
-            Sites { correspondences: &correspondences, information: 1.0, scale: 0.5 }.add(&body, poses, normal);
+            Sites { correspondences: &correspondences, information: 1.0, scale: 0.5, biased: true }.add(&body, poses, normal);
         })?;
     }
 

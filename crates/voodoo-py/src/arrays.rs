@@ -116,6 +116,6 @@ pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
 /// A read-only array of a given shape.
 pub fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let array = PyArray1::from_vec(py, values).reshape(shape)?;
-    array.call_method1("setflags", (false,))?;
+    array.try_readwrite()?.make_nonwriteable();
     Ok(array)
 }

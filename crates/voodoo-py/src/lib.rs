@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "the documentation of the Python side stands in _core.pyi")]
 
 mod arrays;
+mod beside;
 mod body;
 mod config;
 mod errors;
@@ -16,6 +17,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use super::beside::{nearest_surface, points_within, splat};
     #[pymodule_export]
     use super::body::PyBody;
     #[pymodule_export]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +49,8 @@ def open_recording(path: str | Path, *, loader: str | None = None, **options: An
     Raises:
         RecordingError: nothing there, no loader for it, an unknown loader or option, or damage.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise RecordingError(f"path: expected a file or folder, found {type(path).__name__}")
     path = Path(path).expanduser()
     if loader is not None and loader not in LOADERS:
         raise RecordingError(f"loader {loader!r}: expected one of {', '.join(LOADERS)}")

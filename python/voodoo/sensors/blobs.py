@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.sensors.assignment import assign
-from voodoo.sensors.pixels import FloatArray
+from voodoo.sensors.pixels import FloatArray, lengths
 
 JUMP_M = 0.12
 """A region is at most this far from where its motion would have it, from one picture to the next."""
@@ -76,10 +76,6 @@ class Blob:
     far: dict[str, float] = field(default_factory=dict)
     doubt: dict[str, float] = field(default_factory=dict)
 
-    def at(self, stamp: float) -> FloatArray:
-        """Where it should be."""
-        return self.sight.place + (stamp - self.stamp) * self.velocity
-
     def move(self, sight: Sight, stamp: float) -> None:
         """It was seen again."""
         elapsed = stamp - self.stamp
@@ -87,7 +83,7 @@ class Blob:
             velocity = (sight.place - self.sight.place) / elapsed
             if not (sight.deep and self.sight.deep):
                 velocity = velocity - sight.direction * float(velocity @ sight.direction)
-            if float(np.linalg.norm(velocity)) < FASTEST:
+            if math.hypot(*velocity.tolist()) < FASTEST:
                 self.velocity = 0.5 * self.velocity + 0.5 * velocity
         self.sight, self.stamp = sight, stamp
         self.count += 1
@@ -204,7 +200,7 @@ class Blobs:
                         for other in range(len(seen))
                         if able[other]
                         and seen[other].label is None
-                        and float(np.linalg.norm(seen[other].sight.place - blob.sight.place)) > SAME_M
+                        and math.dist(seen[other].sight.place, blob.sight.place) > SAME_M
                     ]
                     if min(rivals, default=np.inf) >= max(ambiguity * near, 0.5 * gate):
                         cost[row, column] = DRIFTED * (near / reach) ** 2
@@ -239,14 +235,14 @@ def _apart(blobs: Sequence[Blob], sights: Sequence[Sight], stamp: float) -> Floa
     """(blobs, sights): distance of a sight from where a blob should be, in units of what is possible."""
     if not blobs or not sights:
         return np.zeros((len(blobs), len(sights)))
-    offset = np.array([sight.place for sight in sights]) - np.array([blob.at(stamp) for blob in blobs])[:, None]
+    elapsed = np.array([stamp - blob.stamp for blob in blobs])
+    expected = np.array([blob.sight.place for blob in blobs]) + elapsed[:, None] * [blob.velocity for blob in blobs]
+    offset = np.array([sight.place for sight in sights]) - expected[:, None]
     directions = np.array([sight.direction for sight in sights])
     deep = np.outer([blob.sight.deep for blob in blobs], [sight.deep for sight in sights])
     along = np.where(deep, 0.0, (offset * directions).sum(axis=2))
     offset -= along[..., None] * directions
-    return np.asarray(
-        np.sqrt((offset * offset).sum(axis=2)) / np.array([_limit(blob, stamp) for blob in blobs])[:, None]
-    )
+    return lengths(offset) / np.array([_limit(blob, stamp) for blob in blobs])[:, None]
 
 
 def _limit(blob: Blob, stamp: float) -> float:

@@ -3,14 +3,17 @@ range."""
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from statistics import median
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from voodoo import _core
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
 from voodoo.sensors.pixels import FloatArray, in_sensor
@@ -18,6 +21,9 @@ from voodoo.sensors.pixels import FloatArray, in_sensor
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 
 
+_CORNERS = np.array([[bool(corner >> axis & 1) for axis in range(3)] for corner in range(8)])
+"""Which of a box's corners are at its high end."""
+_AROUND = np.ones((3, 3), np.uint8)
 _EDGE_M = 0.10
 """Surfaces that differ by more than this in depth do not touch."""
 _STANDS = 1e-3
@@ -128,34 +134,14 @@ class BodyView:
     ) -> tuple[float, bool] | None:
         """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
         less than three points there. Where three of the points `among` (N,) are there, only those count."""
-        near = self._near(pixel, radius, None if among is None else np.flatnonzero(among))
-        if len(near) < 3 and among is not None:
-            near = self._near(pixel, radius, None)
-        if len(near) < 3:
-            return None
-        depths = self.depths[near]
-        fifth = (len(near) - 1) // 5
-        surface = np.abs(depths - np.partition(depths, fifth)[fifth]) < 0.1
-        depths = depths[surface]
-        still = self.still is not None and 2 * int(np.count_nonzero(self.still[near][surface])) > len(depths)
-        half = len(depths) // 2
-        return float(np.partition(depths, half)[half]), still
-
-    def _near(
-        self, pixel: tuple[float, float], radius: float, among: npt.NDArray[np.intp] | None
-    ) -> npt.NDArray[np.intp]:
-        pixels = self.pixels if among is None else self.pixels[among]
-        u, v = pixels[:, 0] - pixel[0], pixels[:, 1] - pixel[1]
-        inside = np.flatnonzero(u * u + v * v < radius**2)
-        return inside if among is None else among[inside]
+        return _core.nearest_surface(self.pixels, self.depths, self.still, pixel=pixel, radius=radius, among=among)
 
     def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
         """Values (N,) of the picture (H, W) at the points, -1 outside."""
-        u, v = np.rint(self.pixels.T).astype(np.intp)
+        u, v = np.rint(self.pixels).astype(np.intp).T
         inside = (u >= 0) & (v >= 0) & (u < image.shape[1]) & (v < image.shape[0])
-        values = np.full(len(u), -1, dtype=np.int32)
-        values[inside] = image[v[inside], u[inside]]
-        return values
+        place = np.where(inside, v * image.shape[1] + u, 0)
+        return np.where(inside, image.take(place), np.int32(-1))
 
 
 class StillDepth:
@@ -180,7 +166,7 @@ class StillDepth:
             (H, W): True where the image shows what may be the scene; (H, W): True where it shows something before what
             was seen there once. None as long as too little was seen.
         """
-        moved = self._pose is None or not np.allclose(self._pose, world_from_sensor, atol=_STANDS)
+        moved = self._pose is None or (np.abs(self._pose - world_from_sensor) > _STANDS).any()
         if self._farthest is None or moved or self._farthest.shape != z.shape:
             self._farthest, self._pose = z.copy(), world_from_sensor
             self._last.clear()
@@ -188,7 +174,7 @@ class StillDepth:
         still = None
         if len(self._last) == _STAYS:
             # At the edges of things every camera sees now the one, now the other.
-            behind = cv2.erode(self._farthest, np.ones((3, 3), np.uint8))
+            behind = cv2.erode(self._farthest, _AROUND)
             near, stayed = (low + share * z for low, share in (_BEHIND, _STAYED))
             before = np.asarray(behind - z >= near)
             still = (np.asarray(~before & (np.abs(z - self._last[0]) < stayed)), before)
@@ -226,92 +212,71 @@ def body_view(
     """
     places = np.asarray(joints, dtype=np.float64)
     low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
+    z = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
     rows, columns = _window(depth_camera, world_from_depth, low, high)
-    standing = None
-    if scene is not None:
-        whole = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
-        rows, columns = (slice(-(-span.start // step) * step, span.stop) for span in (rows, columns))
-        standing = scene.see(whole, world_from_depth)
-        if standing is not None:
-            window = (
-                slice(rows.start // step, -(-rows.stop // step)),
-                slice(columns.start // step, -(-columns.stop // step)),
-            )
-            standing = (standing[0][window], standing[1][window])
-    z = depth[rows, columns][::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
-    rays = depth_camera.rays()[rows, columns][::step, ::step]
-    valid = np.isfinite(z) & (z > 0.0)
-    z = z[valid]
-    x, y = rays[..., 0][valid] * z, rays[..., 1][valid] * z
-    near = np.ones(len(z), dtype=np.bool_)
-    for axis in range(3):
-        turn, shift = world_from_depth[axis, :3].astype(np.float32), np.float32(world_from_depth[axis, 3])
-        place = turn[0] * x + turn[1] * y + turn[2] * z + shift
-        near &= (place > low[axis]) & (place < high[axis])
-    x, y, z = x[near], y[near], z[near]
-    still, moved = (None, None) if standing is None else (item[valid][near] for item in standing)
-    color_from_depth = np.linalg.inv(world_from_color) @ world_from_depth
-    in_color = np.column_stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in color_from_depth[:3]])
-    mask = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
-    pixels = color_camera.project(in_color)
-    u, v = np.rint(pixels).T
-    # NaN, where the colour camera cannot see, is inside of nothing.
-    inside = (u >= 0) & (v >= 0) & (u < color_camera.width) & (v < color_camera.height)
-    pixels, in_color = pixels[inside], in_color[inside]
-    still, moved = (None if item is None else item[inside] for item in (still, moved))
-    mask[v[inside].astype(np.intp), u[inside].astype(np.intp)] = 1
+    points, index = _core.points_within(
+        z,
+        depth_camera.rays(),
+        step=step,
+        rows=(-(-rows.start // step), -(-rows.stop // step)),
+        columns=(-(-columns.start // step), -(-columns.stop // step)),
+        low=low,
+        high=high,
+        world_from_sensor=world_from_depth,
+        other_from_sensor=np.linalg.inv(world_from_color) @ world_from_depth,
+    )
+    standing = None if scene is None else scene.see(z, world_from_depth)
+    still, moved = (None, None) if standing is None else (item.ravel()[index] for item in standing)
+    pixels = color_camera.project(points)
+    mask, front, inside, corner, nearest = _core.splat(
+        pixels, points, moved, height=color_camera.height, width=color_camera.width
+    )
     # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
     size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
     around = np.ones((size, size), np.uint8)
-    grown = np.asarray(cv2.dilate(mask, around), dtype=bool)
-    before = None
-    if moved is not None:
-        front = np.zeros_like(mask)
-        front[v[inside][moved].astype(np.intp), u[inside][moved].astype(np.intp)] = 1
-        before = np.asarray(cv2.dilate(front, around), dtype=bool)
-    beyond = _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
-    cut = _behind_edges(pixels, in_color[:, 2], mask.shape)
-    return BodyView((grown | beyond) & ~cut, pixels, in_color[:, 2], still, None if before is None else before & ~cut)
+    grown = cv2.dilate(mask, around).view(np.bool_)
+    before = None if front is None else cv2.dilate(front, around).view(np.bool_)
+    grown |= _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
+    # A hand's region ends where a table behind it begins.
+    edges = _behind_edges(nearest)
+    window = tuple(slice(first, first + count) for first, count in zip(corner, edges.shape, strict=True))
+    for image in (grown, before):
+        if image is not None:
+            image[window] &= ~edges
+    depths = points[:, 2].copy()
+    if len(inside) < len(points):
+        pixels, depths, still = pixels[inside], depths[inside], None if still is None else still[inside]
+    return BodyView(grown, pixels, depths, still, before)
 
 
-def _behind_edges(pixels: FloatArray, depths: npt.NDArray[Any], shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
-    """(H, W): True in a line on the far side of the edges between surfaces: a hand's region ends where a table behind it
-    begins.
+def _behind_edges(nearest: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """(H, W): True in a line on the far side of the edges between surfaces.
 
     Args:
-        pixels: (N, 2) of the points in the colour image, inside it; between them the nearest one counts.
-        depths: (N,) [m].
-        shape: of the colour image.
+        nearest: (H, W) depths [m], infinite where nothing was measured; between the others the nearest one counts.
     """
-    edges = np.zeros(shape, dtype=np.bool_)
-    if not len(depths):
-        return edges
-    u, v = np.rint(pixels.T).astype(np.intp)
-    left, top = u.min(), v.min()
-    z = np.full((v.max() - top + 1, u.max() - left + 1), np.inf, dtype=np.float32)
-    np.minimum.at(z, (v - top, u - left), depths.astype(np.float32))
-    _, nearest = cv2.distanceTransformWithLabels(
-        np.isinf(z).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3, labelType=cv2.DIST_LABEL_PIXEL
+    if not nearest.size:
+        return np.zeros(nearest.shape, dtype=np.bool_)
+    unknown = np.isinf(nearest)
+    _, labels = cv2.distanceTransformWithLabels(
+        unknown.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3, labelType=cv2.DIST_LABEL_PIXEL
     )
-    known = np.isfinite(z)
-    of_label = np.zeros(int(nearest.max()) + 1, dtype=np.float32)
-    of_label[nearest[known]] = z[known]
-    z = of_label[nearest]
-    front = cv2.erode(z, np.ones((3, 3), np.uint8))
-    edges[top : top + len(z), left : left + z.shape[1]] = z > front + _EDGE_M
-    return edges
+    # Known pixels are numbered row by row, from 1.
+    z = np.concatenate([np.zeros(1, np.float32), nearest[~unknown]]).take(np.asarray(labels, dtype=np.int32))
+    return np.asarray(z > cv2.erode(z, _AROUND) + _EDGE_M)
 
 
 def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high: FloatArray) -> tuple[slice, slice]:
     """Rows and columns of a depth image that can show the box between two corners (3,); all where the lens distorts."""
-    corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
-    corners = in_sensor(world_from_depth, corners)
+    corners = in_sensor(world_from_depth, np.where(_CORNERS, high, low))
     if camera.distorted or (corners[:, 2] < 0.05).any():
         return slice(0, camera.height), slice(0, camera.width)
-    pixels = camera.project(corners)
-    first = np.clip(np.floor(pixels.min(axis=0)), 0, (camera.width, camera.height)).astype(int)
-    last = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, (camera.width, camera.height)).astype(int)
-    return slice(first[1], last[1]), slice(first[0], last[0])
+    columns, rows = camera.project(corners).T.tolist()
+    spans = [
+        slice(min(max(math.floor(min(span)), 0), size), min(max(math.ceil(max(span)) + 1, 0), size))
+        for span, size in ((rows, camera.height), (columns, camera.width))
+    ]
+    return spans[0], spans[1]
 
 
 def _beyond(
@@ -322,15 +287,17 @@ def _beyond(
     places: FloatArray,
 ) -> npt.NDArray[np.bool_]:
     """(H, W) of the colour image: True where the depth camera does not look, at the distance of the body."""
-    z = max(float(np.median(in_sensor(world_from_depth, places)[:, 2])), 0.1)
+    z = max(median(in_sensor(world_from_depth, places)[:, 2].tolist()), 0.1)
     right, bottom = depth_camera.width - 1, depth_camera.height - 1
-    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]].astype(np.float64)
-    corners = np.column_stack([rays * z, np.full(4, z)]) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
+    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]]
+    corners = np.ones((4, 3))
+    corners[:, :2] = rays
+    corners = (z * corners) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
     outline = color_camera.project(in_sensor(world_from_color, corners))
     # The corners are the centres of the outermost pixels.
     middle = outline.mean(axis=0)
     outline = middle + (outline - middle) * (1.0 + 4.0 / min(depth_camera.width, depth_camera.height))
-    seen = np.zeros((color_camera.height, color_camera.width), dtype=np.uint8)
+    away = np.ones((color_camera.height, color_camera.width), dtype=np.uint8)
     if np.isfinite(outline).all():
-        cv2.fillConvexPoly(seen, np.clip(np.round(outline), -9999, 9999).astype(np.int32), 1)
-    return np.asarray(seen == 0)
+        cv2.fillConvexPoly(away, outline.round().clip(-9999, 9999).astype(np.int32), 0)
+    return away.view(np.bool_)

@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.sensors.pixels import FloatArray, ray_distance
+from voodoo.sensors.pixels import FloatArray, lengths, ray_distance
+
+_NOWHERE = np.full(3, np.nan)
 
 
 @dataclass
@@ -51,15 +53,16 @@ class SiteGate:
         self, site: str, predicted: FloatArray, origin: FloatArray, direction: FloatArray, stamp: float, source: str
     ) -> bool:
         """Whether a ray (unit direction) passes near enough to the predicted site (3,)."""
-        return self._accept(site, source, float(ray_distance(origin, direction, predicted)), stamp)
+        return self.accepts(site, float(ray_distance(origin, direction, predicted)), stamp, source)
 
     def accepts_point(
         self, site: str, predicted: FloatArray, point: FloatArray, stamp: float, source: str = "points"
     ) -> bool:
         """Whether a point (3,) is near enough to the predicted site."""
-        return self._accept(site, source, float(np.linalg.norm(point - predicted)), stamp)
+        return self.accepts(site, float(np.linalg.norm(point - predicted)), stamp, source)
 
-    def _accept(self, site: str, source: str, distance: float, stamp: float) -> bool:
+    def accepts(self, site: str, distance: float, stamp: float, source: str) -> bool:
+        """Whether a measurement this far [m] from the predicted site is near enough."""
         if distance > self.limit(site, source, stamp):
             return False
         self._last[site, source] = stamp
@@ -77,21 +80,25 @@ class SitePredictor:
 
     velocity_share: float = 0.6
     max_speed: float = 8.0
-    _last: tuple[float, dict[str, FloatArray]] | None = field(default=None, repr=False)
-    _velocity: dict[str, FloatArray] = field(default_factory=dict, repr=False)
+    _names: tuple[str, ...] = field(default=(), repr=False)
+    _stamp: float = field(default=float("nan"), repr=False)
+    _positions: FloatArray = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
+    _velocity: FloatArray = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
 
     def update(self, stamp: float, joints: Mapping[str, npt.NDArray[np.float64]]) -> None:
         """Take up an estimate; a NaN stamp (after a reset) forgets the velocity."""
-        current = {name: np.asarray(position, dtype=np.float64) for name, position in joints.items()}
-        self._velocity = {}
-        if self._last is not None and stamp > self._last[0]:
-            elapsed = stamp - self._last[0]
-            for name, position in current.items():
-                if name in self._last[1]:
-                    velocity = (position - self._last[1][name]) / elapsed
-                    if math.hypot(*velocity.tolist()) <= self.max_speed:
-                        self._velocity[name] = velocity
-        self._last = (stamp, current)
+        names = tuple(joints)
+        positions = np.array(list(joints.values()), dtype=np.float64).reshape(-1, 3)
+        velocity = np.zeros_like(positions)
+        if stamp > self._stamp:
+            before = self._positions
+            if names != self._names:
+                known = dict(zip(self._names, before, strict=True))
+                before = np.array([known.get(name, _NOWHERE) for name in names])
+            velocity = (positions - before) / (stamp - self._stamp)
+            # NaN: the site is new.
+            velocity[~(lengths(velocity) <= self.max_speed)] = 0.0
+        self._names, self._stamp, self._positions, self._velocity = names, stamp, positions, velocity
 
     def predict(self, stamp: float) -> dict[str, FloatArray]:
         """Site name -> (3,) [m] at `stamp` [s].
@@ -99,8 +106,7 @@ class SitePredictor:
         Raises:
             MeasurementError: no estimate yet.
         """
-        if self._last is None:
+        if not self._names:
             raise MeasurementError("prediction: expected an estimate first, found none")
-        last, positions = self._last
-        elapsed = self.velocity_share * (stamp - last) if np.isfinite(last) else 0.0
-        return {name: position + elapsed * self._velocity.get(name, 0.0) for name, position in positions.items()}
+        elapsed = self.velocity_share * (stamp - self._stamp) if math.isfinite(self._stamp) else 0.0
+        return dict(zip(self._names, self._positions + elapsed * self._velocity, strict=True))

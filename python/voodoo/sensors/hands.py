@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.sensors.blobs import Sight
-from voodoo.sensors.pixels import FloatArray
+from voodoo.sensors.pixels import FloatArray, lengths
 
 BARE = ("head", "neck", "upperarm", "forearm", "hand")
 """Endings of the names of limbs that show skin."""
@@ -26,7 +26,7 @@ def reach(side: str, predicted: Mapping[str, FloatArray]) -> float:
     if any(joint is None for joint in joints):
         return math.inf
     shoulder, elbow, hand = (np.asarray(joint) for joint in joints)
-    return 1.2 * float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(hand - elbow)) + 0.15
+    return 1.2 * (math.dist(elbow, shoulder) + math.dist(hand, elbow)) + 0.15
 
 
 def elsewhere(
@@ -38,13 +38,14 @@ def elsewhere(
     """(S, B): whether a sight is the surface of a limb other than a hand's own forearm, of a bare one if that is lost."""
     result = np.zeros((len(sites), len(sights)), dtype=np.bool_)
     deep = np.array([sight.deep for sight in sights])
+    away = np.array(list(limbs.values()))
     for row, site in enumerate(sites):
-        own = [name for name in limbs if name.startswith(site[0]) and name.endswith(("forearm", "hand"))]
-        if not own or site.startswith("head"):
+        own = np.array([name.startswith(site[0]) and name.endswith(("forearm", "hand")) for name in limbs])
+        if not own.any() or site.startswith("head"):
             continue
-        names = [name for name in limbs if name not in own and (site not in lost or name.endswith(BARE))]
-        others = np.min([limbs[name] for name in names], axis=0, initial=np.inf)
-        own_away = np.min([limbs[name] for name in own], axis=0)
+        rest = ~own & [site not in lost or name.endswith(BARE) for name in limbs]
+        others = away[rest].min(axis=0, initial=np.inf)
+        own_away = away[own].min(axis=0)
         result[row] = deep & (others < ON_LIMB_M) & (own_away > others + OFF_LIMB_M)
     return result
 
@@ -76,10 +77,8 @@ def of_pieces(place: FloatArray, pieces: list[FloatArray], expected: FloatArray)
 
 def hand_ends(sights: list[Sight], hand: FloatArray | None, elbow: FloatArray) -> list[bool]:
     """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region."""
-    towards = [
-        (0.0 if hand is None else float(np.linalg.norm(item.place - hand))) - float(np.linalg.norm(item.place - elbow))
-        for item in sights
-    ]
+    places = np.array([item.place for item in sights])
+    towards = ((0.0 if hand is None else lengths(places - hand)) - lengths(places - elbow)).tolist()
     least: dict[int, float] = {}
     for item, value in zip(sights, towards, strict=True):
         if item.hand:

@@ -72,11 +72,14 @@ class SensorModel:
         Raises:
             MeasurementError: a sigma that is not a number above zero, or sharing below 1.
         """
+        if not sharing >= 1.0:
+            raise MeasurementError(f"sharing: expected a number of data >= 1, found {sharing!r}")
+        if isinstance(sigma, float) and 0.0 < sigma < math.inf:
+            # Rays come one by one, and an array of one number costs ten times as much.
+            return min((self.reference_sigma / sigma) ** 2 / sharing, self.max_weight)
         values = np.asarray(sigma, dtype=np.float64)
         if not np.isfinite(values).all() or (values <= 0.0).any():
             raise MeasurementError(f"sigma: expected finite metres > 0, found {sigma!r}")
-        if not sharing >= 1.0:
-            raise MeasurementError(f"sharing: expected a number of data >= 1, found {sharing!r}")
         weights = np.minimum((self.reference_sigma / values) ** 2 / sharing, self.max_weight)
         return float(weights) if weights.ndim == 0 else weights
 

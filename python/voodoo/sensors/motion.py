@@ -34,22 +34,19 @@ class LimbMotion:
     max_speed: float = 8.0
     longest: float = 0.1
     _poses: FloatArray | None = field(default=None, repr=False)
-    _moves: FloatArray | None = field(default=None, repr=False)
+    _before: tuple[float, FloatArray] | None = field(default=None, repr=False)
     _stamp: float = field(default=float("nan"), repr=False)
 
     def update(self, stamp: float, world_from_limb: Mapping[str, npt.NDArray[np.float64]]) -> None:
         """Take up the poses of all limbs (4, 4) at `stamp` [s]."""
         poses = np.array(list(world_from_limb.values()), dtype=np.float64)
-        self._moves = None
-        if self._poses is not None and len(self._poses) == len(poses) and stamp > self._stamp:
-            # What the last interval did to a place on a limb, a second: (L, 3, 4).
-            moves = (poses @ np.linalg.inv(self._poses) - np.eye(4))[:, :3] / (stamp - self._stamp)
-            self._moves = self.velocity_share * moves
+        comparable = self._poses is not None and len(self._poses) == len(poses) and stamp > self._stamp
+        self._before = (stamp - self._stamp, self._poses) if comparable and self._poses is not None else None
         self._poses, self._stamp = poses, stamp
 
     def moves(self, elapsed: float) -> bool:
         """Whether there is anything to do for points seen `elapsed` seconds before the frame."""
-        return self._moves is not None and abs(elapsed) >= _SAME_S
+        return self._before is not None and abs(elapsed) >= _SAME_S
 
     def carried(
         self, points: FloatArray, elapsed: float, distances: Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
@@ -61,8 +58,9 @@ class LimbMotion:
             elapsed: negative for a sensor that measured after the frame's time.
             distances: of places (N, 3) from each limb, (L, N) [m]; see `Tracker.limb_distances`.
         """
-        if self._moves is None or self._poses is None or not self.moves(elapsed):
+        if self._before is None or self._poses is None or not self.moves(elapsed):
             return points
+        interval, poses = self._before
         origins = self._poses[:, :3, 3]
         # No limb is longer than a metre: what is far from all of them needs no distances.
         low, high = origins.min(axis=0) - 1.0, origins.max(axis=0) + 1.0
@@ -70,12 +68,14 @@ class LimbMotion:
         if not len(around):
             return points
         away = distances(points[around])
-        if len(away) != len(self._moves):
+        if len(away) != len(poses):
             return points
         limb = np.asarray(away.argmin(axis=0))
         on_body = away[limb, np.arange(len(around))] < self.near
         chosen, limb = around[on_body], limb[on_body]
-        moves = self._moves[limb]
+        # What the last interval did to a place on a limb, a second: (L, 3, 4).
+        moves = (self._poses @ np.linalg.inv(poses) - np.eye(4))[:, :3] / interval * self.velocity_share
+        moves = moves[limb]
         velocity = np.einsum("nij,nj->ni", moves[:, :, :3], points[chosen]) + moves[:, :, 3]
         steady = np.linalg.norm(velocity, axis=1) < self.max_speed * self.velocity_share
         result = points.copy()

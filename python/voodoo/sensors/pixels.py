@@ -14,7 +14,6 @@ from voodoo.errors import MeasurementError
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _ROUND_TRIP_PX = 0.1
-_EYE = np.eye(3)
 
 
 def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:
@@ -81,10 +80,21 @@ def rigid(world_from_sensor: npt.ArrayLike) -> FloatArray:
     pose = np.asarray(world_from_sensor, dtype=np.float64)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise MeasurementError(f"world_from_sensor: expected a finite (4, 4) array, found shape {pose.shape}")
-    turn = pose[:3, :3]
-    if np.abs(turn @ turn.T - _EYE).max() > 1e-4 or float(turn[0] @ np.cross(turn[1], turn[2])) < 0.0:
-        raise MeasurementError(f"world_from_sensor: expected a rotation in its upper left 3x3, found {turn.tolist()}")
+    x, y, z = pose[:3, :3].tolist()
+    # Nine numbers are faster without arrays.
+    unit, square = [_dot(axis, axis) for axis in (x, y, z)], [_dot(x, y), _dot(y, z), _dot(z, x)]
+    across = [y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0]]
+    if (
+        any(abs(value - 1.0) > 1e-4 for value in unit)
+        or any(abs(value) > 1e-4 for value in square)
+        or _dot(x, across) < 0
+    ):
+        raise MeasurementError(f"world_from_sensor: expected a rotation in its upper left 3x3, found {[x, y, z]}")
     return pose
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def in_sensor(world_from_sensor: FloatArray, points: npt.ArrayLike) -> FloatArray:
@@ -93,7 +103,12 @@ def in_sensor(world_from_sensor: FloatArray, points: npt.ArrayLike) -> FloatArra
 
 
 def ray_distance(origin: FloatArray, directions: FloatArray, points: FloatArray) -> FloatArray:
-    """Distances (N,) [m] of points (N, 3) to rays with unit directions (N, 3); behind the origin, to the origin."""
+    """Distances (...) [m] of points (..., 3) to rays with unit directions (..., 3); behind the origin, to the origin."""
     offset = points - origin
     along = np.maximum((offset * directions).sum(axis=-1), 0.0)
-    return np.asarray(np.linalg.norm(offset - along[..., None] * directions, axis=-1))
+    return lengths(offset - along[..., None] * directions)
+
+
+def lengths(vectors: FloatArray) -> FloatArray:
+    """Of vectors (..., 3)."""
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1)))

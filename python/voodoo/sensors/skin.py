@@ -33,7 +33,7 @@ from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.hands import BARE, elsewhere, hand_ends, of_pieces, reach, to_palm
 from voodoo.sensors.model import PixelNoise
-from voodoo.sensors.pixels import FloatArray, checked_camera, in_sensor, ray_distance, rigid, world_rays
+from voodoo.sensors.pixels import FloatArray, checked_camera, in_sensor, lengths, ray_distance, rigid, world_rays
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
 from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates, joined
@@ -62,6 +62,8 @@ class SkinSettings:
     Args:
         sites: site -> how far [m] a region's middle may always be from it, see `SiteRay.bias`. A face is the front of the
             head.
+        shown_bias: the same while a depth camera shows the site's limb: a face is always to the same side of the head's
+            middle, and would pull for ever at a head that is where it was seen.
         gate: a new region farther than this from the predicted site is not it [m]; one that has its name keeps it.
         lost_gate: see gate_growth [m].
         gate_growth: a gate grows by this while its site is not seen [m/s], up to `lost_gate`, or to `widest_gate` for a
@@ -81,6 +83,7 @@ class SkinSettings:
     sites: Mapping[str, float] = field(
         default_factory=lambda: {"head_center": 0.06, "l_hand": 0.06, "r_hand": 0.06},
     )
+    shown_bias: Mapping[str, float] = field(default_factory=lambda: {"head_center": 0.12})
     gate: float = 0.12
     lost_gate: float = 0.35
     gate_growth: float = 1.0
@@ -95,6 +98,7 @@ class SkinSettings:
     def __post_init__(self) -> None:
         """Check the numbers."""
         numbers = {"gate": self.gate, "lost_gate": self.lost_gate, "static_seconds": self.static_seconds, **self.sites}
+        numbers |= {f"shown_bias {site}": bias for site, bias in self.shown_bias.items()}
         numbers |= {"gate_growth": self.gate_growth, "widest_gate": self.widest_gate, "unexplained": self.unexplained}
         numbers["learn_every"] = float(self.learn_every)
         for name, value in numbers.items():
@@ -144,6 +148,7 @@ class SkinTracker:
         surface: Surface | None = None,
         lost: Collection[str] = (),
         held: Collection[str] = (),
+        shown: Collection[str] = (),
         source: str = "skin",
     ) -> list[SiteRay]:
         """Rays of those sites that were found.
@@ -160,6 +165,7 @@ class SkinTracker:
                 `Tracker.limb_distances`.
             lost: sites whose limb the other sensors do not show where the body has it.
             held: sites whose upper arm they do show there: its hand is a forearm away from that elbow.
+            shown: sites whose own limb they show there, see `SkinSettings.shown_bias`.
             source: name for `Estimate.sources`.
 
         Raises:
@@ -199,33 +205,29 @@ class SkinTracker:
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
         axis = pose[:3, 2]
         regions = None if body is None else body.sample(labels)
-        sights, speck = [], []
-        for item, direction in zip(self.candidates, directions, strict=True):
-            looked = None
-            if body is not None and regions is not None:
-                radius = 1.5 * PALM_M * focal / nearest
-                looked = body.look_at(item.pixel, radius, among=regions == item.region)
-            z, still = (nearest, False) if looked is None else looked
-            place = origin + direction * (z / float(direction @ axis))
-            sights.append(Sight(direction, place, looked is not None, item.hand, item.region, still))
-            speck.append(item.area < SPECK * math.pi * (PALM_M * focal / z) ** 2)
+        looked: list[tuple[float, bool] | None] = [None] * len(self.candidates)
+        if body is not None and regions is not None:
+            radius = 1.5 * PALM_M * focal / nearest
+            looked = [body.look_at(item.pixel, radius, among=regions == item.region) for item in self.candidates]
+        z = np.array([nearest if found is None else found[0] for found in looked])
+        surfaces = origin + directions * (z / (directions @ axis))[:, None]
+        sights = [
+            Sight(direction, place, found is not None, item.hand, item.region, found is not None and found[1])
+            for direction, place, found, item in zip(directions, surfaces, looked, self.candidates, strict=True)
+        ]
+        specks = np.array([item.area for item in self.candidates]) < SPECK * math.pi * (PALM_M * focal / z) ** 2
         seen = self.blobs.follow(sights, stamp)
         sites = list(places)
-        distance = np.array(
-            [
-                [
-                    float(np.linalg.norm(self._inside(site, sight) - predicted[site]))
-                    if sight.deep
-                    else float(ray_distance(origin, sight.direction, predicted[site]))
-                    for sight in sights
-                ]
-                for site in sites
-            ]
-        )
-        limbs = {} if surface is None else surface(np.array([sight.place for sight in sights]))
-        allowed = self._allowed(sites, sights, seen, predicted, limbs, lost, held, specks=speck)
+        deep = np.array([sight.deep for sight in sights])
+        expected = np.array([predicted[site] for site in sites])[:, None]
+        # Where each site is when a sight is its surface, (S, B, 3).
+        behind = np.array([FACE_BEHIND_M if site.startswith("head") else HAND_BEHIND_M for site in sites])
+        inside = surfaces + directions * behind[:, None, None]
+        distance = np.where(deep, lengths(inside - expected), ray_distance(origin, directions, expected))
+        limbs = {} if surface is None else surface(surfaces)
+        allowed = self._allowed(sites, sights, inside, seen, predicted, limbs, lost, held, specks=specks)
         # A speck far from where the hand is expected is what is left of another region.
-        allowed[(distance > self.settings.gate) & np.array(speck)] = 0.0
+        allowed[(distance > self.settings.gate) & specks] = 0.0
         others = elsewhere(sites, sights, limbs, lost)
         found = self.blobs.name(
             seen,
@@ -248,36 +250,32 @@ class SkinTracker:
         for site, column in found.items():
             self.assigned[site] = self.candidates[column]
             across = self.settings.noise.sigma(places[site][1], focal)
-            sight = sights[column]
-            direction, place = sight.direction, self._inside(site, sight) if sight.deep else None
+            row = sites.index(site)
+            direction, place = directions[column], inside[row, column] if deep[column] else None
             if place is not None and not site.startswith("head"):
-                able = (allowed[sites.index(site)] > 0) & ~others[sites.index(site)]
+                able = (allowed[row] > 0) & ~others[row] & deep
                 able[list(found.values())] = False
-                pieces = [
-                    self._inside(site, other) for other, free in zip(sights, able, strict=True) if free and other.deep
-                ]
-                place = of_pieces(place, pieces, predicted[site])
+                place = of_pieces(place, list(inside[row, able]), predicted[site])
                 direction = (place - origin) / float(np.linalg.norm(place - origin))
             bias = self.settings.sites[site]
+            if site in shown:
+                bias = max(bias, self.settings.shown_bias.get(site, bias))
             ray = SiteRay(site, origin, direction, across, source, bias=bias, place=place)
             rays.append(ray.moved(to_palm(site, predicted)))
         return rays
-
-    def _inside(self, site: str, sight: Sight) -> FloatArray:
-        """Where the site is when a sight is its surface."""
-        return sight.place + sight.direction * (FACE_BEHIND_M if site.startswith("head") else HAND_BEHIND_M)
 
     def _allowed(
         self,
         sites: list[str],
         sights: list[Sight],
+        inside: FloatArray,
         seen: list[Blob],
         predicted: Mapping[str, FloatArray],
         limbs: Mapping[str, npt.NDArray[np.floating[Any]]],
         lost: Collection[str],
         held: Collection[str],
         *,
-        specks: list[bool],
+        specks: Mask,
     ) -> FloatArray:
         """(S, B): 0 the sight cannot be the site, 1 only near to where it is expected, 2 wherever it can reach.
 
@@ -286,12 +284,15 @@ class SkinTracker:
         forearm is lost may also hang before trunk or legs: those have no skin to show.
         """
         owned = {blob.sight.region for blob in seen if blob.label is not None}
-        away = np.min(list(limbs.values()), axis=0) if limbs else np.zeros(len(sights))
+        distances = np.array(list(limbs.values())) if limbs else np.zeros((1, len(sights)))
+        away = distances.min(axis=0)
         outside = away > self.settings.unexplained
-        free = np.array([not a and b.deep and b.region not in owned for a, b in zip(specks, sights, strict=True)])
+        places = np.array([sight.place for sight in sights])
+        deep, hand = (np.array([getattr(sight, name) for sight in sights]) for name in ("deep", "hand"))
+        free = ~specks & deep & [sight.region not in owned for sight in sights]
         scene = np.array([sight.still for sight in sights]) & outside
-        bare = [distances for name, distances in limbs.items() if name.endswith(BARE)]
-        dressed = ((np.min(bare, axis=0) if bare else away) > BARE_M) & (away > STANDS_OUT_M)
+        bare = [row for row, name in enumerate(limbs) if name.endswith(BARE)]
+        dressed = ((distances[bare].min(axis=0) if bare else away) > BARE_M) & (away > STANDS_OUT_M)
         far = np.array([free & (outside | (dressed if site in lost else False)) for site in sites])
         allowed = np.where(scene, 0.0, 1.0 + far)
         for row, site in enumerate(sites):
@@ -299,18 +300,16 @@ class SkinTracker:
             shoulder = predicted.get(f"{side}_shoulder")
             if site.startswith("head"):
                 continue
-            allowed[row] *= [sight.hand for sight in sights]
+            allowed[row] *= hand
             if shoulder is not None:
-                farthest = reach(side, predicted)
-                distance = [float(np.linalg.norm(sight.place - shoulder)) for sight in sights]
-                allowed[row] *= [not sight.deep or d < farthest for sight, d in zip(sights, distance, strict=True)]
+                allowed[row] *= ~deep | (lengths(places - shoulder) < reach(side, predicted))
             elbow = predicted.get(f"{side}_elbow")
             if elbow is not None and site in held:
                 # What is much nearer is the forearm's middle, with the hand in the shade or cut off.
-                apart = [float(np.linalg.norm(self._inside(site, sight) - elbow)) for sight in sights]
-                forearm = float(np.linalg.norm(predicted[site] - elbow))
+                apart = lengths(inside[row] - elbow)
+                forearm = math.dist(predicted[site], elbow)
                 least, most = NEAREST_HAND * forearm, math.inf if site in lost else forearm + FARTHEST_HAND_M
-                allowed[row] *= [not sight.deep or least < d < most for sight, d in zip(sights, apart, strict=True)]
+                allowed[row] *= ~deep | ((least < apart) & (apart < most))
             if elbow is not None:
                 ends = np.array(hand_ends(sights, predicted[site], elbow))
                 if site in lost:
@@ -349,28 +348,27 @@ class SkinTracker:
         _check_image(image, camera)
         places = self._places(camera, pose, estimate.joints)
         focal = math.sqrt(camera.fx * camera.fy)
-        inside = []
-        near = np.zeros(image.shape[:2], dtype=np.uint8)
+        discs = []
+        away = np.ones(image.shape[:2], dtype=np.uint8)
         for site, (pixel, z) in places.items():
             radius = (FACE_M if site.startswith("head") else PALM_M) * focal / z
             centre = (round(pixel[0]), round(pixel[1]))
             if not (-1e4 < centre[0] < 1e4 and -1e4 < centre[1] < 1e4):
                 continue
-            cv2.circle(near, centre, max(round(2.5 * radius), 2), 1, -1)
+            cv2.circle(away, centre, max(round(2.5 * radius), 2), 0, -1)
             if site in self.assigned or not self.settled:
-                place = np.zeros(image.shape[:2], dtype=np.uint8)
-                cv2.circle(place, centre, max(round(0.8 * radius), 1), 1, -1)
-                inside.append(place.astype(bool))
+                discs.append((centre, max(round(0.8 * radius), 1)))
         self._pictures += 1
-        away = near == 0
+        outside = away.view(np.bool_)
         if self._seen is not None:
-            self._learn_static(self._seen, away if self._before is None else away & ~self._before, rate_hz)
+            self._learn_static(self._seen, outside if self._before is None else outside & ~self._before, rate_hz)
         # Light does not change from picture to picture; learning is the dearest part.
         if self.settled and self._pictures % self.settings.learn_every:
             return
+        inside = [cv2.circle(np.zeros_like(away), *disc, 1, -1).view(np.bool_) for disc in discs]
         known = self._colours
         colours = known[1] if known is not None and known[0] is image else Colours.of(image)
-        if self.colour.learn(colours, inside, outside=away, body=self._body):
+        if self.colour.learn(colours, inside, outside=outside, body=self._body):
             self._learnt += 1
 
     def _learn_static(self, seen: Mask, away: Mask, rate_hz: float) -> None:

@@ -17,9 +17,12 @@ Histogram = npt.NDArray[np.float32]
 LUMA_BINS, CHROMA_BINS = 8, 64
 """Bins of Y, and of either chroma axis, of YCrCb. Luma is coarse: it parts a face from a dark poster of the same
 hue."""
-_SHAPE = (LUMA_BINS, CHROMA_BINS, CHROMA_BINS)
-_SIZE = LUMA_BINS * CHROMA_BINS**2
+_SHAPE = (CHROMA_BINS, CHROMA_BINS, LUMA_BINS)
+"""Of a histogram: Cr, Cb, Y."""
+_SIZE = CHROMA_BINS**2 * LUMA_BINS
+_RANGES = [0.0, 256.0] * 3
 _SMOOTHING = (0.7, 0.8)
+"""Standard deviations along luma and chroma [bins]."""
 
 _IN_COMMON = 0.1
 """Two places that share less of their colours than this do not both show skin."""
@@ -29,9 +32,9 @@ _PRIOR_CENTRE, _PRIOR_SPREAD = (150.0, 110.0), (8.0, 8.0)
 
 @dataclass(frozen=True, eq=False)
 class Colours:
-    """A picture as histogram bins (H, W), and where it is light enough to have a colour (H, W), 1 or 0."""
+    """A picture's planes Cr, Cb and Y, (H, W) each, and where it is light enough to have a colour (H, W), 1 or 0."""
 
-    bins: npt.NDArray[np.int32]
+    planes: tuple[ByteImage, ...]
     lit: ByteImage
 
     @classmethod
@@ -39,8 +42,25 @@ class Colours:
         """Those of a BGR picture (H, W, 3); pixels with less luma than `darkest` have no reliable chroma."""
         planes = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb))
         luma, cr, cb = (np.asarray(plane, dtype=np.uint8) for plane in planes)
-        chroma = ((cr >> 2).astype(np.int32) << 6) | (cb >> 2)
-        return cls(((luma >> 5).astype(np.int32) << 12) | chroma, (luma >= darkest).astype(np.uint8))
+        return cls((cr, cb, luma), (luma >= darkest).view(np.uint8))
+
+    def within(self, mask: ByteImage) -> tuple[Colours, ByteImage]:
+        """The smallest part that holds all of a mask (H, W), and the mask there."""
+        x, y, w, h = cv2.boundingRect(mask)
+        window = (slice(y, y + h), slice(x, x + w))
+        return Colours(tuple(plane[window] for plane in self.planes), self.lit[window]), mask[window]
+
+    def among(self, table: Mask) -> ByteImage:
+        """(H, W): 1 where a picture is lit and its colour is one of a histogram's bins."""
+        # Without the wrapper the last axis of an array would be taken for channels.
+        bins = cv2.Mat(table.astype(np.float32), wrap_channels=False)  # type: ignore[no-untyped-call]
+        found = np.asarray(cv2.calcBackProject(self.planes, [0, 1, 2], bins, _RANGES, 1.0), dtype=np.uint8)
+        return found & self.lit
+
+    def shares(self, mask: ByteImage) -> Histogram:
+        """Share of each bin among the pixels of a mask (H, W)."""
+        counts = cv2.calcHist(self.planes, [0, 1, 2], mask, list(_SHAPE), _RANGES)
+        return np.asarray(counts / np.float32(max(cv2.countNonZero(mask), 1)), dtype=np.float32)
 
 
 class SkinColour:
@@ -59,15 +79,15 @@ class SkinColour:
         cr = ((axis - _PRIOR_CENTRE[0]) / _PRIOR_SPREAD[0]) ** 2
         cb = ((axis - _PRIOR_CENTRE[1]) / _PRIOR_SPREAD[1]) ** 2
         chroma = np.exp(-0.5 * (cr[:, None] + cb[None, :]))
-        prior = np.broadcast_to(chroma, _SHAPE).astype(np.float32)
+        prior = np.broadcast_to(chroma[:, :, None], _SHAPE).astype(np.float32)
         self.skin: Histogram = prior / prior.sum()
         self.rest: Histogram = np.full(_SHAPE, 1.0 / _SIZE, dtype=np.float32)
         self._pictures = 0
 
     def classify(self, colours: Colours) -> Mask:
         """(H, W): True where a picture has the colour of skin; single pixels are removed."""
-        table = (self.skin > self.ratio * self.rest).astype(np.uint8).ravel()
-        return np.asarray(cv2.medianBlur(table[colours.bins] & colours.lit, 3), dtype=bool)
+        found = colours.among(self.skin > self.ratio * self.rest)
+        return np.asarray(cv2.medianBlur(found, 3), dtype=np.uint8).view(np.bool_)
 
     def learn(self, colours: Colours, inside: Sequence[Mask], *, outside: Mask, body: Mask | None = None) -> bool:
         """Learn from the pixels where skin must be, and from those far from it.
@@ -84,16 +104,20 @@ class SkinColour:
         Returns:
             Whether there was enough skin to learn from.
         """
-        bins = colours.bins
-        near = (self.skin > 0.5 * self.ratio * self.rest).ravel()
-        likely = near[bins] & colours.lit.astype(bool)
-        places = [bins[place & likely] for place in inside]
-        places = [place for place in places if len(place) >= 8]
-        if len(places) < 2 or sum(len(place) for place in places) < 20:
+        near = self.skin > 0.5 * self.ratio * self.rest
+        places = []
+        for place in inside:
+            if not place.any():
+                continue
+            part, mask = colours.within(place.view(np.uint8))
+            places.append((part, mask & part.among(near)))
+        sizes = [cv2.countNonZero(mask) for _, mask in places]
+        places = [place for place, size in zip(places, sizes, strict=True) if size >= 8]
+        if len(places) < 2 or sum(size for size in sizes if size >= 8) < 20:
             return False
         most, shown = np.zeros(_SHAPE, np.float32), np.zeros(_SHAPE, np.float32)
-        for place in places:
-            shares = _smoothed(_shares(place))
+        for part, mask in places:
+            shares = _smoothed(part.shares(mask))
             np.maximum(shown, np.minimum(most, shares), out=shown)
             np.maximum(most, shares, out=most)
         total = float(shown.sum())
@@ -102,9 +126,9 @@ class SkinColour:
         # The first pictures make the general skin this person's; later ones follow slowly.
         keep = np.float32(self.forgetting if self._pictures >= 5 else 0.5)
         self.skin = keep * self.skin + (1 - keep) * (shown / np.float32(total))
-        rest = _shares(bins[outside])
+        rest = colours.shares(outside.view(np.uint8))
         if body is not None and (clothes := outside & body).any():
-            rest = 0.5 * rest + 0.5 * _shares(bins[clothes])
+            rest = 0.5 * rest + 0.5 * colours.shares(clothes.view(np.uint8))
         # A colour seen nowhere yet is not skin.
         rest = 0.95 * _smoothed(rest) + np.float32(0.05 / _SIZE)
         self.rest = keep * self.rest + (1 - keep) * rest
@@ -112,21 +136,14 @@ class SkinColour:
         return True
 
 
-def _shares(bins: npt.NDArray[np.int32]) -> Histogram:
-    """Share of each bin."""
-    counts = np.bincount(bins, minlength=_SIZE).reshape(_SHAPE).astype(np.float32)
-    return np.asarray(counts / np.float32(max(len(bins), 1)))
-
-
 def _smoothed(shares: Histogram) -> Histogram:
     """A smoothed histogram: the colours between those seen count too."""
-    across = _LUMA_KERNEL @ (_CHROMA_KERNEL @ shares @ _CHROMA_KERNEL.T).reshape(LUMA_BINS, -1)
-    return np.asarray(across.reshape(_SHAPE))
+    along_luma = (shares.reshape(-1, LUMA_BINS) @ _LUMA_KERNEL.T).reshape(_SHAPE)
+    return np.asarray(
+        cv2.sepFilter2D(along_luma, -1, _CHROMA_KERNEL, _CHROMA_KERNEL, borderType=cv2.BORDER_REFLECT), dtype=np.float32
+    )
 
 
-def _kernel(bins: int, sigma: float) -> npt.NDArray[np.float32]:
-    """Smoothing as a matrix: some small products are ten times as fast as filters along three axes."""
-    return np.asarray(gaussian_filter1d(np.eye(bins), sigma, axis=0, truncate=2.5), dtype=np.float32)
-
-
-_LUMA_KERNEL, _CHROMA_KERNEL = _kernel(LUMA_BINS, _SMOOTHING[0]), _kernel(CHROMA_BINS, _SMOOTHING[1])
+_LUMA_KERNEL = gaussian_filter1d(np.eye(LUMA_BINS), _SMOOTHING[0], axis=0, truncate=2.5).astype(np.float32)
+"""Smoothing along the luma axis as a matrix."""
+_CHROMA_KERNEL = cv2.getGaussianKernel(5, _SMOOTHING[1], cv2.CV_32F)

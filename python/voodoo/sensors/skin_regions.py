@@ -10,8 +10,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
-from voodoo.sensors.pixels import FloatArray
-
 Mask = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.int32]
 
@@ -55,9 +53,11 @@ def joined(skin: Mask, *, palm_px: float) -> Mask:
     size = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     small = size <= 3.0 * palm_px
     small[0] = False
-    closed = cv2.morphologyEx(small[labels].view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    closed = cv2.morphologyEx(
+        small.take(np.asarray(labels, dtype=np.int32)).view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)
+    )
     result = skin.copy()
-    result[window] |= closed.astype(bool)
+    result[window] |= closed.view(np.bool_)
     return result
 
 
@@ -111,22 +111,20 @@ def _length(mask: Mask) -> float:
 def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
     """Middles of the parts of a region around its tips, farthest first, at most four."""
     contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    outline = max(contours, key=len).reshape(-1, 2).astype(np.float64)
-    rows, columns = np.nonzero(mask)
-    pixels = np.column_stack([columns, rows]).astype(np.float64)
-    distance = np.linalg.norm(outline - pixels.mean(axis=0), axis=1)
+    outline = max(contours, key=len).reshape(-1, 2)
+    v, u = np.nonzero(mask)
+    distance = (outline[:, 0] - u.mean()) ** 2 + (outline[:, 1] - v.mean()) ** 2
     # A tip is farther out than all of the contour around it.
     peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
+    peaks = np.flatnonzero(peak & (distance >= (1.5 * palm_px) ** 2))
     tips: list[tuple[float, float]] = []
-    taken: list[FloatArray] = []
-    for index in np.argsort(-distance, kind="stable"):
-        if len(tips) == 4 or distance[index] < 1.5 * palm_px:
+    taken: list[list[float]] = []
+    for tip in outline[peaks[np.argsort(-distance[peaks], kind="stable")]].tolist():
+        if len(tips) == 4:
             break
-        tip = outline[index]
-        if not peak[index] or any(float(np.linalg.norm(tip - other)) < 3.0 * palm_px for other in taken):
+        if any(math.dist(tip, other) < 3.0 * palm_px for other in taken):
             continue
         taken.append(tip)
-        near = pixels[np.linalg.norm(pixels - tip, axis=1) < 3.2 * palm_px]
-        u, v = near.mean(axis=0)
-        tips.append((float(u), float(v)))
+        near = (u - tip[0]) ** 2 + (v - tip[1]) ** 2 < (3.2 * palm_px) ** 2
+        tips.append((float(u[near].mean()), float(v[near].mean())))
     return tips

@@ -1,8 +1,11 @@
 //! Closest points of many queries at once.
 
 use super::kernel::{BLOCK, Block, Constants, SHORT, Surface, closest};
+use super::lanes::LANES;
 use super::{SurfacePoint, TaperedEllipticCylinder};
 use crate::geometry::{Points, Pose, Vec3};
+#[cfg(target_arch = "x86_64")]
+use crate::simd::has_avx512;
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted to find the right basin.
@@ -30,6 +33,14 @@ impl SurfaceBatch {
     /// True when there is no result.
     pub fn is_empty(&self) -> bool {
         self.region.is_empty()
+    }
+
+    /// Makes room for `len` results in all.
+    pub fn reserve(&mut self, len: usize) {
+        self.points.reserve(len);
+        self.normals.reserve(len);
+        self.signed_distance.reserve(len.saturating_sub(self.signed_distance.len()));
+        self.region.reserve(len.saturating_sub(self.region.len()));
     }
 
     fn resize(&mut self, len: usize) {
@@ -77,18 +88,30 @@ impl TaperedEllipticCylinder {
         out.resize(xs.len());
         if self.aspect_change() > ONE_BASIN || !self.is_blunt() {
             for i in 0..xs.len() {
-                self.closest_exactly(world_from_limb, [xs[i], ys[i], zs[i]], Self::closest_point, i, out);
+                let query = in_limb(world_from_limb, [xs[i], ys[i], zs[i]]);
+                out.set(i, &self.closest_point(query), world_from_limb);
             }
             return;
         }
         let constants = Constants::new(self, world_from_limb);
         let whole = xs.len() - xs.len() % BLOCK;
         let queries = [xs, ys, zs];
-        self.closest_blocks(world_from_limb, &constants, kernel::<BLOCK>(), queries, 0..whole, out);
-        self.closest_blocks(world_from_limb, &constants, kernel::<SHORT>(), queries, whole..xs.len(), out);
+        let mut doubtful = Doubtful::default();
+        self.closest_blocks(world_from_limb, &constants, kernel::<BLOCK>(), queries, 0..whole, &mut doubtful, out);
+        self.closest_blocks(
+            world_from_limb,
+            &constants,
+            kernel::<SHORT>(),
+            queries,
+            whole..xs.len(),
+            &mut doubtful,
+            out,
+        );
+        self.settle(world_from_limb, &mut doubtful, out);
     }
 
-    /// Closest points of the queries in `range`, block by block.
+    /// Closest points of the queries in `range`, block by block; some of those left to the exact path stay in `doubtful`.
+    #[allow(clippy::too_many_arguments, reason = "one loop of its caller, for two sizes of blocks")]
     fn closest_blocks<const N: usize>(
         &self,
         world_from_limb: &Pose,
@@ -96,6 +119,7 @@ impl TaperedEllipticCylinder {
         run: Kernel<N>,
         queries: [&[f32]; 3],
         range: Range<usize>,
+        doubtful: &mut Doubtful,
         out: &mut SurfaceBatch,
     ) {
         let mut block = Block::ZERO;
@@ -122,25 +146,38 @@ impl TaperedEllipticCylinder {
             for i in 0..count {
                 if found.doubtful[i] != 0 {
                     let query = [block.x[i], block.y[i], block.z[i]];
-                    self.closest_exactly(world_from_limb, query, Self::closest_point_in_one_basin, start + i, out);
+                    doubtful.queries[doubtful.count] = in_limb(world_from_limb, query);
+                    doubtful.indices[doubtful.count] = start + i;
+                    doubtful.count += 1;
+                    if doubtful.count == LANES {
+                        self.settle(world_from_limb, doubtful, out);
+                    }
                 }
             }
         }
     }
 
-    #[cold]
-    fn closest_exactly(
-        &self,
-        world_from_limb: &Pose,
-        query: [f32; 3],
-        closest: fn(&Self, Vec3) -> SurfacePoint,
-        index: usize,
-        out: &mut SurfaceBatch,
-    ) {
-        let world = Vec3::from_array(query.map(f64::from));
-        let found = closest(self, world_from_limb.inverse_transform_point(world));
-        out.set(index, &found, world_from_limb);
+    /// Decides the doubtful queries in double precision.
+    fn settle(&self, world_from_limb: &Pose, doubtful: &mut Doubtful, out: &mut SurfaceBatch) {
+        let Doubtful { queries, indices, count } = doubtful;
+        if *count > 0 {
+            let decide = |lane: usize, found: SurfacePoint| out.set(indices[lane], &found, world_from_limb);
+            self.closest_points_in_one_basin(&queries[..*count], decide);
+        }
+        *count = 0;
     }
+}
+
+/// Queries (limb frame) that single precision did not settle, and which they are.
+#[derive(Default)]
+struct Doubtful {
+    queries: [Vec3; LANES],
+    indices: [usize; LANES],
+    count: usize,
+}
+
+fn in_limb(world_from_limb: &Pose, query: [f32; 3]) -> Vec3 {
+    world_from_limb.inverse_transform_point(Vec3::from_array(query.map(f64::from)))
 }
 
 /// Copies a block, mostly a whole one: its size is then known to the compiler.
@@ -165,6 +202,16 @@ type Kernel<const N: usize> = fn(&Constants, &Block<N>, &mut Surface<N>);
 /// The fastest kernel this processor can run; the detection is cached by the standard library.
 fn kernel<const N: usize>() -> Kernel<N> {
     #[cfg(target_arch = "x86_64")]
+    if has_avx512() && std::arch::is_x86_feature_detected!("fma") {
+        return |constants, queries, out| {
+            // SAFETY: the function is safe code that only needs AVX-512 and FMA, and this processor was found to have both.
+            #[allow(unsafe_code)]
+            unsafe {
+                closest_avx512(constants, queries, out);
+            }
+        };
+    }
+    #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
         return |constants, queries, out| {
             // SAFETY: the function is safe code that only needs AVX2 and FMA, and this processor was found to have both.
@@ -180,6 +227,12 @@ fn kernel<const N: usize>() -> Kernel<N> {
 /// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
 fn closest_baseline<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
     closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N>(constants, queries, out);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
+fn closest_avx512<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+    closest::<true, N>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -243,6 +296,40 @@ mod tests {
                 assert!((fast.points.y[i] - plain.points.y[i]).abs() < 1e-6);
                 assert!((fast.signed_distance[i] - plain.signed_distance[i]).abs() < 5e-7);
             }
+        }
+        Ok(())
+    }
+
+    /// Skipped, as there is nothing to compare, on processors without AVX-512.
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    fn wider_registers_change_no_bit() -> Result<(), crate::shape::ShapeError> {
+        if !has_avx512() || !std::arch::is_x86_feature_detected!("fma") {
+            return Ok(());
+        }
+        let shape = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.027)?;
+        let constants = Constants::new(&shape, &Pose::IDENTITY);
+        let (mut wider, mut wide) = (Surface::ZERO, Surface::ZERO);
+        for queries in shell(&shape) {
+            // SAFETY: the processor was just found to have AVX-512 (hence AVX2) and FMA.
+            unsafe {
+                closest_avx512(&constants, &queries, &mut wider);
+                closest_avx2(&constants, &queries, &mut wide);
+            }
+            let bits = |found: &Surface<BLOCK>| {
+                [
+                    &found.points.x,
+                    &found.points.y,
+                    &found.points.z,
+                    &found.normals.x,
+                    &found.normals.z,
+                    &found.signed_distance,
+                ]
+                .map(|values| values.map(f32::to_bits))
+            };
+            assert_eq!(bits(&wider), bits(&wide));
+            assert_eq!((wider.doubtful, wider.region), (wide.doubtful, wide.region));
         }
         Ok(())
     }

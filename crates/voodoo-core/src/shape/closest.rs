@@ -32,7 +32,7 @@ const SHARPEST: f64 = 1e-3;
 /// Least ratio of `g''/2` to `|P_θ|²` of a minimum that is taken for the only one; it falls to 0 at the medial axis.
 pub(super) const DISTINCT: f64 = 0.3;
 
-fn folded(q: Vec3) -> Vec3 {
+pub(super) fn folded(q: Vec3) -> Vec3 {
     Vec3::new(q.x.abs(), q.y.abs(), q.z)
 }
 
@@ -53,18 +53,16 @@ impl TaperedEllipticCylinder {
         self.nearest_face(q, self.closest_on_side(folded, self.guessed(folded)))
     }
 
-    /// [`Self::closest_point`] for shapes whose end ellipses differ little: where the minimum found first is a distinct one,
-    /// the side has no other basin, and none is looked for.
-    pub(super) fn closest_point_in_one_basin(&self, q: Vec3) -> SurfacePoint {
+    /// [`Self::closest_point`] when a first minimum is known, for shapes whose end ellipses differ little: where it is a
+    /// distinct one, the side has no other basin, and none is looked for.
+    pub(super) fn settled(&self, q: Vec3, guessed: Foot) -> SurfacePoint {
         if !q.is_finite() {
             return self.closest_point(q);
         }
-        let folded = folded(q);
-        let guessed = self.guessed(folded);
         let (a, b) = self.semi_axes(guessed.t * self.length);
         let tangent = (a * guessed.angle.s).powi(2) + (b * guessed.angle.c).powi(2);
         let distinct = guessed.bend >= DISTINCT * tangent;
-        self.nearest_face(q, if distinct { guessed } else { self.closest_on_side(folded, guessed) })
+        self.nearest_face(q, if distinct { guessed } else { self.closest_on_side(folded(q), guessed) })
     }
 
     /// The closest point when that of the side is known: a cap may be nearer.
@@ -181,7 +179,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// A starting angle: the direction `(x/a, y/b)` of the slice, then one step over the evolute of its ellipse.
-    fn guess(&self, q: Vec3) -> Angle {
+    pub(super) fn guess(&self, q: Vec3) -> Angle {
         // Not the very ends: a tip has no ellipse.
         let (a, b) = self.semi_axes(q.z.clamp(0.1 * self.length, 0.9 * self.length));
         let near = Angle::of(q.x * b, q.y * a).unwrap_or(Angle { c: 0.8, s: 0.6 });

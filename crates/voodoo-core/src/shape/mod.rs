@@ -19,6 +19,7 @@ mod batch;
 mod bounds;
 mod closest;
 mod kernel;
+mod lanes;
 mod ray;
 mod ruling;
 

@@ -15,6 +15,7 @@ impl Angle {
     pub const RIGHT: Self = Self { c: 0.0, s: 1.0 };
 
     /// The angle of the vector `(x, y)`, `None` for the zero vector.
+    #[inline(always)]
     pub fn of(x: f64, y: f64) -> Option<Self> {
         // Lengths and their products: far from where the squares overflow or vanish, so no need for the slower `hypot`.
         let norm = (x * x + y * y).sqrt();
@@ -22,16 +23,19 @@ impl Angle {
     }
 
     /// Sine of `other - self`: positive when `other` is the larger angle.
+    #[inline(always)]
     pub fn to(self, other: Self) -> f64 {
         self.c * other.s - self.s * other.c
     }
 
     /// The angle half-way to `other`.
+    #[inline(always)]
     pub fn middle(self, other: Self) -> Self {
         Self::of(self.c + other.c, self.s + other.s).unwrap_or(self)
     }
 
     /// This angle plus `atan(d)`.
+    #[inline(always)]
     pub fn turned(self, d: f64) -> Self {
         Self::of(self.c - d * self.s, self.s + d * self.c).unwrap_or(self)
     }
@@ -53,6 +57,7 @@ pub(super) struct Foot {
 
 impl TaperedEllipticCylinder {
     /// The foot of `q` (folded to `x, y >= 0`) on the ruling `A + t D` at `angle`.
+    #[inline(always)]
     pub(super) fn foot(&self, angle: Angle, q: Vec3) -> Foot {
         let Angle { c, s } = angle;
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
@@ -65,11 +70,9 @@ impl TaperedEllipticCylinder {
         let e = point - q;
         let tangent = Vec3::new(-a * s, b * c, 0.0);
         let slope = e.dot(tangent);
-        let mut bend = tangent.length_squared() - (e.x * a * c + e.y * b * s);
-        if t == free {
-            let mixed = tangent.dot(along) + e.dot(Vec3::new(-da * s, db * c, 0.0));
-            bend -= mixed * mixed / along.length_squared();
-        }
+        let mixed = tangent.dot(along) + e.dot(Vec3::new(-da * s, db * c, 0.0));
+        let coupling = if t == free { mixed * mixed / along.length_squared() } else { 0.0 };
+        let bend = tangent.length_squared() - (e.x * a * c + e.y * b * s) - coupling;
         Foot { angle, t, point, squared: e.length_squared(), slope, bend }
     }
 

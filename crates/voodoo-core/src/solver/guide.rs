@@ -95,7 +95,7 @@ impl Guide {
             self.add_points(problem, information);
         }
         let terms: [&dyn Term; 3] = [
-            &Sites { correspondences, information, scale: SCALE },
+            &Sites { correspondences, information, scale: SCALE, biased: true },
             &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, calm: 0.0 },
             &Limits { sigma: LIMIT_SIGMA },
         ];

@@ -55,7 +55,7 @@ pub struct WholeBody {
 
 impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
-        self.sum_terms(problem, poses);
+        self.sum_terms(problem, poses, true);
         match &mut self.tree {
             Some(tree) => tree.step(problem.body, &self.normal, DAMPING, problem.config.band_sigma, poses),
             None => self.chain.step(problem.body, &self.normal, DAMPING, poses),
@@ -63,7 +63,7 @@ impl Solver for WholeBody {
     }
 
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
-        self.sum_terms(problem, poses);
+        self.sum_terms(problem, poses, false);
         let Self { normal, chain, lengths, .. } = self;
         chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
     }
@@ -101,14 +101,15 @@ impl WholeBody {
         Self { tree: Some(TreeSolver::default()), ..Self::default() }
     }
 
-    fn sum_terms(&mut self, problem: &Problem, poses: &[Pose]) {
+    /// The normal equations at `poses`, with or without the sites that may always be off.
+    fn sum_terms(&mut self, problem: &Problem, poses: &[Pose], biased: bool) {
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
         // A site speaks for every joint between it and the root: what a hand is seen to do, its arm does.
         self.sites.clear();
         self.sites.resize(poses.len(), 0.0);
-        for pair in &correspondences.sites {
+        for pair in correspondences.sites.iter().filter(|pair| biased || pair.bias <= 0.0) {
             self.sites[pair.limb] += pair.weight;
         }
         for (limb, part) in body.limbs().iter().enumerate().rev() {
@@ -135,7 +136,7 @@ impl WholeBody {
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
         let terms: [&dyn Term; 4] = [
             &Surface { correspondences, information, slide: config.slide, scale },
-            &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE) },
+            &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased },
             &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
             &Prior { predicted, root, joints: &self.joint_sigmas, calm },
         ];

@@ -15,11 +15,13 @@ pub struct Sites<'a> {
     pub information: f64,
     /// Scale of the kernel, metres.
     pub scale: f64,
+    /// Whether sites with a bias count: one that may always be off can move a limb, but not tell how long it is.
+    pub biased: bool,
 }
 
 impl Term for Sites<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut Normal) {
-        for pair in &self.correspondences.sites {
+        for pair in self.correspondences.sites.iter().filter(|pair| self.biased || pair.bias <= 0.0) {
             let r = pair.x - pair.p;
             let (rho, kernel) = geman_mcclure(r.length(), self.scale);
             normal.cost += pair.weight * self.information * rho;

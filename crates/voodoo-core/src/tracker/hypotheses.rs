@@ -3,6 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::Tracker;
+use super::doubt::Doubt;
+use crate::correspondence::Correspondences;
 use crate::estimate::{LimbStatus, Status};
 use crate::evidence::{EXPLAINED, Visibility, look};
 use crate::frame::Frame;
@@ -15,9 +17,6 @@ const SUSPICIOUS: f64 = 25.0;
 /// So many near an arm make it suspect whatever else speaks for it, unless a larger share of the whole frame is unexplained.
 const STRIKING: f64 = 40.0;
 const CLUTTER: f64 = 0.15;
-/// After so many refusals in a row a chain is tried in every `REST`th frame only: a hidden arm is refused for seconds.
-const TIRED: usize = 30;
-const REST: usize = 4;
 /// A chain is idle when the patches that it alone explains are a smaller share of those it shows.
 const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
@@ -66,25 +65,22 @@ pub(super) struct Hypotheses {
     kept: Vec<Pose>,
     at_rest: Vec<Pose>,
     kept_predicted: Vec<Pose>,
+    /// What was matched before the hypothesis.
+    matched: Correspondences,
     /// Where each chain ended when the frame last proved it right, world.
     ends: Vec<Option<Vec3>>,
-    /// How often each chain was refused a change since it was in order.
-    refused: Vec<usize>,
-    /// Chains of which the last frame asked for a change.
-    proposed: Vec<bool>,
+    /// What past frames said against each chain.
+    doubts: Vec<Doubt>,
 }
 
 impl Tracker {
     pub(super) fn prepare_hypotheses(&mut self) {
         self.chains = TwoBone::of(&self.body);
-        self.idle = vec![0; self.chains.len()];
         let work = &mut self.hypotheses;
         work.ends.clear();
         work.ends.resize(self.chains.len(), None);
-        work.refused.clear();
-        work.refused.resize(self.chains.len(), 0);
-        work.proposed.clear();
-        work.proposed.resize(self.chains.len(), false);
+        work.doubts.clear();
+        work.doubts.resize(self.chains.len(), Doubt::default());
         // Room at once, not when the first hard frame comes.
         for poses in [&mut work.trial, &mut work.kept, &mut work.at_rest, &mut work.kept_predicted] {
             poses.clear();
@@ -128,6 +124,7 @@ impl Tracker {
         work.own_weight.reserve(most);
         work.others.reserve(most);
         work.distances.reserve(most);
+        work.matched.reserve_as(&self.correspondences);
         work.best.clear();
         work.best.resize(self.candidates.len(), f32::INFINITY);
         for matches in &self.correspondences.limbs {
@@ -171,16 +168,8 @@ impl Tracker {
         // Furniture stays open beside legs; nothing else than the arm is expected about an arm.
         let striking = !chain.leg && !work.cluttered && open >= STRIKING;
         let suspect = open >= SUSPICIOUS && self.suspect(chain, views, work) != [false; 2];
-        if !suspect && !striking {
-            self.idle[index] = 0;
-            work.proposed[index] = false;
-            work.refused[index] = 0;
-            return 0;
-        }
-        self.idle[index] += 1;
-        work.refused[index] += 1;
-        let tired = work.refused[index] > TIRED && !work.refused[index].is_multiple_of(REST);
-        if self.idle[index] < (if suspect { PATIENCE } else { LONG_PATIENCE }) || tired {
+        let patience = if suspect { Some(PATIENCE) } else { striking.then_some(LONG_PATIENCE) };
+        if !work.doubts[index].due(patience) {
             return 0;
         }
         let targets = targets(&work.near, &work.near_weight, root, &mut work.best);
@@ -193,7 +182,13 @@ impl Tracker {
         thin(&mut work.near, &mut work.near_weight, SAMPLE);
         self.distances_to_others(chain, &work.near, &mut work.others, &mut work.best);
         let others = std::mem::take(&mut work.others);
-        let score = |poses: &[Pose], near: &Points, weights: &[f64], best: &mut Vec<f32>, distances: &mut Vec<f32>| {
+        // No part of the cost is negative: what cannot fall below `least` any more is not looked at further.
+        let score = |poses: &[Pose],
+                     least: f64,
+                     near: &Points,
+                     weights: &[f64],
+                     best: &mut Vec<f32>,
+                     distances: &mut Vec<f32>| {
             best.clone_from(&others);
             for limb in chain.limbs() {
                 self.body.limbs()[limb].shape.approximate_distances(&poses[limb], near, distances);
@@ -203,9 +198,14 @@ impl Tracker {
             }
             let points: f64 =
                 best.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum();
-            points + look(poses).cost() + self.strain(chain, poses)
+            if points >= least {
+                return points;
+            }
+            let seen = points + look(poses).cost();
+            if seen >= least { seen } else { seen + self.strain(chain, poses) }
         };
-        let current = score(&self.poses, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
+        let current =
+            score(&self.poses, f64::INFINITY, &work.near, &work.near_weight, &mut work.best, &mut work.distances);
         let enough = current - GAIN;
         let Hypotheses { near, near_weight, best, distances, trial, kept, at_rest, .. } = work;
         // The best way to end at a place that costs less than `least`, into `kept`; returns its cost.
@@ -213,7 +213,7 @@ impl Tracker {
             for swivel in 0..ways {
                 trial.clone_from(&self.poses);
                 chain.point_at(&self.body, trial, target, TAU * swivel as f64 / ways as f64);
-                let cost = score(trial, near, near_weight, best, distances);
+                let cost = score(trial, least, near, near_weight, best, distances);
                 if cost < least {
                     least = cost;
                     kept.clone_from(trial);
@@ -231,21 +231,20 @@ impl Tracker {
             // Where the chain was a frame ago, carried by its parent.
             trial.clone_from(&self.poses);
             carry(chain, &self.body, &self.previous, trial);
-            let cost = score(trial, near, near_weight, best, distances);
+            let cost = score(trial, least, near, near_weight, best, distances);
             if cost < least {
                 least = cost;
                 kept.clone_from(trial);
             }
         }
         work.others = others;
-        let proposed = std::mem::take(&mut work.proposed[index]);
         let tried = [(rested, std::mem::take(&mut work.at_rest)), (least < enough, std::mem::take(&mut work.kept))];
         let mut steps = 0;
         for (_, poses) in tried.iter().filter(|(found, _)| *found) {
-            if !work.proposed[index] {
+            if !work.doubts[index].asks() {
                 steps += REFINE;
-                if self.refine(index, frame, pace, poses, work) {
-                    self.take_seconded(index, frame, proposed, work);
+                if self.refine(index, frame, pace, poses, work) && !work.doubts[index].ask() {
+                    self.take_back(work);
                 }
             }
         }
@@ -253,20 +252,11 @@ impl Tracker {
         steps
     }
 
-    /// A change of a chain is made when two frames in a row ask for one: a single frame may be disturbed.
-    fn take_seconded(&mut self, index: usize, frame: &Frame, proposed: bool, work: &mut Hypotheses) {
-        work.proposed[index] = true;
-        work.refused[index] = 0;
-        if !proposed {
-            self.take_back(frame, work);
-        }
-    }
-
-    /// The poses from before the hypothesis.
-    fn take_back(&mut self, frame: &Frame, work: &mut Hypotheses) {
+    /// The poses from before the hypothesis, and what was matched there.
+    fn take_back(&mut self, work: &mut Hypotheses) {
         self.poses.clone_from(&work.trial);
         self.predicted.clone_from(&work.kept_predicted);
-        self.match_last(frame);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
     }
 
     /// Remembers where the chains end that this frame proves right; a lost body has been anywhere.
@@ -276,7 +266,7 @@ impl Tracker {
         }
         let measured = |limb: usize| self.estimate.limb_status[limb] == LimbStatus::Measured;
         for (index, chain) in self.chains.iter().enumerate() {
-            if self.idle[index] == 0 && chain.limbs().all(measured) {
+            if self.hypotheses.doubts[index].none() && chain.limbs().all(measured) {
                 self.hypotheses.ends[index] = Some(chain.end(&self.poses) + self.origin);
             }
         }
@@ -346,6 +336,7 @@ impl Tracker {
         // The prediction spoke for the old configuration; the new one is what is expected now.
         work.kept_predicted.clone_from(&self.predicted);
         self.predicted.clone_from(hypothesis);
+        std::mem::swap(&mut self.correspondences, &mut work.matched);
         let last = self.config.max_steps;
         for step in 0..REFINE {
             self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
@@ -359,7 +350,7 @@ impl Tracker {
                 return true;
             }
         }
-        self.take_back(frame, work);
+        self.take_back(work);
         false
     }
 }

@@ -40,8 +40,11 @@ impl Tracker {
             for place in &PLACES[first..] {
                 let point = poses[limb] * Vec3::new(0.0, 0.0, place * shape.length());
                 let within = (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
-                    let local = poses[other].inverse_transform_point(point);
-                    self.body.limbs()[other].shape.approximate_distance(local) < -INSIDE
+                    let shape = &self.body.limbs()[other].shape;
+                    // Most limbs are too far away to hold it.
+                    let reach = shape.length() + shape.a0().max(shape.b0()).max(shape.a1()).max(shape.b1());
+                    (point - poses[other].translation).length_squared() < reach * reach
+                        && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -INSIDE
                 });
                 cost += if within { patches / PLACES.len() as f64 } else { 0.0 };
             }

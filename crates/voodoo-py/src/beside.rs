@@ -1,0 +1,110 @@
+//! A depth camera's points in the picture of another camera.
+
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use voodoo_core::beside::{Measured, Splats, Window};
+
+use crate::errors::{IntoPy, exception};
+
+type Points<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<isize>>);
+
+/// Points of a depth image (metres) within a box, in another camera's frame, and the index of each one's pixel.
+#[pyfunction]
+#[pyo3(signature = (depth, rays, *, step, rows, columns, low, high, world_from_sensor, other_from_sensor))]
+#[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+pub fn points_within<'py>(
+    py: Python<'py>,
+    depth: PyReadonlyArray2<'py, f32>,
+    rays: PyReadonlyArray3<'py, f32>,
+    step: usize,
+    rows: (usize, usize),
+    columns: (usize, usize),
+    low: [f64; 3],
+    high: [f64; 3],
+    world_from_sensor: [[f64; 4]; 4],
+    other_from_sensor: [[f64; 4]; 4],
+) -> PyResult<Points<'py>> {
+    let (size, camera) = (depth.dims(), rays.dims());
+    if camera[2] != 2 {
+        let text = format!("rays: expected shape (height, width, 2), found {:?}", rays.shape());
+        return Err(exception(py, "MeasurementError", text));
+    }
+    let window = Window {
+        depth: depth.as_slice()?,
+        size: [size[0], size[1]],
+        rays: rays.as_slice()?.as_chunks().0,
+        camera: [camera[0], camera[1]],
+        step,
+        rows: rows.0..rows.1,
+        columns: columns.0..columns.1,
+    };
+    let found = py.detach(|| window.within(low, high, &world_from_sensor, &other_from_sensor));
+    let (points, pixels) = found.map_err(|error| error.into_py(py))?;
+    let count = points.len();
+    let points = PyArray1::from_vec(py, points.into_flattened()).reshape([count, 3])?;
+    Ok((points, PyArray1::from_vec(py, pixels)))
+}
+
+type Image<'py, T> = Bound<'py, PyArray2<T>>;
+type Splatted<'py> =
+    (Image<'py, u8>, Option<Image<'py, u8>>, Bound<'py, PyArray1<isize>>, (usize, usize), Image<'py, f32>);
+
+/// Where points are in a picture: all of them, the marked ones, which are inside, and the least depths from a corner on.
+#[pyfunction]
+#[pyo3(signature = (pixels, points, marks, *, height, width))]
+pub fn splat<'py>(
+    py: Python<'py>,
+    pixels: PyReadonlyArray2<'py, f64>,
+    points: PyReadonlyArray2<'py, f64>,
+    marks: Option<PyReadonlyArray1<'py, bool>>,
+    height: usize,
+    width: usize,
+) -> PyResult<Splatted<'py>> {
+    columns(py, "pixels", &pixels, 2)?;
+    columns(py, "points", &points, 3)?;
+    let (places, points) = (pixels.as_slice()?.as_chunks().0, points.as_slice()?.as_chunks().0);
+    let marks = marks.as_ref().map(|marks| marks.as_slice()).transpose()?;
+    let found = py.detach(|| Splats::new(places, points, marks, [height, width]));
+    let Splats { seen, marked, inside, rows, columns, nearest } = found.map_err(|error| error.into_py(py))?;
+    let marked = match marks {
+        Some(_) => Some(PyArray1::from_vec(py, marked).reshape([height, width])?),
+        None => None,
+    };
+    Ok((
+        PyArray1::from_vec(py, seen).reshape([height, width])?,
+        marked,
+        PyArray1::from_vec(py, inside),
+        (rows.start, columns.start),
+        PyArray1::from_vec(py, nearest).reshape([rows.len(), columns.len()])?,
+    ))
+}
+
+/// Depth of the nearest surface around a place in a picture and whether most of it is still; none with too few points.
+#[pyfunction]
+#[pyo3(signature = (pixels, depths, still, *, pixel, radius, among=None))]
+pub fn nearest_surface<'py>(
+    py: Python<'py>,
+    pixels: PyReadonlyArray2<'py, f64>,
+    depths: PyReadonlyArray1<'py, f64>,
+    still: Option<PyReadonlyArray1<'py, bool>>,
+    pixel: [f64; 2],
+    radius: f64,
+    among: Option<PyReadonlyArray1<'py, bool>>,
+) -> PyResult<Option<(f64, bool)>> {
+    columns(py, "pixels", &pixels, 2)?;
+    let still = still.as_ref().map(|marks| marks.as_slice()).transpose()?;
+    let among = among.as_ref().map(|marks| marks.as_slice()).transpose()?;
+    let measured = Measured { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
+    measured.surface(pixel, radius, among).map_err(|error| error.into_py(py))
+}
+
+fn columns(py: Python<'_>, name: &str, array: &PyReadonlyArray2<'_, f64>, count: usize) -> PyResult<()> {
+    let shape = array.dims();
+    if shape[1] == count {
+        return Ok(());
+    }
+    let text = format!("{name}: expected shape (N, {count}), found ({}, {})", shape[0], shape[1]);
+    Err(exception(py, "MeasurementError", text))
+}
