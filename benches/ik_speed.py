@@ -55,10 +55,10 @@ def main() -> None:
     goals = np.array([chain.forward(row)[1]["wrist"] for row in rng.uniform(-0.8, 0.8, (count, 6))])[:, None]
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {count} postures, 15 steps a phase")
     print(
-        "| images | postures a second | us a posture | steps | tried | us a step | reached within 0.1 mm |\n"
-        "|---|---|---|---|---|---|---|"
+        "| images | postures a second | us a posture | steps | tried | looked | us a step | reached within 0.1 mm |\n"
+        "|---|---|---|---|---|---|---|---|"
     )
-    took, tries = [], []
+    took, looks = [], []
     for views in (0, 1, 2):
         # The fastest of some rounds for each few hundred postures: waiting for other programs does not count.
         fastest = np.full(len(parts), np.inf)
@@ -80,20 +80,21 @@ def main() -> None:
                 fastest[index] = min(fastest[index], time.perf_counter() - began)
         best, steps = fastest.sum(), sum(some.steps.sum() for some in found)
         took.append(1e6 * best / count)
-        tries.append(sum(some.tried.sum() for some in found) / count)
+        tried, looked = (sum(getattr(some, name).sum() for some in found) / count for name in ("tried", "looked"))
+        looks.append(looked)
         reached = np.linalg.norm(np.concatenate([some.joints[:, 0] for some in found]) - goals[:, 0], axis=1) < 1e-4
         print(
-            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {tries[-1]:.1f} | "
+            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {tried:.1f} | {looked:.1f} | "
             f"{1e6 * best / steps:.2f} | "
             f"{100 * reached.mean():.1f} % |"
         )
     plain, one, two = took
     print(f"one picture: {plain:.1f} us without it, {two - one:.1f} us sampling and gradient, ", end="")
     print(
-        f"{2 * one - two - plain:.1f} us null space, kinematics and limits; {two - one:.1f} us / {tries[1]:.1f} tries = ",
+        f"{2 * one - two - plain:.1f} us null space, kinematics and limits; {two - one:.1f} us / {looks[1]:.1f} postures = ",
         end="",
     )
-    print(f"{1e3 * (two - one) / tries[1]:.0f} ns a picture and try")
+    print(f"{1e3 * (two - one) / looks[1]:.0f} ns a picture and posture")
 
 
 if __name__ == "__main__":

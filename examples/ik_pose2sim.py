@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+from ik_keypoints import Keypoints, keypoints
 from ik_limbs import LIMBS, Truth, follow, limb_lengths, steady
 
 import voodoo
 from voodoo import ik
-from voodoo.keypoint_layouts import LAYOUTS
 from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
-from voodoo.recordings import KeypointImage, Recording
 from voodoo.recordings.pose2sim import SITES
 from voodoo.sensors.background import StillBackground
 from voodoo.silhouettes import filled, surroundings
@@ -24,20 +23,20 @@ SCALE = 0.25
 LEARN_EVERY = 2
 AGREES_PX = 15.0
 """Pose2Sim leaves a camera out of its triangulation that is farther off by default."""
-SURE = 0.3
 CORNERS = ("l_shoulder", "r_shoulder", "l_hip", "r_hip")
 
 
 @dataclass
 class Trial:
     """The published triangulation, the chains of constant limbs nearest to it, and of each camera its silhouettes (F) and its
-    pose (4, 4), and how far the 2-D keypoints of the known sites lie from the triangulation as it sees it: offsets (N, 2),
-    pixels."""
+    pose (4, 4), the 2-D keypoints, and how far those of the known sites lie from the triangulation as it sees it: offsets
+    (N, 2), pixels."""
 
     truth: Truth
     steady: Truth
     height: float
     views: dict[str, tuple[list[ik.Silhouette], np.ndarray]]
+    keypoints: Keypoints
     offsets: dict[str, np.ndarray]
 
     @property
@@ -49,6 +48,10 @@ class Trial:
         """How far an outline is from where it should be in the smaller pictures [px]: a pixel of its own, and what the
         calibration is off across a limb, the median of the offsets along either axis."""
         return 1.0 + SCALE * float(np.median(np.abs(self.offsets[camera])))
+
+    def best(self, count: int) -> tuple[str, ...]:
+        """So many cameras: those that agree best with the known sites, which is known before anything is estimated."""
+        return tuple(sorted(sorted(self.apart, key=lambda name: self.apart[name])[:count]))
 
     @property
     def agreeing(self) -> tuple[str, ...]:
@@ -63,15 +66,6 @@ class Trial:
 
         return follow(truth, self.height, silhouettes if cameras else None, **options)
 
-    def sharp(self) -> Trial:
-        """The same silhouettes, their borders as sure as if the calibrations were right."""
-        views = {}
-        for name, (outlines, pose) in self.views.items():
-            camera = replace(outlines[0].camera, distortion=())  # taken out of the masks already
-            masks = [outline.distance < 0.0 for outline in outlines]
-            views[name] = ([ik.Silhouette(mask, camera=camera, world_from_camera=pose) for mask in masks], pose)
-        return replace(self, views=views)
-
 
 def four_cameras(path: Path) -> Trial:
     recording = voodoo.open_recording(path)
@@ -81,7 +75,8 @@ def four_cameras(path: Path) -> Trial:
         placed.name: (*read(video, placed.camera), placed.world_from_sensor)
         for placed, video in zip(recording.cameras, sorted((path / "videos").glob("*.mp4")), strict=True)
     }
-    trial = Trial(truth, steady(truth), stature(truth), {}, offsets(recording, truth))
+    seen_by = keypoints(recording, names)
+    trial = Trial(truth, steady(truth), stature(truth), {}, seen_by, seen_by.offsets(truth))
     known = {name: places for name, places in truth.items() if name not in LIMBS}
     # Twice: elbows and knees found with the first silhouettes tell better where the person is not, hence the background.
     for _ in range(2):
@@ -90,22 +85,6 @@ def four_cameras(path: Path) -> Trial:
         }
         known = {**known, **trial.solve(trial.agreeing, truth)}
     return trial
-
-
-def offsets(recording: Recording, truth: Truth) -> dict[str, np.ndarray]:
-    """Camera -> offsets (N, 2) [px] of the known sites' keypoints from the truth as projected into it."""
-    found: dict[str, list[np.ndarray]] = {}
-    for frame, recorded in enumerate(recording):
-        for item in recorded.measurements:
-            if not isinstance(item, KeypointImage) or not item.people:
-                continue
-            view = CameraView(item.camera, item.root_from_sensor)
-            for part in LAYOUTS[item.layout].parts:
-                u, v, sure = np.sum([share * item.people[0][index] for index, share in part.shares.items()], axis=0)
-                if part.site in truth and part.site not in LIMBS and sure > SURE:
-                    pixel, _ = view.project(truth[part.site][frame][None])
-                    found.setdefault(item.sensor, []).append(pixel[0] - (u, v))
-    return {name: np.array(rows) for name, rows in found.items()}
 
 
 def cut_out(

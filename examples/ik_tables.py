@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import cv2
@@ -21,7 +22,7 @@ from ik_pose2sim import Trial, four_cameras
 import voodoo
 from voodoo import ik
 from voodoo.recordings import DepthImage
-from voodoo.silhouettes import StillScene, from_depth
+from voodoo.silhouettes import StillScene, from_depth, metres
 from voodoo.views import CameraView, silhouette
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
@@ -55,18 +56,19 @@ class Rendered:
         """Pose (4, 4) of the second camera: 3 m to the side of the root."""
         return side_pose(self.truth["humanoid_root"][frame])
 
-    def front(self, frame: int, last: Mapping[str, np.ndarray]) -> ik.Silhouette:
-        """The person cut out by depth: what hangs together with the known joints and the last estimates."""
+    def front(self, frame: int, last: Mapping[str, np.ndarray], *, deep: bool = False) -> ik.Silhouette:
+        """The person cut out by depth: what hangs together with the known joints and the last estimates; `deep`: with depths."""
         depth = self.depths[frame]
         known = {name: self.truth[name][frame] for name in KNOWN}
         mask = from_depth(depth, {**known, **last}, scene=self.scene)
-        return ik.Silhouette(mask, camera=depth.camera, world_from_camera=depth.root_from_sensor)
+        seen = metres(depth) if deep else None
+        return ik.Silhouette(mask, camera=depth.camera, world_from_camera=depth.root_from_sensor, depth=seen)
 
-    def solve(self, views: int) -> dict[str, np.ndarray]:
-        """Positions (F, 3) of elbows and knees with so many views."""
+    def solve(self, views: int, *, deep: bool = False) -> dict[str, np.ndarray]:
+        """Positions (F, 3) of elbows and knees with so many views; `deep`: the first one with its depths."""
 
         def silhouettes(frame: int, last: Mapping[str, np.ndarray]) -> list[ik.Silhouette]:
-            return [self.front(frame, last), self.side[frame]][:views]
+            return [self.front(frame, last, deep=deep), self.side[frame]][:views]
 
         return follow(self.truth, self.height, silhouettes if views else None)
 
@@ -137,14 +139,35 @@ def picture(
     return canvas
 
 
-def spread(trial: Trial, cameras: Sequence[str]) -> str:
-    """Mean error [mm] of elbows and knees from the nearest chains, over some cautions around the default (least to most): small
-    changes move the solution of a sequence from one valley to another, so one figure alone says little."""
-    means = [
-        1e3 * np.mean(list(errors(trial.solve(cameras, trial.steady, caution=caution), trial.steady).values()))
-        for caution in CAUTIONS
-    ]
-    return f"{np.mean(means):.1f} ({min(means):.1f} to {max(means):.1f})"
+def mean(found: Mapping[str, np.ndarray], truth: Truth, joint: str) -> float:
+    """Mean error [mm] over both sides of "elbow", "knee", or "both"."""
+    some = [error for name, error in errors(found, truth).items() if joint in ("both", name[2:])]
+    return float(1e3 * np.nanmean(some))
+
+
+def spread(trial: Trial, cameras: Sequence[str]) -> list[str]:
+    """Mean errors [mm] of elbows, knees and both from the nearest chains, over some cautions around the default (least to most):
+    small changes move the solution of a sequence from one valley to another, so one figure alone says little."""
+    found = [trial.solve(cameras, trial.steady, caution=caution) for caution in CAUTIONS]
+    words = []
+    for joint in ("elbow", "knee", "both"):
+        means = [mean(one, trial.steady, joint) for one in found]
+        words.append(f"{np.mean(means):.1f} ({min(means):.1f} to {max(means):.1f})")
+    return words
+
+
+def all_sets(trial: Trial) -> None:
+    """The table of every set of cameras, and what the keypoints that the truth was triangulated from say in their place."""
+    plain = trial.solve((), trial.steady)
+    halves = [0.5 * mean(plain, trial.steady, joint) for joint in ("elbow", "knee", "both")]
+    print("\n| cameras | elbow | knee | both | keypoints: elbow | knee | both |\n|---|---|---|---|---|---|---|")
+    print("| half of plain | " + " | ".join(f"{half:.1f}" for half in halves) + " | | | |")
+    for count in range(1, len(trial.views) + 1):
+        for cameras in combinations(trial.views, count):
+            turned = trial.keypoints.turned(cameras, trial.steady)
+            own = [f"{mean(turned, trial.steady, joint):.1f}" for joint in ("elbow", "knee", "both")]
+            name = " ".join(camera[-2:] for camera in cameras) + (" (best)" if cameras == trial.best(count) else "")
+            print(f"| {name} | " + " | ".join(spread(trial, cameras) + own) + " |", flush=True)
 
 
 def main() -> None:
@@ -153,12 +176,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("ik_tables"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("| sequence | joint | plain | 1 view | 2 views |\n|---|---|---|---|---|")
-    for name in ("dev_03_punch", "dev_05_walk"):
+    print(
+        "| sequence | joint | plain | 1 view | 2 views | 1 with depth | 2, the first with depth |\n|---|---|---|---|---|---|---|"
+    )
+    for name in sorted(path.parent.name for path in (arguments.data / "rendered").glob("*/bag")):
         if not (arguments.data / "rendered" / name).is_dir():
             continue
         sequence = rendered(arguments.data / "rendered" / name)
-        found = [sequence.solve(views) for views in (0, 1, 2)]
+        found = [sequence.solve(views) for views in (0, 1, 2)] + [sequence.solve(views, deep=True) for views in (1, 2)]
         for joint in ("elbow", "knee", "both"):
             print(row(name, joint, [errors(one, sequence.truth) for one in found]))
         tiles = []
@@ -170,11 +195,11 @@ def main() -> None:
         cv2.imwrite(str(arguments.out / f"{name}.png"), np.hstack(tiles))
     if (arguments.data / "pose2sim").is_dir():
         trial = four_cameras(arguments.data / "pose2sim")
-        sets = ((), ("cam_01",), ("cam_01", "cam_04"), trial.agreeing, tuple(trial.views))
+        sets = ((), trial.best(1), trial.best(2), trial.agreeing, tuple(trial.views))
         print("\n2-D keypoints off by: " + ", ".join(f"{name} {pixels:.1f} px" for name, pixels in trial.apart.items()))
         print("borders (smaller pictures): " + ", ".join(f"{name} {trial.border(name):.1f} px" for name in trial.views))
         print(
-            "\n| real cameras, known and error from | joint | plain | 1 view | 2 views | those that agree | all 4 | best turn |\n"
+            "\n| real cameras, known and error from | joint | plain | best 1 | best 2 | those that agree | all 4 | best turn |\n"
             "|---|---|---|---|---|---|---|---|"
         )
         for name, truth in (("the triangulation", trial.truth), ("its nearest chains", trial.steady)):
@@ -184,11 +209,7 @@ def main() -> None:
                 print(f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")
             for joint in ("elbow", "knee", "both"):
                 print(row(name, joint, [errors(one, truth) for one in found]))
-        print(
-            "\n| borders, nearest chains, both | 1 view | 2 views | those that agree | all 4 |\n|---|---|---|---|---|"
-        )
-        for name, some in (("as the calibration is off", trial), ("1 px", trial.sharp())):
-            print(f"| {name} | " + " | ".join(spread(some, cameras) for cameras in sets[1:]) + " |")
+        all_sets(trial)
         moved = {name: np.linalg.norm(trial.steady[name] - trial.truth[name], axis=1) for name in trial.truth}
         print("\nmoved, mean mm: " + ", ".join(f"{n} {1e3 * d.mean():.1f}" for n, d in moved.items() if d.any()))
         frame = 50

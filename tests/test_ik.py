@@ -36,6 +36,16 @@ def test_stretched_arm_leaves_the_singular_pose(arm):
     assert found.residuals[0] < 1e-6
 
 
+@pytest.mark.parametrize("bend", [0.6, 1.0, 1.5])
+def test_an_elbow_bent_backwards_comes_back_for_a_nearer_target(arm, bend):
+    # At its limit the elbow has the stretched arm, which is farther from the target, between itself and the answer.
+    start = np.array([0.7, -1.0, -0.6, arm.limits[3, 0]])
+    goal = arm.forward([*start[:3], bend])[1]["l_hand"]
+    assert start[3] < -0.05
+    found = ik.Follower(arm, start=start, steps=30).step({"l_hand": goal})
+    assert found.residuals[0] < 1e-6 and found.angles[3] == pytest.approx(bend, abs=0.05)
+
+
 def test_contradictory_targets_meet_in_the_weighted_middle():
     body = voodoo.Body.human(1.75, model="papers")
     chain = ik.Chain(body, limbs=("torso",), root="free")

@@ -363,6 +363,7 @@ class View:
         cls,
         distance: npt.NDArray[np.float32],
         thickness: npt.NDArray[np.float32],
+        depth: npt.NDArray[np.float32] | None,
         border: float,
         intrinsics: tuple[float, float, float, float],
         camera_from_world: npt.ArrayLike,
@@ -427,6 +428,7 @@ class Chain:
         views: Sequence[View],
         how: tuple[int, float, float, float, float, float],
     ) -> tuple[
+        npt.NDArray[np.float64],
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],

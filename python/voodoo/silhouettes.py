@@ -56,7 +56,7 @@ class StillScene:
         """
         if not images or len({image.image.shape for image in images}) != 1:
             raise MeasurementError(f"images: expected some of one size, found {len(images)}")
-        depths = np.sort(np.stack([_metres(image) for image in images]), axis=0)  # NaN comes last
+        depths = np.sort(np.stack([metres(image) for image in images]), axis=0)  # NaN comes last
         last = np.isfinite(depths).sum(axis=0)[None] - 1
         # The farthest but one, since one alone may be an error; then the middle of what lies as deep.
         deep = np.take_along_axis(depths, np.maximum(last - 1, 0), axis=0)
@@ -100,7 +100,7 @@ def from_depth(
     places = {site: _place(site, position) for site, position in known.items()}
     points, valid = depth_points(depth)
     solid = valid & (points[:, 2] > _FLOOR_M) if level else valid
-    z = np.where(solid.reshape(height, width), _metres(depth), np.nan)
+    z = np.where(solid.reshape(height, width), metres(depth), np.nan)
     view = CameraView(depth.camera, depth.root_from_sensor)
     seeds = []
     for place in places.values():
@@ -194,7 +194,7 @@ def _nearest_of(scene: FloatArray) -> FloatArray:
     return np.asarray(scene - _BEFORE[0] - _BEFORE[1] * scene)
 
 
-def _metres(depth: DepthImage) -> FloatArray:
+def metres(depth: DepthImage) -> FloatArray:
     """Depths (height, width) [m], NaN where nothing returned."""
     z = depth.image.astype(np.float64) * depth.metres_per_unit
     return np.asarray(np.where(z > 0.0, z, np.nan))

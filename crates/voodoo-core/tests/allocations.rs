@@ -85,14 +85,15 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
 fn ik_allocations() -> usize {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let model = Model::new(&body, &[], Root::Free).unwrap();
-    let image: Vec<f32> =
-        (0..160 * 120).map(|i| ((i % 160) as f32 - 70.0).hypot((i / 160) as f32 - 60.0) - 9.0).collect();
-    let thickness: Vec<f32> = image.iter().map(|distance| if *distance < 0.0 { 9.0 } else { 0.0 }).collect();
+    let pixels: Vec<[f32; 2]> = (0..160 * 120)
+        .map(|i| ((i % 160) as f32 - 70.0).hypot((i / 160) as f32 - 60.0) - 9.0)
+        .map(|distance| [distance, if distance < 0.0 { 9.0 } else { 0.0 }])
+        .collect();
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
     let view = View {
-        distance: &image,
-        thickness: &thickness,
+        pixels: &pixels,
+        depth: &[],
         border: 1.0,
         width: 160,
         height: 120,

@@ -106,11 +106,14 @@ proptest! {
         angles[2] += 0.2;
         let image = disc(160, 120, [60.0, 50.0], 12.0);
         // A disc is nowhere thinner than itself; a little slope, so that its derivative is seen.
-        let thickness: Vec<f32> = image.iter().enumerate().map(|(i, d)| if *d < 0.0 { 6.0 + 0.02 * (i % 160) as f32 } else { 0.0 }).collect();
+        let pixels: Vec<[f32; 2]> = image.iter().enumerate().map(|(i, d)| [*d, if *d < 0.0 { 6.0 + 0.02 * (i % 160) as f32 } else { 0.0 }]).collect();
+        // A surface through the body, oblique.
+        let depth: Vec<f32> = (0..160 * 120).map(|i| 3.0 + 0.001 * (i % 160) as f32 - 0.002 * (i / 160) as f32).collect();
         // Optical frame: z towards -x of the world, 3 m away.
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { distance: &image, thickness: &thickness, border: 1.0, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
+        let view = View { pixels: &pixels, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
+        let deep = View { depth: &depth, ..view };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
         let mut trunk = trunk(&body, &model);
@@ -118,7 +121,7 @@ proptest! {
         // A limb beside the chain, through the body's middle.
         let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
         trunk.push(Trunk::new(&body.limbs()[0].shape, Carrier::World(beside)));
-        let criterion = Criterion { views: &[view, view], segments: &segments, thin, trunk: &trunk };
+        let criterion = Criterion { views: &[view, deep], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
             model.place(&Pose::identity(), angles, &mut at);
@@ -149,10 +152,10 @@ proptest! {
         let trunk = trunk(&body, &model);
         // The base of an arm is the trunk.
         prop_assert_eq!(trunk.len(), 1);
-        let image = vec![-100.0_f32; 160 * 120];
+        let image = vec![[-100.0_f32, 0.0]; 160 * 120];
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { distance: &image, thickness: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+        let view = View { pixels: &image, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
         // One short bone beside the shoulder, moved into the trunk by its base.
         let segment = Segment { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
         let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };

@@ -23,8 +23,8 @@ type OptionParts = (usize, f64, f64, f64, f64, f64);
 
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
 pub struct PyView {
-    distance: Vec<f32>,
-    thickness: Vec<f32>,
+    pixels: Vec<[f32; 2]>,
+    depth: Vec<f32>,
     border: f64,
     width: usize,
     height: usize,
@@ -38,6 +38,7 @@ impl PyView {
     fn new(
         distance: PyReadonlyArray2<'_, f32>,
         thickness: PyReadonlyArray2<'_, f32>,
+        depth: Option<PyReadonlyArray2<'_, f32>>,
         border: f64,
         intrinsics: [f64; 4],
         camera_from_world: &Bound<'_, PyAny>,
@@ -48,8 +49,8 @@ impl PyView {
             return Err(exception(camera_from_world.py(), "MeasurementError", message));
         }
         Ok(Self {
-            distance: distance.as_slice()?.to_vec(),
-            thickness: thickness.as_slice()?.to_vec(),
+            pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
+            depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,
             border,
             width,
             height,
@@ -62,8 +63,8 @@ impl PyView {
 impl PyView {
     fn view(&self) -> ik::View<'_> {
         ik::View {
-            distance: &self.distance,
-            thickness: &self.thickness,
+            pixels: &self.pixels,
+            depth: &self.depth,
             border: self.border,
             width: self.width,
             height: self.height,
@@ -313,7 +314,7 @@ impl PyChain {
     }
 
     /// Many postures that share sites, images and options: angles `(N, n)`, sites `(N, S, 3)`, h `(N,)`, steps `(N,)`,
-    /// postures tried `(N,)`, converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
+    /// postures tried and those compared with images `(N,)`, converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
     #[allow(clippy::too_many_arguments, clippy::type_complexity, reason = "called by voodoo.ik only")]
     fn solve_many<'py>(
         &self,
@@ -325,7 +326,7 @@ impl PyChain {
         depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
-    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
+    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
         let py = base.py();
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
@@ -339,7 +340,7 @@ impl PyChain {
         let sites: Vec<(usize, Vec3)> = self.site_parts().map(|(_, part, x)| (part, x)).collect();
         let how = options(how);
         let mut points = Vec::with_capacity(3 * sites.len() * count);
-        let (mut h, mut steps, mut tried, mut converged) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let [mut h, mut steps, mut tried, mut looked, mut converged] = [const { Vec::new() }; 5];
         py.detach(|| {
             let mut solver = Solver::default();
             let width = 3 * goals.len();
@@ -355,6 +356,7 @@ impl PyChain {
                 h.push(report.h);
                 steps.push(report.steps as f64);
                 tried.push(report.tried as f64);
+                looked.push(report.looked as f64);
                 converged.push(f64::from(u8::from(report.converged)));
             }
         });
@@ -364,6 +366,7 @@ impl PyChain {
             frozen(py, h, &[count])?,
             frozen(py, steps, &[count])?,
             frozen(py, tried, &[count])?,
+            frozen(py, looked, &[count])?,
             frozen(py, converged, &[count])?,
         ))
     }

@@ -25,7 +25,13 @@ class Silhouette:
     """The person's outline in one calibrated picture, as its Euclidean distance transform (J10 section 3)."""
 
     def __init__(
-        self, mask: npt.ArrayLike, *, camera: Camera, world_from_camera: npt.ArrayLike, border: float = 1.0
+        self,
+        mask: npt.ArrayLike,
+        *,
+        camera: Camera,
+        world_from_camera: npt.ArrayLike,
+        border: float = 1.0,
+        depth: npt.ArrayLike | None = None,
     ) -> None:
         """Transform a mask; lens distortion is taken out of it first.
 
@@ -35,9 +41,12 @@ class Silhouette:
             world_from_camera: rigid (4, 4) pose of the optical frame.
             border: how far the outline may be from where the camera should see it [px], by its own error and by that of the
                 calibration: bones need not lie deep inside, or in the middle, more exactly than that.
+            depth: (height, width) along the optical axis [m] as a depth camera saw it, 0 or not finite where nothing
+                returned: bones lie behind what is seen, too, and no farther than that where the silhouette is the limb itself.
 
         Raises:
-            MeasurementError: the border is no number of pixels, the mask has not the camera's size, or the pose is not rigid.
+            MeasurementError: the border is no number of pixels, mask or depth have not the camera's size, depths are
+                negative or of a camera with lens distortion, or the pose is not rigid.
         """
         if not isinstance(camera, Camera):
             raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
@@ -64,12 +73,13 @@ class Silhouette:
         pose = numbers("world_from_camera", world_from_camera)
         if pose.shape != (4, 4) or not np.isfinite(pose).all():
             raise MeasurementError(f"world_from_camera: expected a rigid 4x4 transform, found {world_from_camera!r}")
+        seen = None if depth is None else _depths(depth, camera, person)
         intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
         # The core checks that the pose is rigid, so the inverse is the transposed one.
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, self.thickness, self.border, intrinsics, inverse)
+        self._core = _core.View(self.distance, self.thickness, seen, self.border, intrinsics, inverse)
 
     @property
     def core(self) -> _core.View:
@@ -127,6 +137,21 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
     for u, v, radius in zip(columns[order].tolist(), rows[order].tolist(), radii[order].tolist(), strict=True):
         cv2.circle(thickness, (u * one, v * one), round(radius * one), radius, cv2.FILLED, shift=_SUBPIXEL_BITS)
     return np.where(inside > 0.0, np.maximum(thickness, inside), np.float32(0.0)).astype(np.float32)
+
+
+def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
+    """Depths of the person as the core takes them: zero where there is none."""
+    found = np.nan_to_num(numbers("depth", depth), nan=0.0, posinf=0.0, neginf=0.0)
+    if found.shape != (camera.height, camera.width) or (found < 0.0).any():
+        raise MeasurementError(
+            f"depth: expected metres of shape {(camera.height, camera.width)} of its camera, found {found.shape}, "
+            f"{int((found < 0.0).sum())} of them negative"
+        )
+    if camera.distorted:
+        # Interpolated depths would be between two surfaces; depth cameras deliver rectified pictures.
+        raise MeasurementError(f"depth: expected a camera without lens distortion, found {camera.distortion}")
+    # Beside the person it is the silhouette that says so.
+    return np.ascontiguousarray(np.where(person != 0, found, 0.0), dtype=np.float32)
 
 
 def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:

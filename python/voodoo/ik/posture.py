@@ -49,13 +49,14 @@ class Posture:
 @dataclass(frozen=True, eq=False, repr=False)
 class Postures:
     """N postures of `solve_many`: angles (N, n), joints (N, S, 3) [m] in the order of Chain.site_names, h (N,) [px],
-    steps (N,), postures tried on the way (N,), converged (N,)."""
+    steps (N,), postures tried on the way (N,), those of them compared with the images (N,), converged (N,)."""
 
     angles: FloatArray
     joints: FloatArray
     h: FloatArray
     steps: FloatArray
     tried: FloatArray
+    looked: FloatArray
     converged: npt.NDArray[np.bool_]
 
     def __repr__(self) -> str:

@@ -125,8 +125,8 @@ def solve_many(
         views,
         options.parts(),
     )
-    angles, joints, h, steps, tried, converged = found
-    return Postures(angles, joints, h, steps, tried, converged != 0.0)
+    angles, joints, h, steps, tried, looked, converged = found
+    return Postures(angles, joints, h, steps, tried, looked, converged != 0.0)
 
 
 def _chain(chain: Chain | Body) -> Chain:

@@ -2,33 +2,11 @@
 
 use super::model::{Kinematics, Model};
 use super::trunk::{Carrier, Trunk};
-use crate::geometry::{Mat3, Pose, Vec3};
+use super::view::{NEAREST, View};
+use crate::geometry::{Mat3, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
 pub const SAMPLES: usize = 8;
-/// Points nearer to the camera plane than this, or behind it, are not seen; metres.
-const NEAREST: f64 = 0.05;
-
-/// One calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
-#[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
-    /// Distances, row by row; at least 2 x 2.
-    pub distance: &'a [f32],
-    /// Of every pixel inside, the radius of the largest disc within the silhouette that covers it, pixels: half its local
-    /// width. As many as distances, or none: then no bone is centred.
-    pub thickness: &'a [f32],
-    /// How far its border may be from where it should be, pixels: that much less deep is deep enough. The middle between two
-    /// borders is known to half of that.
-    pub border: f64,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Focal lengths fx, fy and centre cx, cy, pixels; integer coordinates are pixel centres.
-    pub intrinsics: [f64; 4],
-    /// Pose of the world in the optical frame.
-    pub camera_from_world: Pose,
-}
 
 /// A bone that shall lie inside the silhouettes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +21,7 @@ pub struct Segment {
 
 /// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less
 /// what the border is uncertain by or, where the silhouette is about as thin as the limb, half the silhouette's width less half
-/// of that.
+/// of that. Views with depths add how far the bone's flesh lies before what they see, see [`View::depth`].
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
@@ -90,12 +68,19 @@ impl Criterion<'_> {
                 let (a, b) =
                     (view.camera_from_world.transform_point(ends[0]), view.camera_from_world.transform_point(ends[1]));
                 let mut slopes = [Vec3::ZERO; 2];
+                let mut seen = false;
                 for t in places() {
                     let radius = segment.radius[0] + t * (segment.radius[1] - segment.radius[0]);
                     let (value, slope) = view.outside(a + t * (b - a), radius, self.thin);
-                    h += value;
-                    slopes[0] += (1.0 - t) * slope;
-                    slopes[1] += t * slope;
+                    if value > 0.0 {
+                        seen = true;
+                        h += value;
+                        slopes[0] += (1.0 - t) * slope;
+                        slopes[1] += t * slope;
+                    }
+                }
+                if !seen {
+                    continue;
                 }
                 let world_from_camera = Mat3::from_quat(view.camera_from_world.rotation).transpose();
                 forces[0] += world_from_camera * slopes[0];
@@ -169,85 +154,4 @@ fn pull(model: &Model, at: &Kinematics, part: usize, x: Vec3, force: Vec3, gradi
 /// Where on a segment the samples are, as shares of its length.
 fn places() -> impl Iterator<Item = f64> {
     (0..SAMPLES).map(|sample| (sample as f64 + 0.5) / SAMPLES as f64)
-}
-
-impl View<'_> {
-    /// `max(distance + depth, 0)` of a point in the optical frame and its derivative by that point.
-    fn outside(&self, x: Vec3, radius: f64, thin: f64) -> (f64, Vec3) {
-        if x.z < NEAREST {
-            return (0.0, Vec3::ZERO);
-        }
-        let [fx, fy, cx, cy] = self.intrinsics;
-        let inverse = 1.0 / x.z;
-        let (px, py) = (x.x * inverse, x.y * inverse);
-        let Some(at) = self.locate(fx * px + cx, fy * py + cy) else { return (0.0, Vec3::ZERO) };
-        let [distance, mut du, mut dv] = at.sample(self.distance, self.width);
-        let projected = fx * radius * inverse;
-        let mut depth = (projected - self.border).max(0.0);
-        // The derivative of the depth by the distance from the camera plane.
-        let mut closer = if depth > 0.0 { projected } else { 0.0 };
-        let middle = 0.5 * self.border;
-        // No place is deeper than half the width: what is too deep to be thin need not be looked up.
-        if distance < 0.0 && -distance <= thin * projected && distance + thin * projected - middle > 0.0 {
-            let [half, su, sv] = at.sample(self.thickness, self.width);
-            if half <= thin * projected && half - middle > depth {
-                depth = half - middle;
-                (du, dv, closer) = (du + su, dv + sv, 0.0);
-            }
-        }
-        let value = distance + depth;
-        if value <= 0.0 {
-            return (0.0, Vec3::ZERO);
-        }
-        let (gx, gy) = (du * fx, dv * fy);
-        (value, Vec3::new(gx, gy, -(gx * px + gy * py) - closer) * inverse)
-    }
-
-    /// The four pixels around a place; outside of the picture those of its border.
-    fn locate(&self, u: f64, v: f64) -> Option<Place> {
-        let (right, bottom) = ((self.width - 1) as f64, (self.height - 1) as f64);
-        let (x, y) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
-        let column = (x as usize).min(self.width - 2);
-        let row = (y as usize).min(self.height - 2);
-        let place =
-            Place { start: row * self.width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
-        (place.start + self.width + 2 <= self.distance.len()).then_some(place)
-    }
-}
-
-/// A place between four pixels, and how far beyond the picture it lies.
-struct Place {
-    start: usize,
-    s: f64,
-    t: f64,
-    beyond: [f64; 2],
-}
-
-impl Place {
-    /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the
-    /// picture is background. Zero for an image of another size.
-    fn sample(&self, image: &[f32], width: usize) -> [f64; 3] {
-        let (s, t) = (self.s, self.t);
-        let (Some(upper), Some(lower)) =
-            (image.get(self.start..self.start + 2), image.get(self.start + width..self.start + width + 2))
-        else {
-            return [0.0; 3];
-        };
-        let [d00, d01, d10, d11] = [upper[0], upper[1], lower[0], lower[1]].map(f64::from);
-        let (first, second) = (d00 + s * (d01 - d00), d10 + s * (d11 - d10));
-        let value = first + t * (second - first);
-        let (mut du, mut dv) = ((1.0 - t) * (d01 - d00) + t * (d11 - d10), second - first);
-        let [ox, oy] = self.beyond;
-        if ox == 0.0 && oy == 0.0 {
-            return [value, du, dv];
-        }
-        let beyond = ox.hypot(oy);
-        if ox != 0.0 {
-            du = ox / beyond;
-        }
-        if oy != 0.0 {
-            dv = oy / beyond;
-        }
-        [value + beyond, du, dv]
-    }
 }

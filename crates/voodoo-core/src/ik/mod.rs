@@ -2,7 +2,7 @@
 //! to Inverse Kinematics for Human Motion Capture", EURASIP JASP 2010) on the kinematic chain of R07 (Rosenhahn, Brox, Cremers,
 //! Seidel, "Online Smoothing for Markerless Motion Capture", DAGM 2007).
 //!
-//! Files depend downwards only: `solver` > `image`, `goal`, `linear` > `trunk` > `model` > `twist`.
+//! Files depend downwards only: `solver` > `image`, `goal`, `linear` > `view`, `trunk` > `model` > `twist`.
 
 mod bones;
 mod goal;
@@ -13,12 +13,14 @@ mod project;
 mod solver;
 mod trunk;
 mod twist;
+mod view;
 
 pub use bones::{bones, trunk};
 pub use goal::{Aim, Goal, level_cost, level_rows};
-pub use image::{Criterion, SAMPLES, Segment, View};
+pub use image::{Criterion, SAMPLES, Segment};
 pub use model::{Column, Kinematics, Model, Part, Root, Turn};
 pub use project::{project, read};
 pub use solver::{Options, Report, Solver};
 pub use trunk::{Carrier, Trunk};
 pub use twist::log;
+pub use view::View;

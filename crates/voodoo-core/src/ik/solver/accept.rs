@@ -19,7 +19,7 @@ impl Solver {
             return 0.0;
         }
         self.propose(problem, angles, last, 1.0);
-        self.evaluate(problem, true);
+        self.evaluate(problem);
         let Some(failed) = self.first_failure(n, count, image, slack, last) else {
             for level in 0..count {
                 // Slow progress is the sign of a goal out of reach, where less damping would overshoot.
@@ -40,7 +40,7 @@ impl Solver {
                 continue;
             }
             self.propose(problem, angles, stage, share);
-            self.evaluate(problem, true);
+            self.evaluate(problem);
             if (share == 0.0 && slack)
                 || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
             {

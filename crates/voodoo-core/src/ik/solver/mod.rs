@@ -15,6 +15,9 @@ use crate::geometry::Pose;
 const SETTLED: f64 = 1e-10;
 /// Turn that leaves a stationary pose with a residual, radians.
 const NUDGE: f64 = 0.05;
+/// The same for an angle that stands at its limit: a knee bent backwards as far as it goes has its stretched pose, which is
+/// farther from a near goal, between itself and all that bend forwards.
+const NUDGE_AT_LIMIT: f64 = 0.35;
 /// The image is at rest when the criterion falls by less than this share in so many steps, one after the other.
 const LEAST_FALL: f64 = 1e-3;
 const PATIENCE: usize = 3;
@@ -50,6 +53,8 @@ pub struct Report {
     pub steps: usize,
     /// Postures tried, refused ones included.
     pub tried: usize,
+    /// How many of them were compared with the images.
+    pub looked: usize,
     /// Whether the angles or the image criterion came to rest (or the only level was reached).
     pub converged: bool,
     /// Image criterion at the end, pixels; 0 without images.
@@ -89,6 +94,9 @@ pub struct Solver {
     saved: Vec<f64>,
     saved_cost: Vec<f64>,
     tried: usize,
+    /// How many of them were compared with the images.
+    looked: usize,
+    looking: bool,
 }
 
 struct Problem<'a> {
@@ -120,6 +128,11 @@ impl Solver {
         let mut report = Report { converged: true, ..Report::default() };
         // One level after the other joins, the image last: what a level reaches does not depend on those below it.
         for phase in 0..count + usize::from(criterion.is_some()) {
+            // The images are looked at when it is their turn: what the levels above do does not depend on them.
+            self.looking = phase == count;
+            if self.looking {
+                self.evaluate_here(&problem, angles);
+            }
             self.phase_start.clear();
             self.phase_start.extend_from_slice(angles);
             self.phase(&problem, phase, true, angles, &mut report);
@@ -134,7 +147,7 @@ impl Solver {
             }
         }
         report.h = self.h;
-        report.tried = self.tried;
+        (report.tried, report.looked) = (self.tried, self.looked);
         report
     }
 
@@ -180,13 +193,23 @@ impl Solver {
     /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
     /// are as good as before the phase.
     fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
+        let looking = std::mem::take(&mut self.looking);
+        let mut moved = false;
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
                 let reached = self.cost[..active].iter().all(|cost| *cost < SETTLED * SETTLED);
-                if reached || self.step(problem, active, false, true, angles) < 1e-12 {
+                if reached {
+                    break;
+                }
+                moved = true;
+                if self.step(problem, active, false, true, angles) < 1e-12 {
                     break;
                 }
             }
+        }
+        self.looking = looking;
+        if looking && moved {
+            self.evaluate_here(problem, angles);
         }
         self.cost.iter().zip(&self.best).all(|(cost, best)| cost.sqrt() <= best + SETTLED)
     }
@@ -215,26 +238,29 @@ impl Solver {
         self.stages.clear();
         self.stages.resize((count + 1) * n, 0.0);
         self.best.clear();
-        self.tried = 0;
+        (self.tried, self.looked, self.looking) = (0, 0, false);
         self.gain = problem.options.gain;
         self.evaluate_here(problem, angles);
     }
 
     fn evaluate_here(&mut self, problem: &Problem, angles: &[f64]) {
         self.trial.copy_from_slice(angles);
-        self.evaluate(problem, true);
+        self.evaluate(problem);
         self.accept();
     }
 
-    /// Costs, criterion and kinematics at the trial angles.
-    fn evaluate(&mut self, problem: &Problem, image: bool) {
+    /// Costs and kinematics at the trial angles, and the criterion if it is the images' turn.
+    fn evaluate(&mut self, problem: &Problem) {
         self.tried += 1;
         problem.model.place(problem.base, &self.trial, &mut self.trial_at);
         self.trial_cost.clear();
         let costs = self.levels.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial_at));
         self.trial_cost.extend(costs);
         self.trial_h = match problem.criterion {
-            Some(criterion) if image => criterion.evaluate(problem.model, &self.trial_at, &mut self.trial_gradient),
+            Some(criterion) if self.looking => {
+                self.looked += 1;
+                criterion.evaluate(problem.model, &self.trial_at, &mut self.trial_gradient)
+            }
             _ => 0.0,
         };
     }
@@ -253,7 +279,8 @@ impl Solver {
         self.saved_cost.extend_from_slice(&self.cost);
         for (i, (angle, [low, high])) in angles.iter_mut().zip(problem.model.limits()).enumerate() {
             // Uneven, so that symmetric chains leave their symmetry; away from the nearer limit.
-            let by = NUDGE * (1.0 + 0.37 * (i % 3) as f64);
+            let at_limit = *angle <= *low || *angle >= *high;
+            let by = if at_limit { NUDGE_AT_LIMIT } else { NUDGE } * (1.0 + 0.37 * (i % 3) as f64);
             *angle = if *high - *angle < *angle - *low { *angle - by } else { *angle + by }.clamp(*low, *high);
         }
         self.trust.fill(0.1);
