@@ -41,6 +41,8 @@ pub struct Visibility {
     pub hidden: f64,
     /// Patches facing a camera inside its image.
     pub facing: f64,
+    /// Those hidden, however they are seen: to point along the ray is no excuse for hiding.
+    pub concealed: f64,
 }
 
 impl std::ops::AddAssign for Visibility {
@@ -49,13 +51,14 @@ impl std::ops::AddAssign for Visibility {
         self.contradicted += other.contradicted;
         self.hidden += other.hidden;
         self.facing += other.facing;
+        self.concealed += other.concealed;
     }
 }
 
 impl Visibility {
     /// Cost in unexplained patches: to be seen past is as bad as to leave a patch unexplained, to hide is suspicious.
     pub fn cost(&self) -> f64 {
-        self.contradicted + HIDDEN * self.hidden
+        self.contradicted + HIDDEN * self.concealed
     }
 }
 
@@ -82,13 +85,17 @@ pub fn look(views: Views, limb: &Limb, working_from_limb: &Pose) -> Visibility {
                 let forward = (1.0 - s * s).sqrt();
                 let place = ahead * forward + side * s;
                 let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
-                let patches = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length() * aslant
+                let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
                     / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
+                let patches = whole * aslant;
                 match sight(&view, point) {
                     None => continue,
                     Some(Sight::Contradicted) => found.contradicted += patches,
                     Some(Sight::Seen) => found.seen += patches,
-                    Some(Sight::Hidden) => found.hidden += patches,
+                    Some(Sight::Hidden) => {
+                        found.hidden += patches;
+                        found.concealed += whole;
+                    }
                 }
                 found.facing += patches;
             }
