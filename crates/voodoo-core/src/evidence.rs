@@ -41,8 +41,12 @@ pub struct Visibility {
     pub hidden: f64,
     /// Patches facing a camera inside its image.
     pub facing: f64,
-    /// Those hidden, however they are seen: to point along the ray is no excuse for hiding.
+    /// Those hidden, seen past and all, counted as if the limb were seen from its side: to point along the ray hides nothing.
     pub concealed: f64,
+    /// See `concealed`.
+    pub past: f64,
+    /// See `concealed`.
+    pub whole: f64,
 }
 
 impl std::ops::AddAssign for Visibility {
@@ -52,6 +56,8 @@ impl std::ops::AddAssign for Visibility {
         self.hidden += other.hidden;
         self.facing += other.facing;
         self.concealed += other.concealed;
+        self.past += other.past;
+        self.whole += other.whole;
     }
 }
 
@@ -90,7 +96,10 @@ pub fn look(views: Views, limb: &Limb, working_from_limb: &Pose) -> Visibility {
                 let patches = whole * aslant;
                 match sight(&view, point) {
                     None => continue,
-                    Some(Sight::Contradicted) => found.contradicted += patches,
+                    Some(Sight::Contradicted) => {
+                        found.contradicted += patches;
+                        found.past += whole;
+                    }
                     Some(Sight::Seen) => found.seen += patches,
                     Some(Sight::Hidden) => {
                         found.hidden += patches;
@@ -98,6 +107,7 @@ pub fn look(views: Views, limb: &Limb, working_from_limb: &Pose) -> Visibility {
                     }
                 }
                 found.facing += patches;
+                found.whole += whole;
             }
         }
     }

@@ -23,8 +23,9 @@ const CLUTTER: f64 = 0.15;
 const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
 const REFUTED: f64 = 0.2;
-/// Either share is of this many patches at least, and has to last for so many frames.
+/// Either share is of this many patches at least (of those seen past, of the image), and has to last for so many frames.
 const LEAST: f64 = 20.0;
+const LEAST_PAST: f64 = 12.0;
 const PATIENCE: usize = 2;
 /// So many frames where nothing but open points speaks against an arm.
 const LONG_PATIENCE: usize = 4;
@@ -73,6 +74,8 @@ pub(super) struct Hypotheses {
     /// The body as the frame wanted it that last asked for a change of each chain, world.
     wanted: Vec<Vec<Pose>>,
     asked_for: Vec<Pose>,
+    /// Whether that one was drawn by open points.
+    wanted_drawn: Vec<bool>,
 }
 
 impl Tracker {
@@ -85,6 +88,8 @@ impl Tracker {
         work.doubts.resize(self.chains.len(), Doubt::default());
         let room = || Vec::with_capacity(self.body.limbs().len());
         work.wanted.clear();
+        work.wanted_drawn.clear();
+        work.wanted_drawn.resize(self.chains.len(), true);
         work.wanted.resize_with(self.chains.len(), room);
         // Room at once, not when the first hard frame comes.
         for poses in [
@@ -179,7 +184,7 @@ impl Tracker {
         };
         // Furniture stays open beside legs; nothing else than the arm is expected about an arm.
         let striking = !chain.leg && !work.cluttered && open >= STRIKING;
-        let suspect = open >= SUSPICIOUS && self.suspect(chain, views, work) != [false; 2];
+        let suspect = open >= SUSPICIOUS && self.suspect(chain, views, work, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(LONG_PATIENCE) };
         if !work.doubts[index].due(patience) {
             return 0;
@@ -253,23 +258,25 @@ impl Tracker {
         let mut wanted = std::mem::take(&mut work.wanted[index]);
         wanted.iter_mut().for_each(|pose| *pose = shifted(pose, self.origin));
         let both = rested && self.rest_both(index, views, work);
+        // Found; drawn by open points; the body.
         let tried = [
-            (work.doubts[index].asked() && !wanted.is_empty(), wanted),
-            (rested, std::mem::take(&mut work.at_rest)),
-            (least < enough, std::mem::take(&mut work.kept)),
-            (both, std::mem::take(&mut work.both)),
+            (work.doubts[index].asked() && !wanted.is_empty(), work.wanted_drawn[index], wanted),
+            (rested, false, std::mem::take(&mut work.at_rest)),
+            (least < enough, true, std::mem::take(&mut work.kept)),
+            (both, false, std::mem::take(&mut work.both)),
         ];
         let mut steps = 0;
-        for (_, poses) in tried.iter().filter(|(found, _)| *found) {
+        for (_, drawn, poses) in tried.iter().filter(|(found, ..)| *found) {
             if !work.doubts[index].asks() {
                 steps += REFINE;
-                if self.refine(index, frame, pace, poses, work) && !work.doubts[index].ask() {
+                if self.refine(index, frame, pace, poses, work, *drawn) && !work.doubts[index].ask() {
+                    work.wanted_drawn[index] = *drawn;
                     work.asked_for.extend(self.poses.iter().map(|pose| shifted(pose, -self.origin)));
                     self.take_back(work);
                 }
             }
         }
-        [(_, work.wanted[index]), (_, work.at_rest), (_, work.kept), (_, work.both)] = tried;
+        [(.., work.wanted[index]), (.., work.at_rest), (.., work.kept), (.., work.both)] = tried;
         std::mem::swap(&mut work.wanted[index], &mut work.asked_for);
         work.asked_for.clear();
         steps
@@ -325,8 +332,10 @@ impl Tracker {
         }
     }
 
-    /// Whether the frame speaks against a chain where it is: against all of it, and against what lies beyond its hinge.
-    fn suspect(&self, chain: &TwoBone, views: Views, work: &mut Hypotheses) -> [bool; 2] {
+    /// Whether the frame speaks against a chain where it is: against all of it, and against what lies beyond its hinge. What
+    /// cameras see past counts by its area in the image; where open points have drawn the chain, as if seen from the side, too:
+    /// a thing that appears draws a calf along the ray, where nothing of it is seen.
+    fn suspect(&self, chain: &TwoBone, views: Views, work: &mut Hypotheses, drawn: bool) -> [bool; 2] {
         let Hypotheses { own, own_weight, others, best, .. } = work;
         own.clear();
         own_weight.clear();
@@ -352,13 +361,15 @@ impl Tracker {
         let mut against = |limb: usize, alone: f64| {
             seen += look(views, &self.body.limbs()[limb], &self.poses[limb]);
             alone <= IDLE * (seen.facing - seen.hidden).max(LEAST)
-                || seen.contradicted > (REFUTED * seen.facing).max(LEAST)
+                || seen.contradicted > (REFUTED * seen.facing).max(LEAST_PAST)
         };
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
         });
         let lower = against(chain.lower, alone(upper));
-        [against(chain.upper, alone(0)), lower]
+        let upper = against(chain.upper, alone(0));
+        let past = drawn && seen.past > (REFUTED * seen.whole).max(LEAST);
+        [upper || past, lower || past]
     }
 
     /// Distance of points to the nearest limb that does not belong to a chain.
@@ -381,6 +392,7 @@ impl Tracker {
         pace: f64,
         hypothesis: &Vec<Pose>,
         work: &mut Hypotheses,
+        drawn: bool,
     ) -> bool {
         let before = self.overall_score(frame);
         let strained = self.strain(&self.chains[index], &self.poses).max(STRAINED);
@@ -399,7 +411,7 @@ impl Tracker {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
             // What is as suspect as before is not worth a jump.
             let strain = self.strain(&self.chains[index], &self.poses);
-            if strain <= strained && !self.suspect(&self.chains[index], views, work)[0] {
+            if strain <= strained && !self.suspect(&self.chains[index], views, work, drawn)[0] {
                 return true;
             }
         }
