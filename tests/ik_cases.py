@@ -10,6 +10,16 @@ import voodoo
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 ARM = ("l_upperarm", "l_forearm")
+BAR = """name = "bar"
+[[limbs]]
+name = "base"
+shape = { length = 0.1, a0 = 0.05, b0 = 0.05, a1 = 0.05, b1 = 0.05 }
+[[limbs]]
+name = "bone"
+parent = "base"
+shape = { length = 0.4, a0 = 0.08, b0 = 0.08, a1 = 0.08, b1 = 0.08 }
+joint = { name = "joint" }
+"""
 
 
 def load_example(name):

@@ -4,19 +4,10 @@ import numpy as np
 import pytest
 
 import voodoo
+from ik_cases import BAR
 from voodoo import ik
 
 CAMERA = voodoo.Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
-BAR = """name = "bar"
-[[limbs]]
-name = "base"
-shape = { length = 0.1, a0 = 0.05, b0 = 0.05, a1 = 0.05, b1 = 0.05 }
-[[limbs]]
-name = "bone"
-parent = "base"
-shape = { length = 0.4, a0 = 0.08, b0 = 0.08, a1 = 0.08, b1 = 0.08 }
-joint = { name = "joint" }
-"""
 SEEN_M = 2.5
 RADIUS_M = 0.08
 

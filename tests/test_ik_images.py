@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import voodoo
-from ik_cases import front_camera, shoulder
+from ik_cases import BAR, front_camera, shoulder
 from voodoo import ik
 
 
@@ -92,17 +92,7 @@ def test_a_bone_lies_in_the_middle_of_a_limb_and_is_content_in_a_trunk():
     assert image.thickness[60, 36] == pytest.approx(6.5, abs=1.0)
     assert image.thickness[60, 95] == pytest.approx(25.5, abs=1.0)
     assert image.thickness[60, 60] == 0.0
-    text = """name = "bar"
-[[limbs]]
-name = "base"
-shape = { length = 0.1, a0 = 0.05, b0 = 0.05, a1 = 0.05, b1 = 0.05 }
-[[limbs]]
-name = "bone"
-parent = "base"
-shape = { length = 0.4, a0 = 0.08, b0 = 0.08, a1 = 0.08, b1 = 0.08 }
-joint = { name = "joint" }
-"""
-    chain = ik.Chain(voodoo.Body.from_toml(text), limbs=("bone",))
+    chain = ik.Chain(voodoo.Body.from_toml(BAR), limbs=("bone",))
 
     def h(pixel, thin, image=image):
         # The bone runs down the picture, 2.5 m away; its radius is 4.8 px.

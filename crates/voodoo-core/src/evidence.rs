@@ -30,11 +30,9 @@ enum Sight {
     Contradicted,
 }
 
-/// Patches of a limb: seen, contradicted, and all that face a camera.
+/// Patches of a limb: contradicted, hidden, and all that face a camera, by their area in the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Visibility {
-    /// Patches seen where they are.
-    pub seen: f64,
     /// Patches that a camera sees past.
     pub contradicted: f64,
     /// Patches behind what the camera sees.
@@ -51,7 +49,6 @@ pub struct Visibility {
 
 impl std::ops::AddAssign for Visibility {
     fn add_assign(&mut self, other: Self) {
-        self.seen += other.seen;
         self.contradicted += other.contradicted;
         self.hidden += other.hidden;
         self.facing += other.facing;
@@ -100,7 +97,7 @@ pub fn look(views: Views, limb: &Limb, working_from_limb: &Pose) -> Visibility {
                         found.contradicted += patches;
                         found.past += whole;
                     }
-                    Some(Sight::Seen) => found.seen += patches,
+                    Some(Sight::Seen) => {}
                     Some(Sight::Hidden) => {
                         found.hidden += patches;
                         found.concealed += whole;
