@@ -4,7 +4,8 @@
 
 The 2-D cue is skin colour: head and hands in one colour picture. Which way a fast arm goes is partly chance: with
 `--starts N` each recording is tracked N times, the first time from its own start and then with 4 mm of noise on the start's
-joints, and the table tells the means. Writes table.md, groups.png (error of each joint group) and frames_SOLVER.png (what
+joints, and the table tells the means. How much of a change is chance is told by `--modes depth again`: depth alone once
+more, from joints moved by another 0.1 mm. Writes table.md, groups.png (error of each joint group) and frames_SOLVER.png (what
 each of the ways makes of the frame in which fusion gains most).
 """
 
@@ -30,7 +31,10 @@ MODES = {
     "2-D": ("skin",),
     "fused": ("depth", "skin"),
     "all": ("depth", "skin", "scan"),
+    "laser": ("depth", "scan"),
+    "again": ("depth",),
 }
+PAPERS = ("depth", "2-D", "fused", "all")
 GROUPS = {
     "trunk": ("humanoid_root", "vc7", "l_shoulder", "r_shoulder", "l_hip", "r_hip"),
     "head": ("head_center", "skull_tip"),
@@ -40,6 +44,7 @@ GROUPS = {
     "ankles": ("l_ankle", "r_ankle"),
 }
 NOISE_M = 0.004
+AGAIN_M = 0.0001
 PAIRS = (("shoulder", "elbow"), ("elbow", "hand"), ("hip", "knee"), ("knee", "ankle"), ("shoulder", "hip"))
 LIMBS = (
     *((f"{side}_{a}", f"{side}_{b}") for side in "lr" for a, b in PAIRS),
@@ -83,6 +88,8 @@ def track(
     chance = np.random.default_rng(start)
     noise = NOISE_M if start else 0.0
     joints = {name: np.add(place, chance.normal(0.0, noise, 3)) for name, place in recording.start["joints"].items()}
+    if mode == "again":
+        joints = {name: np.add(place, chance.normal(0.0, AGAIN_M, 3)) for name, place in joints.items()}
     # The papers' solver with the papers' ten limbs, any other with the default human.
     model = "papers" if solver == "limbwise" else "full"
     body = voodoo.Body.human(height=recording.start["height_m"], model=model)
@@ -115,7 +122,7 @@ def table(results: list[Result], solver: str) -> str:
             " / ".join(f"{100 * chosen[name, mode].group(group).mean():.1f}" for mode in modes) for group in GROUPS
         ]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    for mode in [mode for mode in modes if mode in ("fused", "all")]:
+    for mode in [mode for mode in modes if mode not in ("depth", "2-D")]:
         medians, worst = [], []
         for group in GROUPS:
             changes = []
@@ -123,10 +130,10 @@ def table(results: list[Result], solver: str) -> str:
                 alone, fused = (chosen[name, kind].group(group) for kind in ("depth", mode))
                 # Each start is run in both ways: what they share cancels.
                 change = (fused - alone) / alone.mean()
-                changes.append((change.mean(), change.std(ddof=1) / np.sqrt(starts) if starts > 1 else None))
-            medians.append(f"{100 * np.median([change for change, _ in changes]):+.0f} %")
-            most, error = max(changes, key=lambda item: item[0])
-            worst.append(f"{100 * most:+.1f} %" + ("" if error is None else f" ± {100 * error:.1f}"))
+                changes.append((change.mean(), change.std(ddof=1) / np.sqrt(starts) if starts > 1 else None, name))
+            medians.append(f"{100 * np.median([change for change, _, _ in changes]):+.0f} %")
+            most, error, name = max(changes, key=lambda item: item[0])
+            worst.append(f"{100 * most:+.1f} %" + ("" if error is None else f" ± {100 * error:.1f}") + f" ({name})")
         lines.append(f"| **{mode} against depth, median** | " + " | ".join(medians) + " |")
         lines.append(f"| **{mode} against depth, worst** | " + " | ".join(worst) + " |")
     return "\n".join(lines) + "\n"
@@ -134,13 +141,13 @@ def table(results: list[Result], solver: str) -> str:
 
 def plot(results: list[Result], solvers: list[str], file: Path) -> None:
     figure, axes = plt.subplots(1, len(solvers), figsize=(6.5 * len(solvers), 4), sharey=True, squeeze=False)
+    modes = [mode for mode in MODES if any(r.mode == mode for r in results)]
+    width = 0.8 / len(modes)
     for axis, solver in zip(axes[0], solvers, strict=True):
-        for offset, mode in enumerate(MODES):
+        for offset, mode in enumerate(modes):
             chosen = [r for r in results if r.solver == solver and r.mode == mode]
-            if not chosen:
-                continue
             values = [100 * np.median([r.group(group).mean() for r in chosen]) for group in GROUPS]
-            axis.bar(np.arange(len(GROUPS)) + 0.2 * offset, values, width=0.19, label=mode)
+            axis.bar(np.arange(len(GROUPS)) + width * offset, values, width=0.95 * width, label=mode)
         axis.set_xticks(np.arange(len(GROUPS)) + 0.3, list(GROUPS), rotation=20)
         axis.set(title=solver, ylabel="median of mean errors / cm", ylim=(0, 40))
         axis.legend()
@@ -188,7 +195,9 @@ def main() -> None:
     parser.add_argument("recordings", type=Path, nargs="+")
     parser.add_argument("--out", type=Path, default=Path("out/fusion"))
     parser.add_argument("--solvers", nargs="+", default=["limbwise", voodoo.Config().solver])
-    parser.add_argument("--modes", nargs="+", choices=MODES, default=list(MODES), help="depth and fused are always run")
+    parser.add_argument(
+        "--modes", nargs="+", choices=MODES, default=list(PAPERS), help="depth and fused are always run"
+    )
     parser.add_argument("--starts", type=int, default=1, help="runs of each recording; all but the first disturbed")
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
