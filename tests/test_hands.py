@@ -1,0 +1,148 @@
+"""Which part of a region of skin is the hand."""
+
+import cv2
+import numpy as np
+import pytest
+
+from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
+from voodoo.sensors.depth import BodyView, body_view
+from voodoo.sensors.hands import FINGERS_M, of_pieces, to_palm
+from voodoo.sensors.skin import SkinTracker
+from voodoo.sensors.skin_regions import candidates, joined
+
+
+@pytest.mark.parametrize("gap", [0, 6])
+def test_a_hand_ends_where_a_table_behind_it_begins(gap):
+    """Also when the depth camera sees nothing between them, as in the shadow of structured light."""
+    depth = np.full((240, 320), 4.5, np.float32)
+    depth[110:130, 100:140] = Z + 0.3  # a table of skin's colour, within the box around the body
+    depth[100:121, 100:112] = Z  # the hand before it
+    depth[110:121, 112 : 112 + gap] = 0.0
+    depth[121 : 121 + gap, 100:112] = 0.0
+    view = body_view(
+        depth,
+        depth_camera=CAMERA,
+        world_from_depth=POSE,
+        metres_per_unit=1.0,
+        color_camera=CAMERA,
+        world_from_color=POSE,
+        joints=[at((120, 60)), at((160, 180)), at((140, 120))],
+    )
+    skin = np.zeros((240, 320), bool)
+    skin[100:121, 100:112] = True
+    skin[110:130, 100:140] = True
+    assert len(candidates(skin, palm_px=5.4)[0]) != 2  # one region, in colour alone
+    found, regions = candidates(skin & view.mask, palm_px=5.4)
+    hand = next(item for item in found if regions[105, 105] == item.region)
+    assert regions[125, 130] not in (0, hand.region)
+    assert np.linalg.norm(np.subtract(hand.pixel, (105.5, 110.0))) < 3.0
+
+
+def test_what_a_shadow_parts_is_one_hand_and_arms_stay_apart():
+    mask = np.zeros((240, 320), bool)
+    mask[100:108, 100:108] = mask[110:118, 100:108] = True  # palm and fingers
+    mask[100:150, 200:208] = mask[100:150, 210:218] = True  # two forearms
+    _, regions = candidates(joined(mask, palm_px=5.4), palm_px=5.4)
+    assert regions[104, 104] == regions[114, 104] != 0
+    assert regions[120, 204] != regions[120, 214]
+
+
+def test_a_hand_in_pieces_is_where_it_is_expected_between_them():
+    fingers, palm, far = np.array([2.0, 0.0, 0.9]), np.array([2.0, 0.0, 1.0]), np.array([2.0, 0.0, 1.2])
+    expected = np.array([2.05, 0.0, 0.97])
+    assert np.allclose(of_pieces(fingers, [palm, far], expected), [2.0, 0.0, 0.97])
+    assert np.array_equal(of_pieces(fingers, [far], expected), fingers), "no hand is that long"
+    assert np.array_equal(of_pieces(fingers, [palm], np.array([2.0, 0.0, 0.5])), fingers), "not beyond the pieces"
+
+
+def test_a_ring_across_a_hand_does_not_move_it_to_its_fingers():
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z - 0.04))
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    joints = Pose(head, left, right).joints
+    whole = picture(head, left, right, seed=3)
+    cv2.ellipse(whole, left, (5, 11), 0, 0, 360, SKIN, -1)
+    (ray,) = [ray for ray in skin.observe(whole, CAMERA, POSE, joints, body=body) if ray.site == "l_hand"]
+    assert np.linalg.norm(ray.place - joints["l_hand"]) < 0.02
+    parted = whole.copy()
+    cv2.rectangle(parted, (100, left[1] - 3), (120, left[1] + 2), (90, 40, 30), -1)
+    (ray,) = [ray for ray in skin.observe(parted, CAMERA, POSE, joints, body=body) if ray.site == "l_hand"]
+    assert pixel_error(skin, "l_hand", left) > 4.0, "it is named after one piece"
+    assert np.linalg.norm(ray.place - joints["l_hand"]) < 0.02
+
+
+def test_a_hands_middle_lies_beyond_its_palm():
+    predicted = {"l_hand": np.array([2.0, 0.0, 1.0]), "l_elbow": np.array([2.0, 0.0, 1.3]), "head_center": np.zeros(3)}
+    assert np.allclose(to_palm("l_hand", predicted), [0.0, 0.0, FINGERS_M])
+    assert np.array_equal(to_palm("head_center", predicted), np.zeros(3))
+    assert np.array_equal(to_palm("r_hand", predicted | {"r_hand": np.ones(3)}), np.zeros(3)), "without an elbow"
+
+
+def test_a_far_hand_is_no_speck():
+    """A hand is as large as it is at its own depth, not at that of the nearest site: it keeps its name beyond the gate."""
+    skin = SkinTracker()
+    head, left, right = learnt(skin)
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    far = 1.6 * Z
+    body = BodyView(np.ones((240, 320), bool), grid, np.where(grid[:, 0] < 140, far, Z))
+    joints = Pose(head, left, right).joints
+    joints["l_hand"] = at(left, far)
+    for step in range(6):
+        moved = (left[0] - 4 * step, left[1] - 4 * step)
+        image = picture(head, right, right, seed=step)
+        cv2.circle(image, moved, 4, SKIN, -1)
+        skin.observe(image, CAMERA, POSE, joints, body=body)
+        assert pixel_error(skin, "l_hand", moved) < 2.0
+
+
+def test_a_hand_before_a_door_is_not_the_door():
+    """The door has had skin's colour for seconds where no hand was; the hand stands before it."""
+    skin = SkinTracker()
+    door = (60, 60, 130, 230)
+    learnt(skin, frames=60, door=door)
+    head, left, right = (160, 60), (85, 180), (210, 120)
+    joints = Pose(head, left, right).joints
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    of_hand = np.hypot(*(grid - left).T) < 7
+    mask = of_hand.reshape(240, 320) | (np.arange(320) > 130)
+    depths = np.where(of_hand | (grid[:, 0] > 130), Z, Z + 1.0)
+    image = picture(head, left, right, door=door, seed=99)
+    found = {}
+    for before in (None, of_hand.reshape(240, 320)):
+        body = BodyView(mask, grid, depths, before=before)
+        rays = skin.observe(image, CAMERA, POSE, joints, body=body)
+        found[before is None] = {ray.site for ray in rays}
+    assert found[True] == {"head_center", "r_hand"}
+    assert found[False] == {"head_center", "l_hand", "r_hand"}
+
+
+def test_a_forearm_as_long_as_a_hand_across_its_box_offers_its_tips():
+    """What counts is the length along the region, however it lies: a hand turned by 45 degrees stays one."""
+    for angle in (0.0, 45.0, 90.0):
+        for length, hand in ((3.6, True), (5.4, False)):  # in radii of a palm, 1.6 wide
+            image = np.zeros((240, 320), np.uint8)
+            box = cv2.boxPoints(((160.0, 120.0), (length * 10.0, 16.0), angle))
+            cv2.fillPoly(image, [np.round(box).astype(np.int32)], 1)
+            found, _ = candidates(image.astype(bool), palm_px=10.0)
+            assert found[0].hand == hand
+            assert (len(found) > 1) != hand
+
+
+def test_a_hand_is_a_forearm_away_from_an_elbow_that_is_seen():
+    """With the hand in the shade, the middle of what is left of a bare forearm is near the expected hand, and is not it."""
+    head, left, right = (160, 60), (110, 120), (210, 120)
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
+    found = {}
+    for held in ((), ("l_hand",)):
+        skin = SkinTracker()
+        learnt(skin)
+        joints = Pose(head, left, right).joints
+        joints["l_hand"] = at(left, Z + 0.04)
+        joints["l_elbow"] = at((left[0] + 12, left[1] - 24), Z + 0.04)  # 23 cm above the hand
+        piece = (left[0] + 6, left[1] - 12)
+        rays = skin.observe(picture(head, piece, right, seed=7), CAMERA, POSE, joints, body=body, held=held)
+        found[held] = {ray.site for ray in rays}
+    assert found[()] == {"head_center", "l_hand", "r_hand"}
+    assert found["l_hand",] == {"head_center", "r_hand"}
