@@ -277,7 +277,7 @@ config! {
     /// Keep joints within their limits, softly (whole-body solvers).
     limits: bool = true, "";
     /// Limbs that are not joined push each other apart where they overlap (whole-body solvers).
-    penetration: bool = false, "";
+    penetration: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// After a reset that fits sizes, the frames that follow refine the limbs' lengths (whole-body solvers).

@@ -10,9 +10,10 @@ use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
-/// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter.
+/// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter: none, limbs are soft,
+/// only their axes stay out of others.
 const OVERLAP_SIGMA: f64 = 0.03;
-const FREE_SHARE: f64 = 0.3;
+const FREE_SHARE: f64 = 0.0;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
