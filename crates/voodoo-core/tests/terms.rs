@@ -130,7 +130,7 @@ proptest! {
         let forearm = body.limb_index("l_forearm").unwrap();
         let thorax = body.limb_index("thorax").unwrap();
         poses[forearm] = poses[thorax] * Pose::new(Vec3::new(0.05, 0.12, 0.1), Vec3::new(folded, 0.4, 0.0));
-        let term = Penetration { sigma: 1.0, share: 0.3 };
+        let term = Penetration { sigma: 1.0 };
         check(&body, &poses, &|poses, normal| term.add(&body, poses, normal))?;
         let mut normal = Normal::default();
         normal.clear(poses.len());

@@ -197,12 +197,6 @@ impl TaperedEllipticCylinder {
         (self.a0 + (self.a1 - self.a0) * t, self.b0 + (self.b1 - self.b0) * t)
     }
 
-    /// The lesser semi-axis of the slice at height `z`, clamped to the ends, metres.
-    pub fn least_radius(&self, z: f64) -> f64 {
-        let (a, b) = self.semi_axes(z);
-        a.min(b)
-    }
-
     /// `(x b)² + (y a)² - (a b)²` at the slice of `q`: negative inside the ellipse, positive outside, no division.
     fn ellipse_sign(&self, q: Vec3) -> f64 {
         let (a, b) = self.semi_axes(q.z);

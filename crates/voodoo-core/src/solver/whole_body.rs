@@ -10,10 +10,8 @@ use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
-/// Standard deviation of limbs that overlap, metres, and the share of a limb's radius that nothing may enter: none, limbs are soft,
-/// only their axes stay out of others.
+/// Standard deviation of an axis that lies in another limb, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
-const FREE_SHARE: f64 = 0.0;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
@@ -148,7 +146,7 @@ impl WholeBody {
             Limits { sigma: LIMIT_SIGMA }.add(body, poses, &mut self.normal);
         }
         if config.penetration {
-            Penetration { sigma: OVERLAP_SIGMA, share: FREE_SHARE }.add(body, poses, &mut self.normal);
+            Penetration { sigma: OVERLAP_SIGMA }.add(body, poses, &mut self.normal);
         }
     }
 }

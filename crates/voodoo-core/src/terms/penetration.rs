@@ -1,4 +1,5 @@
-//! Limbs do not pass through each other: points of a limb's axis keep their own radius from the surfaces of other limbs.
+//! Limbs do not pass through each other: a limb's axis stays out of other limbs. Limbs are soft, and fatter here than they are, so
+//! that their surfaces may overlap.
 
 use super::Term;
 use crate::body::Body;
@@ -11,14 +12,12 @@ const FELT: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 /// Error of `approximate_distance` that is allowed for before the exact distance is asked, metres.
 const APPROXIMATE: f64 = 0.01;
 
-/// One-sided: `r = max(0, share * radius - distance)` for every felt point against every limb that is neither joined to its
+/// One-sided: `r = max(0, -distance)` for every felt point against every limb that is neither joined to its
 /// own nor hangs on the same parent. Those overlap at their joints in any pose.
 #[derive(Debug)]
 pub struct Penetration {
     /// Standard deviation of the overlap, metres.
     pub sigma: f64,
-    /// Share of the lesser local semi-axis that is kept free: limbs are soft, and fatter here than they are.
-    pub share: f64,
 }
 
 impl Term for Penetration {
@@ -46,13 +45,12 @@ impl Penetration {
         let along = poses[other].rotation.inverse() * (poses[limb].rotation * Vec3::Z);
         for share in FELT {
             let z = share * shape.length();
-            let free = self.share * shape.least_radius(z);
             let local = start + along * z;
-            if far(surface, local, free) || surface.approximate_distance(local) > free + APPROXIMATE {
+            if far(surface, local) || surface.approximate_distance(local) > APPROXIMATE {
                 continue;
             }
             let found = surface.closest_point(local);
-            let overlap = free - found.signed_distance;
+            let overlap = -found.signed_distance;
             if overlap <= 0.0 {
                 continue;
             }
@@ -72,12 +70,12 @@ fn apart(body: &Body, first: usize, second: usize) -> bool {
     !body.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
 }
 
-/// Whether a point, limb frame, lies outside the box around the shape enlarged by `margin`.
-fn far(shape: &TaperedEllipticCylinder, q: Vec3, margin: f64) -> bool {
-    q.x.abs() > shape.a0().max(shape.a1()) + margin
-        || q.y.abs() > shape.b0().max(shape.b1()) + margin
-        || q.z < -margin
-        || q.z > shape.length() + margin
+/// Whether a point, limb frame, lies outside the box around the shape.
+fn far(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
+    q.x.abs() > shape.a0().max(shape.a1())
+        || q.y.abs() > shape.b0().max(shape.b1())
+        || q.z < 0.0
+        || q.z > shape.length()
 }
 
 /// Whether the spheres around two limbs meet.

@@ -394,7 +394,7 @@ impl Tracker {
         work: &mut Hypotheses,
         drawn: bool,
     ) -> bool {
-        let before = self.overall_score(frame);
+        let before = self.overall_cost(frame);
         let strained = self.strain(&self.chains[index], &self.poses).max(STRAINED);
         work.trial.clone_from(&self.poses);
         self.poses.clone_from(hypothesis);
@@ -407,7 +407,9 @@ impl Tracker {
             self.match_and_solve(frame, pace, last.saturating_sub(REFINE - step));
         }
         self.match_last(frame);
-        if self.overall_score(frame) < before - GAIN {
+        let cost = self.overall_cost(frame);
+        // Open points that have drawn it shall be explained by it: to come out of hiding elsewhere is no reason.
+        if cost.total < before.total - GAIN && (!drawn || cost.evidence < before.evidence - GAIN) {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
             // What is as suspect as before is not worth a jump.
             let strain = self.strain(&self.chains[index], &self.poses);

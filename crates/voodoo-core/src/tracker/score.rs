@@ -4,7 +4,7 @@ use super::Tracker;
 use crate::body::Body;
 use crate::candidates::REFERENCE_PATCH;
 use crate::chain::joint_turn;
-use crate::evidence::{look, unexplained};
+use crate::evidence::{Visibility, look, unexplained};
 use crate::frame::Frame;
 use crate::geometry::{Pose, Vec3};
 use crate::recover::TwoBone;
@@ -18,15 +18,26 @@ const MOTION_STRAIN: f64 = 0.6;
 const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const INSIDE: f64 = 0.01;
 
+/// Cost of a pose in unexplained patches.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cost {
+    /// What cameras say against it: points that no limb explains, and surface that they see past.
+    pub(super) evidence: f64,
+    /// That, what hides, and the strain of all arms and legs.
+    pub(super) total: f64,
+}
+
 impl Tracker {
-    /// Points that no limb explains, surface that cameras see past, and the strain of all arms and legs.
-    pub(super) fn overall_score(&self, frame: &Frame) -> f64 {
+    /// What the current poses cost.
+    pub(super) fn overall_cost(&self, frame: &Frame) -> Cost {
         let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         let limbs = self.body.limbs().iter().zip(&self.poses);
-        let seen: f64 = limbs.map(|(limb, pose)| look(views, limb, pose).cost()).sum();
+        let mut seen = Visibility::default();
+        limbs.for_each(|(limb, pose)| seen += look(views, limb, pose));
         let strain: f64 = self.chains.iter().map(|chain| self.strain(chain, &self.poses)).sum();
         let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
-        unexplained(&self.correspondences, total) + seen + strain
+        let points = unexplained(&self.correspondences, total);
+        Cost { evidence: points + seen.contradicted, total: points + seen.cost() + strain }
     }
 
     /// Patches of a chain whose axis lies inside another limb: there is no room for it.

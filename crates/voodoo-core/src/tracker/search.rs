@@ -325,7 +325,7 @@ impl Tracker {
     /// The score of all hypotheses, without the motion since the last frame, and what facing and named sites say.
     fn place_score(&mut self, work: &Search, frame: &Frame, total: f64) -> f64 {
         let previous = std::mem::take(&mut self.previous);
-        let score = self.overall_score(frame);
+        let score = self.overall_cost(frame).total;
         self.previous = previous;
         score.min(4.0 * total)
             + self.facing_cost(work, self.poses[0].rotation, frame.stamp)
