@@ -29,8 +29,10 @@ const LEAST_PAST: f64 = 12.0;
 const PATIENCE: usize = 2;
 /// So many frames where nothing but open points speaks against an arm.
 const LONG_PATIENCE: usize = 4;
-/// A hypothesis must explain so many patches more than the current pose.
+/// A hypothesis must cost so many patches less than the current pose, and one that open points have drawn so many of them by what
+/// cameras see.
 const GAIN: f64 = 25.0;
+const DRAWN: f64 = 10.0;
 /// ICP steps that refine the best hypothesis.
 const REFINE: usize = 8;
 /// A new configuration that costs more than this, and more than the old one, is no pose of a body.
@@ -409,7 +411,7 @@ impl Tracker {
         self.match_last(frame);
         let cost = self.overall_cost(frame);
         // Open points that have drawn it shall be explained by it: to come out of hiding elsewhere is no reason.
-        if cost.total < before.total - GAIN && (!drawn || cost.evidence < before.evidence - GAIN) {
+        if cost.total < before.total - GAIN && (!drawn || cost.evidence < before.evidence - DRAWN) {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
             // What is as suspect as before is not worth a jump.
             let strain = self.strain(&self.chains[index], &self.poses);
