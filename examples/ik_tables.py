@@ -173,7 +173,7 @@ def all_sets(trial: Trial) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--out", type=Path, default=Path("ik_tables"))
+    parser.add_argument("--out", type=Path, default=Path("out/ik_tables"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     print(

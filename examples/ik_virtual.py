@@ -126,7 +126,7 @@ def picture(chain: ik.Chain, experiment: Experiment, angles: np.ndarray, words: 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("ik_virtual"))
+    parser.add_argument("--out", type=Path, default=Path("out/ik_virtual"))
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     chain = planar_chain()
