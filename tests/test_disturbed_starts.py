@@ -59,3 +59,16 @@ def test_a_recording_without_truth_is_refused(disturbed):
 
     with pytest.raises(SystemExit, match="bare: expected a recording with a start and exact truth, found none"):
         disturbed.run(Bare(), np.random.default_rng(0), 0.0)
+
+
+def test_a_recording_played_backwards_is_tracked_from_its_end(disturbed):
+    """Its truth is mirrored with it: from the same place the error stays small, and frames come in the order of time."""
+    recording = voodoo.open_recording(BUNDLED, use=("depth",))
+    played = disturbed.Played(recording, backwards=True, every=2)
+    stamps = [frame.stamp for frame in played]
+    assert len(stamps) == (len(recording) + 1) // 2 and (np.diff(stamps) > 0).all()
+    last = recording.reference.positions[-1]
+    names = recording.reference.names
+    assert np.array_equal(played.start["joints"]["l_wrist"], last[names.index("l_wrist")])
+    error, _, lost = disturbed.run(played, np.random.default_rng(0), 0.0)
+    assert error < 0.06 and not lost, (error, lost)
