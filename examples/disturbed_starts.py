@@ -6,7 +6,7 @@ The first run starts from init.json, the others with 4 mm of noise on its joints
 automatic) and the joints that are still lost at the end, run by run.
 
 `--backwards` plays the recordings from their end, starting from the true joints there, and `--every 2` leaves out every second
-frame: motions that nothing was developed on, though of the same people.
+frame: other motions of the same people.
 """
 
 import argparse
