@@ -30,38 +30,45 @@ enum Sight {
     Contradicted,
 }
 
-/// Patches of a limb: contradicted, hidden, and all that face a camera, by their area in the image.
+/// Patches of a limb that face a camera inside its image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Patches {
+    /// Those that a camera sees past.
+    pub past: f64,
+    /// Those behind what the camera sees.
+    pub hidden: f64,
+    /// All.
+    pub facing: f64,
+}
+
+impl std::ops::AddAssign for Patches {
+    fn add_assign(&mut self, other: Self) {
+        self.past += other.past;
+        self.hidden += other.hidden;
+        self.facing += other.facing;
+    }
+}
+
+/// What the cameras see of a limb.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Visibility {
-    /// Patches that a camera sees past.
-    pub contradicted: f64,
-    /// Patches behind what the camera sees.
-    pub hidden: f64,
-    /// Patches facing a camera inside its image.
-    pub facing: f64,
-    /// Those hidden, seen past and all, counted as if the limb were seen from its side: to point along the ray hides nothing.
-    pub concealed: f64,
-    /// See `concealed`.
-    pub past: f64,
-    /// See `concealed`.
-    pub whole: f64,
+    /// By the area in the image.
+    pub image: Patches,
+    /// As if the limb were seen from its side: to point along the ray hides nothing.
+    pub side: Patches,
 }
 
 impl std::ops::AddAssign for Visibility {
     fn add_assign(&mut self, other: Self) {
-        self.contradicted += other.contradicted;
-        self.hidden += other.hidden;
-        self.facing += other.facing;
-        self.concealed += other.concealed;
-        self.past += other.past;
-        self.whole += other.whole;
+        self.image += other.image;
+        self.side += other.side;
     }
 }
 
 impl Visibility {
     /// Cost in unexplained patches: to be seen past is as bad as to leave a patch unexplained, to hide is suspicious.
     pub fn cost(&self) -> f64 {
-        self.contradicted + HIDDEN * self.concealed
+        self.image.past + HIDDEN * self.side.hidden
     }
 }
 
@@ -90,21 +97,15 @@ pub fn look(views: Views, limb: &Limb, working_from_limb: &Pose) -> Visibility {
                 let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
                 let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
                     / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
-                let patches = whole * aslant;
-                match sight(&view, point) {
-                    None => continue,
-                    Some(Sight::Contradicted) => {
-                        found.contradicted += patches;
-                        found.past += whole;
+                let Some(sight) = sight(&view, point) else { continue };
+                for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
+                    match sight {
+                        Sight::Contradicted => counts.past += patches,
+                        Sight::Hidden => counts.hidden += patches,
+                        Sight::Seen => {}
                     }
-                    Some(Sight::Seen) => {}
-                    Some(Sight::Hidden) => {
-                        found.hidden += patches;
-                        found.concealed += whole;
-                    }
+                    counts.facing += patches;
                 }
-                found.facing += patches;
-                found.whole += whole;
             }
         }
     }
@@ -163,10 +164,10 @@ mod tests {
         let at = |angle: f64| {
             let turn = Quat::from_axis_angle(Vec3::Y, angle);
             let middle = turn * Vec3::new(0.0, 0.0, 0.5 * limb.shape.length());
-            look(views, limb, &Pose::from_parts(Vec3::new(0.0, 0.0, 2.5) - middle, turn))
+            look(views, limb, &Pose::from_parts(Vec3::new(0.0, 0.0, 2.5) - middle, turn)).image
         };
         let across = at(std::f64::consts::FRAC_PI_2);
-        assert!(across.facing > 50.0 && across.contradicted == across.facing, "{across:?}");
+        assert!(across.facing > 50.0 && across.past == across.facing, "{across:?}");
         for angle in [0.2_f64, 0.6, 1.0] {
             let ratio = at(angle).facing / across.facing;
             assert!((ratio - angle.sin()).abs() < 0.02, "{angle}: {ratio}");

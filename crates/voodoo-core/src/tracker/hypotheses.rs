@@ -362,15 +362,15 @@ impl Tracker {
         let mut seen = Visibility::default();
         let mut against = |limb: usize, alone: f64| {
             seen += look(views, &self.body.limbs()[limb], &self.poses[limb]);
-            alone <= IDLE * (seen.facing - seen.hidden).max(LEAST)
-                || seen.contradicted > (REFUTED * seen.facing).max(LEAST_PAST)
+            alone <= IDLE * (seen.image.facing - seen.image.hidden).max(LEAST)
+                || seen.image.past > (REFUTED * seen.image.facing).max(LEAST_PAST)
         };
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
         });
         let lower = against(chain.lower, alone(upper));
         let upper = against(chain.upper, alone(0));
-        let past = drawn && seen.past > (REFUTED * seen.whole).max(LEAST);
+        let past = drawn && seen.side.past > (REFUTED * seen.side.facing).max(LEAST);
         [upper || past, lower || past]
     }
 

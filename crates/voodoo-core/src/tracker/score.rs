@@ -37,7 +37,7 @@ impl Tracker {
         let strain: f64 = self.chains.iter().map(|chain| self.strain(chain, &self.poses)).sum();
         let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
         let points = unexplained(&self.correspondences, total);
-        Cost { evidence: points + seen.contradicted, total: points + seen.cost() + strain }
+        Cost { evidence: points + seen.image.past, total: points + seen.cost() + strain }
     }
 
     /// Patches of a chain whose axis lies inside another limb: there is no room for it.

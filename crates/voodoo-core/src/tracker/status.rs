@@ -191,11 +191,11 @@ impl Tracker {
         let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
         prove(views, &self.body, &self.poses, &self.chains, &mut work.outlines, &mut work.proofs);
         for limb in 0..count {
-            let seen = look(views, &self.body.limbs()[limb], &self.poses[limb]);
+            let seen = look(views, &self.body.limbs()[limb], &self.poses[limb]).image;
             let visible = seen.facing - seen.hidden;
             let alone = work.alone[limb];
             let mut now = if seen.facing > 0.0 {
-                [alone / visible.max(LEAST), seen.contradicted / seen.facing, visible / seen.facing]
+                [alone / visible.max(LEAST), seen.past / seen.facing, visible / seen.facing]
             } else {
                 [SUPPORT * alone / FEW, 0.0, 0.0]
             };
