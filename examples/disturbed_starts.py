@@ -19,30 +19,35 @@ import numpy as np
 import voodoo
 from voodoo import metrics
 from voodoo.evaluate import compare
-from voodoo.recordings import RecordedFrame, Recording, RecordingInfo
+from voodoo.recordings import RecordedFrame, Recording, RecordingInfo, Reference, Start
 from voodoo.results import Track
 from voodoo.running import track
 
 NOISE_M = 0.004
 
 
+def known(recording: Recording) -> tuple[Start, Reference]:
+    """Start and truth of a recording that has both."""
+    if recording.start is None or recording.reference is None:
+        raise SystemExit(f"{recording.name}: expected a recording with a start and exact truth, found none")
+    return recording.start, recording.reference
+
+
 class Played(Recording):
     """A recording with exact truth, played from its end or faster."""
 
     def __init__(self, recording: Recording, *, backwards: bool, every: int) -> None:
-        if recording.start is None or recording.reference is None:
-            raise SystemExit(f"{recording.name}: expected a recording with a start and exact truth, found none")
+        start, truth = known(recording)
         self.recording = recording
         self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
-        self.start, self.reference = recording.start, recording.reference
+        self.start, self.reference = start, truth
         self.frames = list(recording)
         if backwards:
-            truth = recording.reference
             ends = self.frames[0].stamp + self.frames[-1].stamp
             last = truth.positions[np.argmin(np.abs(truth.stamps - self.frames[-1].stamp))]
             there = dict(zip(truth.names, last, strict=True))
-            joints = {name: there[name] for name in recording.start["joints"] if name in there}
-            self.start = {**recording.start, "joints": joints}
+            joints = {name: there[name] for name in start["joints"] if name in there}
+            self.start = {**start, "joints": joints}
             self.reference = replace(truth, stamps=ends - truth.stamps[::-1], positions=truth.positions[::-1])
             self.frames = [mirrored(frame, ends) for frame in reversed(self.frames)]
         self.frames = self.frames[::every]
@@ -65,10 +70,9 @@ def mirrored(frame: RecordedFrame, ends: float) -> RecordedFrame:
 
 def run(recording: Recording, chance: np.random.Generator, noise: float) -> tuple[float, int, list[str]]:
     """Mean error [m], class and the joints lost at the end."""
-    if recording.start is None or recording.reference is None:
-        raise SystemExit(f"{recording.name}: expected a recording with a start and exact truth, found none")
-    tracker = voodoo.Tracker(voodoo.Body.human(recording.start["height_m"]))
-    joints = recording.start["joints"].items()
+    start, _ = known(recording)
+    tracker = voodoo.Tracker(voodoo.Body.human(start["height_m"]))
+    joints = start["joints"].items()
     tracker.reset(joints={name: np.add(place, chance.normal(0.0, noise, 3)) for name, place in joints})
     result = Track.of([step.estimate for step in track(recording, tracker)], body=tracker.body)
     errors = compare(recording, result)
