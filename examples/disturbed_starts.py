@@ -87,6 +87,8 @@ def main() -> None:
     parser.add_argument("--backwards", action="store_true", help="play the recordings from their end")
     parser.add_argument("--every", type=int, default=1, help="use every n-th frame (default 1)")
     options = parser.parse_args()
+    if options.every < 1:
+        parser.error(f"--every: expected at least 1, found {options.every}")
     ended, means = 0, []
     print("| recording | error, cm | mean | class | lost at the end |\n|---|---|---|---|---|")
     for path in options.recordings:

@@ -148,7 +148,7 @@ def plot(results: list[Result], solvers: list[str], file: Path) -> None:
             chosen = [r for r in results if r.solver == solver and r.mode == mode]
             values = [100 * np.median([r.group(group).mean() for r in chosen]) for group in GROUPS]
             axis.bar(np.arange(len(GROUPS)) + width * offset, values, width=0.95 * width, label=mode)
-        axis.set_xticks(np.arange(len(GROUPS)) + 0.3, list(GROUPS), rotation=20)
+        axis.set_xticks(np.arange(len(GROUPS)) + 0.5 * width * (len(modes) - 1), list(GROUPS), rotation=20)
         axis.set(title=solver, ylabel="median of mean errors / cm", ylim=(0, 40))
         axis.legend()
         axis.grid(axis="y", alpha=0.3)
