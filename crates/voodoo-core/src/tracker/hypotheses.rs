@@ -29,10 +29,10 @@ const LEAST_PAST: f64 = 12.0;
 const PATIENCE: usize = 2;
 /// So many frames where nothing but open points speaks against an arm.
 const LONG_PATIENCE: usize = 4;
-/// A hypothesis must cost so many patches less than the current pose, and one that open points have drawn so many of them by what
-/// cameras see.
+/// A hypothesis must cost so many patches less than the current pose, and so many of them by what cameras see: to come out of
+/// hiding, or out of another limb, is no reason to jump.
 const GAIN: f64 = 25.0;
-const DRAWN: f64 = 10.0;
+const SEEN_GAIN: f64 = 10.0;
 /// ICP steps that refine the best hypothesis.
 const REFINE: usize = 8;
 /// A new configuration that costs more than this, and more than the old one, is no pose of a body.
@@ -335,8 +335,9 @@ impl Tracker {
     }
 
     /// Whether the frame speaks against a chain where it is: against all of it, and against what lies beyond its hinge. What
-    /// cameras see past counts by its area in the image; where open points have drawn the chain, as if seen from the side, too:
-    /// a thing that appears draws a calf along the ray, where nothing of it is seen.
+    /// cameras see past counts by its area in the image. Where open points have drawn the chain, it counts as if seen from the
+    /// side, too: a thing that appears draws a calf along the ray, where nothing of it is seen. And the chain has to show itself:
+    /// an arm behind the trunk may end at anything that comes into view there.
     fn suspect(&self, chain: &TwoBone, views: Views, work: &mut Hypotheses, drawn: bool) -> [bool; 2] {
         let Hypotheses { own, own_weight, others, best, .. } = work;
         own.clear();
@@ -370,8 +371,10 @@ impl Tracker {
         });
         let lower = against(chain.lower, alone(upper));
         let upper = against(chain.upper, alone(0));
-        let past = drawn && seen.side.past > (REFUTED * seen.side.facing).max(LEAST);
-        [upper || past, lower || past]
+        let shown = seen.image.facing - seen.image.hidden - seen.image.past;
+        let past = seen.side.past > (REFUTED * seen.side.facing).max(LEAST);
+        let drawn = drawn && (past || shown < SUSPICIOUS);
+        [upper || drawn, lower || drawn]
     }
 
     /// Distance of points to the nearest limb that does not belong to a chain.
@@ -410,8 +413,7 @@ impl Tracker {
         }
         self.match_last(frame);
         let cost = self.overall_cost(frame);
-        // Open points that have drawn it shall be explained by it: to come out of hiding elsewhere is no reason.
-        if cost.total < before.total - GAIN && (!drawn || cost.evidence < before.evidence - DRAWN) {
+        if cost.total < before.total - GAIN && cost.evidence < before.evidence - SEEN_GAIN {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
             // What is as suspect as before is not worth a jump.
             let strain = self.strain(&self.chains[index], &self.poses);
