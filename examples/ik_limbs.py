@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -33,14 +34,14 @@ def rotation(local: np.ndarray, world: np.ndarray) -> np.ndarray:
     return vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
 
 
-def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **options: float) -> dict[str, np.ndarray]:
+def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **options: Any) -> dict[str, np.ndarray]:
     """Positions (F, 3) of elbows and knees, each a chain of two limbs on the trunk that ends at its known joint.
 
     Args:
         truth: site -> positions (F, 3) [m]; the ten-limb body is sized by the first frame of `steady`.
         height: stature [m].
         silhouettes: None: plain inverse kinematics.
-        **options: of ik.Options.
+        **options: of ik.Follower; `rest` may be a function of the chain and its first angles.
     """
     tracker = voodoo.Tracker(voodoo.Body.human(height=height, model="papers"))
     for sites, fit_sizes in ((steady(truth), True), (truth, False)):
@@ -52,7 +53,9 @@ def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **optio
     for joint, (limbs, _, _) in LIMBS.items():
         chain = ik.Chain(tracker.body, limbs=limbs)
         start = chain.project(estimate.world_from_limb, world_from_base=torso, closest=False)
-        followers[joint] = ik.Follower(chain, start=start, **options)
+        rest = options.get("rest")
+        chosen = {**options, "rest": rest(chain, start) if callable(rest) else rest}
+        followers[joint] = ik.Follower(chain, start=start, **chosen)
     last = {joint: truth[joint][0] for joint in LIMBS}
     found: dict[str, list[np.ndarray]] = {joint: [] for joint in LIMBS}
     postures: dict[str, ik.Posture] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -58,7 +59,7 @@ class Trial:
         """The cameras whose calibration agrees with the triangulation."""
         return tuple(name for name, pixels in self.apart.items() if pixels < AGREES_PX)
 
-    def solve(self, cameras: Sequence[str], truth: Truth, **options: float) -> dict[str, np.ndarray]:
+    def solve(self, cameras: Sequence[str], truth: Truth, **options: Any) -> dict[str, np.ndarray]:
         """Positions (F, 3) of elbows and knees with the silhouettes of some cameras, known sites as in `truth`."""
 
         def silhouettes(frame: int, last: Mapping[str, np.ndarray]) -> list[ik.Silhouette]:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -64,13 +65,14 @@ class Rendered:
         seen = metres(depth) if deep else None
         return ik.Silhouette(mask, camera=depth.camera, world_from_camera=depth.root_from_sensor, depth=seen)
 
-    def solve(self, views: int, *, deep: bool = False) -> dict[str, np.ndarray]:
-        """Positions (F, 3) of elbows and knees with so many views; `deep`: the first one with its depths."""
+    def solve(self, views: int, *, deep: bool = False, **options: Any) -> dict[str, np.ndarray]:
+        """Positions (F, 3) of elbows and knees with so many views; `deep`: the first one with its depths; options of
+        ik.Follower."""
 
         def silhouettes(frame: int, last: Mapping[str, np.ndarray]) -> list[ik.Silhouette]:
             return [self.front(frame, last, deep=deep), self.side[frame]][:views]
 
-        return follow(self.truth, self.height, silhouettes if views else None)
+        return follow(self.truth, self.height, silhouettes if views else None, **options)
 
 
 def rendered(path: Path) -> Rendered:
@@ -145,10 +147,10 @@ def mean(found: Mapping[str, np.ndarray], truth: Truth, joint: str) -> float:
     return float(1e3 * np.nanmean(some))
 
 
-def spread(trial: Trial, cameras: Sequence[str]) -> list[str]:
+def spread(trial: Trial, cameras: Sequence[str], **options: Any) -> list[str]:
     """Mean errors [mm] of elbows, knees and both from the nearest chains, over some cautions around the default (least to most):
     small changes move the solution of a sequence from one valley to another, so one figure alone says little."""
-    found = [trial.solve(cameras, trial.steady, caution=caution) for caution in CAUTIONS]
+    found = [trial.solve(cameras, trial.steady, caution=caution, **options) for caution in CAUTIONS]
     words = []
     for joint in ("elbow", "knee", "both"):
         means = [mean(one, trial.steady, joint) for one in found]
@@ -160,14 +162,18 @@ def all_sets(trial: Trial) -> None:
     """The table of every set of cameras, and what the keypoints that the truth was triangulated from say in their place."""
     plain = trial.solve((), trial.steady)
     halves = [0.5 * mean(plain, trial.steady, joint) for joint in ("elbow", "knee", "both")]
-    print("\n| cameras | elbow | knee | both | keypoints: elbow | knee | both |\n|---|---|---|---|---|---|---|")
-    print("| half of plain | " + " | ".join(f"{half:.1f}" for half in halves) + " | | | |")
+    resting = 0.5 * mean(trial.solve((), trial.steady, rest="mean"), trial.steady, "both")
+    print(
+        "\n| cameras | elbow | knee | both | both, at rest | keypoints: elbow | knee | both |\n|---|---|---|---|---|---|---|---|"
+    )
+    print("| half of plain | " + " | ".join(f"{half:.1f}" for half in [*halves, resting]) + " | | | |")
     for count in range(1, len(trial.views) + 1):
         for cameras in combinations(trial.views, count):
             turned = trial.keypoints.turned(cameras, trial.steady)
             own = [f"{mean(turned, trial.steady, joint):.1f}" for joint in ("elbow", "knee", "both")]
             name = " ".join(camera[-2:] for camera in cameras) + (" (best)" if cameras == trial.best(count) else "")
-            print(f"| {name} | " + " | ".join(spread(trial, cameras) + own) + " |", flush=True)
+            found = [*spread(trial, cameras), spread(trial, cameras, rest="mean")[-1]]
+            print(f"| {name} | " + " | ".join(found + own) + " |", flush=True)
 
 
 def main() -> None:
@@ -177,13 +183,16 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     print(
-        "| sequence | joint | plain | 1 view | 2 views | 1 with depth | 2, the first with depth |\n|---|---|---|---|---|---|---|"
+        "| sequence | joint | plain | 1 view | 2 views | 1 with depth | 2, the first with depth "
+        "| at rest: plain | 1 view | 2 views |\n"
+        "|---|---|---|---|---|---|---|---|---|---|"
     )
     for name in sorted(path.parent.name for path in (arguments.data / "rendered").glob("*/bag")):
         if not (arguments.data / "rendered" / name).is_dir():
             continue
         sequence = rendered(arguments.data / "rendered" / name)
         found = [sequence.solve(views) for views in (0, 1, 2)] + [sequence.solve(views, deep=True) for views in (1, 2)]
+        found += [sequence.solve(views, rest="mean") for views in (0, 1, 2)]
         for joint in ("elbow", "knee", "both"):
             print(row(name, joint, [errors(one, sequence.truth) for one in found]))
         tiles = []
@@ -202,8 +211,12 @@ def main() -> None:
             "\n| real cameras, known and error from | joint | plain | best 1 | best 2 | those that agree | all 4 | best turn |\n"
             "|---|---|---|---|---|---|---|---|"
         )
-        for name, truth in (("the triangulation", trial.truth), ("its nearest chains", trial.steady)):
-            found = [*(trial.solve(cameras, truth) for cameras in sets), nearest(truth)]
+        for name, truth, options in (
+            ("the triangulation", trial.truth, {}),
+            ("its nearest chains", trial.steady, {}),
+            ("the same, at rest", trial.steady, {"rest": "mean"}),
+        ):
+            found = [*(trial.solve(cameras, truth, **options) for cameras in sets), nearest(truth)]
             for joint in LIMBS:
                 means = [1e3 * errors(one, truth)[joint].mean() for one in found]
                 print(f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")

@@ -193,3 +193,16 @@ def test_lens_distortion_is_taken_out_of_a_silhouette():
     found = ik.Silhouette(seen, camera=bent, world_from_camera=np.eye(4)).distance < 0
     wanted = ik.Silhouette(bar, camera=straight, world_from_camera=np.eye(4)).distance < 0
     assert (found & wanted).sum() > 0.95 * (found | wanted).sum()
+
+
+def test_images_alone_are_an_answer_too(arm):
+    camera, pose = front_camera(0.5)
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        mask = np.zeros((120, 160), dtype=np.uint8)
+        top, left = rng.integers(10, 60), rng.integers(40, 90)
+        mask[top : top + 50, left : left + rng.integers(10, 50)] = 1
+        image = ik.Silhouette(mask, camera=camera, world_from_camera=pose)
+        start = np.clip(rng.uniform(-1.0, 1.0, 4), *arm.limits.T)
+        found = ik.solve(arm, {}, images=[image], start=start, steps=100)
+        assert found.residuals == () and found.h <= arm.criterion(start, [image])[0] + 1e-9

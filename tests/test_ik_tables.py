@@ -40,6 +40,19 @@ def test_images_halve_the_error_of_the_inner_joints(voodoo_data, name):
             assert (sequence.side[frame].distance[v[seen], u[seen]] < -1.0).all(), (frame, joint)
 
 
+@pytest.mark.parametrize("name", ["dev_03_punch", "dev_07_sword_cmu"])
+def test_the_mean_posture_helps_where_one_view_does_not_tell(voodoo_data, name):
+    sequence = ik_tables.rendered(voodoo_data / "rendered" / name)
+    alone = means(sequence.solve(1), sequence.truth)
+    plain, one, two = (means(sequence.solve(views, rest="mean"), sequence.truth) for views in (0, 1, 2))
+    assert one.mean() < 0.9 * alone.mean() and (one < alone + 0.001).all()
+    assert (one < plain).all()
+    if name == "dev_03_punch":
+        # Half of what two views are better by, for the knees; and half of plain inverse kinematics that has the same rest.
+        without = means(sequence.solve(2), sequence.truth)
+        assert one[1] - two[1] < 0.55 * (alone[1] - without[1]) and (one < 0.5 * plain).all()
+
+
 def test_depths_tell_of_arms_before_the_trunk(voodoo_data):
     sequence = ik_tables.rendered(voodoo_data / "rendered" / "dev_07_sword_cmu")
     outline, deep = (means(sequence.solve(1, deep=deep), sequence.truth) for deep in (False, True))
@@ -72,6 +85,15 @@ def test_four_real_cameras(voodoo_data):
         assert ik_tables.mean(turned, trial.steady, "knee") > 0.5e3 * plain[1]
     every = trial.keypoints.turned(tuple(trial.views), trial.steady)
     assert ik_tables.mean(every, trial.steady, "both") < 0.01e3
+    # Drawn to the mean of the postures so far, all of them are better, plain inverse kinematics most.
+    resting = [
+        means(trial.solve(cameras, trial.steady, rest="mean"), trial.steady).mean()
+        for cameras in ((), trial.best(1), trial.best(2), trial.agreeing, tuple(trial.views))
+    ]
+    assert all(
+        now < before.mean() + 0.001 for now, before in zip(resting, (plain, one, two, agreeing, four), strict=True)
+    )
+    assert resting[0] < 0.85 * plain.mean() and max(resting[1:]) < 0.75 * resting[0]
     # Against the triangulation itself no chain of constant limbs between its ends can halve it.
     plain, best = (means(found, trial.truth) for found in (trial.solve((), trial.truth), ik_limbs.nearest(trial.truth)))
     assert best.mean() > 0.5 * plain.mean()

@@ -408,6 +408,7 @@ class Chain:
         views: Sequence[View],
         others: Sequence[tuple[str, npt.NDArray[np.float64]]],
         how: tuple[int, float, float, float, float, float],
+        rest: Sequence[tuple[int, float]],
     ) -> tuple[
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],
@@ -427,6 +428,7 @@ class Chain:
         depth: tuple[float, float],
         views: Sequence[View],
         how: tuple[int, float, float, float, float, float],
+        rest: Sequence[tuple[int, float]],
     ) -> tuple[
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],

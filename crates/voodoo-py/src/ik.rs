@@ -5,7 +5,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::geometry::{Pose, Vec3};
-use voodoo_core::ik::{self, Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, Trunk};
+use voodoo_core::ik::{
+    self, Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Segment, Solver, Trunk,
+};
 
 use crate::arrays::{frozen, matrix, pose};
 use crate::body::PyBody;
@@ -78,6 +80,11 @@ impl PyView {
 pub struct PyChain {
     body: Body,
     model: Model,
+}
+
+/// A solver that draws the angles of these indices to these values, below all else.
+fn resting(rest: &[(usize, f64)]) -> Solver {
+    Solver::with_rest(rest.iter().map(|&(unknown, angle)| Rest { unknown, angle }).collect())
 }
 
 fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> Options {
@@ -281,6 +288,7 @@ impl PyChain {
         views: Vec<PyRef<'py, PyView>>,
         others: Vec<(String, Bound<'py, PyAny>)>,
         how: OptionParts,
+        rest: Vec<(usize, f64)>,
     ) -> PyResult<Solved<'py>> {
         let py = base.py();
         let mut angles = start.as_slice()?.to_vec();
@@ -293,7 +301,7 @@ impl PyChain {
         let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
         let trunk = self.trunk(py, &others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
-        let mut solver = Solver::default();
+        let mut solver = resting(&rest);
         let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &options(how), &mut angles);
         let at = solver.kinematics();
         let residuals = goals.iter().map(|goal| goal.residual(at).length());
@@ -326,6 +334,7 @@ impl PyChain {
         depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
         how: OptionParts,
+        rest: Vec<(usize, f64)>,
     ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
         let py = base.py();
         let base = pose("world_from_base", Some(base))?;
@@ -342,7 +351,7 @@ impl PyChain {
         let mut points = Vec::with_capacity(3 * sites.len() * count);
         let [mut h, mut steps, mut tried, mut looked, mut converged] = [const { Vec::new() }; 5];
         py.detach(|| {
-            let mut solver = Solver::default();
+            let mut solver = resting(&rest);
             let width = 3 * goals.len();
             for index in 0..count {
                 let (rows, _) = positions[index * width..(index + 1) * width].as_chunks::<3>();

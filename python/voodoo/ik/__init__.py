@@ -7,6 +7,7 @@ from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette, signed_distance
 from voodoo.ik.options import Options
 from voodoo.ik.posture import Posture, Postures
+from voodoo.ik.rest import Rest
 from voodoo.ik.solve import Follower, solve, solve_many
 from voodoo.ik.targets import Target, Targets
 from voodoo.ik.values import Bone
@@ -18,6 +19,7 @@ __all__ = [
     "Options",
     "Posture",
     "Postures",
+    "Rest",
     "Silhouette",
     "Target",
     "Targets",

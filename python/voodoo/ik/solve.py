@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette, seen_views
 from voodoo.ik.options import Options, chosen_options
 from voodoo.ik.posture import Posture, Postures
+from voodoo.ik.rest import Rest, named_rest, rest_parts
 from voodoo.ik.targets import Target, Targets, target_parts
 from voodoo.ik.values import FloatArray, base_pose, listed_bones, listed_poses, named, vector
 
@@ -26,10 +27,12 @@ def solve(
     start: npt.ArrayLike | Posture | None = None,
     world_from_base: npt.ArrayLike | None = None,
     others: Mapping[str, npt.ArrayLike] | None = None,
+    rest: Rest | None = None,
     options: Options | None = None,
     **changes: Any,  # noqa: ANN401 - the fields of Options
 ) -> Posture:
-    """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, limits throughout.
+    """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, a rest posture in what those
+    leave, limits throughout.
 
     Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing
     here is ever NaN.
@@ -43,11 +46,14 @@ def solve(
             chosen limbs; None: identity.
         others: limbs of the body that are not on the chain, as far as they are known: name -> rigid (4, 4) pose, e.g.
             `world_from_limb` of the posture of the other leg. With images no bone of the chain shall lie in them.
+        rest: posture the angles are drawn to where neither targets nor silhouettes object: angles (n,), e.g. `chain.rest()`,
+            or a posture, without the pose of a free root; or only some, name of an angle -> value [rad, m]. None: they
+            stay where targets and silhouettes are met.
         options: see Options.
         **changes: single fields of Options, e.g. `steps=30, margin=0.0`.
 
     Raises:
-        BodyError: a site that is not on the chain, or another limb that is, or is not in the body.
+        BodyError: a site or angle that is not on the chain, or another limb that is, or is not in the body.
         MeasurementError: a number that cannot be used; it says which.
     """
     chain = _chain(chain)
@@ -63,6 +69,7 @@ def solve(
         views,
         listed_poses(others),
         options.parts(),
+        rest_parts(chain, rest),
     )
     return Posture(
         angles=angles,
@@ -85,6 +92,7 @@ def solve_many(
     images: Sequence[Silhouette] = (),
     starts: npt.ArrayLike | None = None,
     world_from_base: npt.ArrayLike | None = None,
+    rest: Rest | None = None,
     options: Options | None = None,
     **changes: Any,  # noqa: ANN401 - the fields of Options
 ) -> Postures:
@@ -97,11 +105,12 @@ def solve_many(
         images: silhouettes.
         starts: angles (n,) or (N, n); None: at rest.
         world_from_base: as in `solve`.
+        rest: as in `solve`.
         options: see Options.
         **changes: single fields of Options.
 
     Raises:
-        BodyError: a site that is not on the chain.
+        BodyError: a site or an angle that is not on the chain.
         MeasurementError: a shape or a number that cannot be used.
     """
     options = chosen_options(options, changes)
@@ -124,6 +133,7 @@ def solve_many(
         (options.margin, options.thin),
         views,
         options.parts(),
+        rest_parts(chain, rest),
     )
     angles, joints, h, steps, tried, looked, converged = found
     return Postures(angles, joints, h, steps, tried, looked, converged != 0.0)
@@ -138,15 +148,25 @@ def _chain(chain: Chain | Body) -> Chain:
 class Follower:
     """Solves a sequence, each posture from the one before."""
 
-    def __init__(self, chain: Chain | Body, *, start: npt.ArrayLike | Posture | None = None, **changes: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        chain: Chain | Body,
+        *,
+        start: npt.ArrayLike | Posture | None = None,
+        rest: Rest | Literal["mean"] | None = None,
+        **changes: Any,  # noqa: ANN401 - the fields of Options
+    ) -> None:
         """Stand at a start.
 
         Args:
             chain: what moves.
             start: angles (n,) or a posture; None: at rest.
+            rest: as in `solve`, for every posture; "mean": the mean of the start and all postures so far, so that what
+                nothing tells any more goes back to where it usually is.
             **changes: fields of Options.
 
         Raises:
+            BodyError: an angle that is not on the chain.
             MeasurementError: an option or an angle that cannot be used.
         """
         self.chain = _chain(chain)
@@ -154,6 +174,13 @@ class Follower:
         begin = start.angles if isinstance(start, Posture) else self.chain.rest() if start is None else start
         self.angles: FloatArray = np.array(vector(begin))
         self.chain.forward(self.angles)
+        self._count = 1 if isinstance(rest, str) and rest == "mean" else 0
+        self._rest = named_rest(self.chain, self.angles if self._count else rest)
+
+    @property
+    def rest(self) -> Mapping[str, float]:
+        """What the next posture is drawn to: name of an angle -> value [rad, m]."""
+        return self._rest
 
     def step(
         self,
@@ -171,9 +198,14 @@ class Follower:
             start=self.angles,
             world_from_base=world_from_base,
             others=others,
+            rest=self._rest,
             options=self.options,
         )
         self.angles = posture.angles
+        if self._count:
+            self._count += 1
+            now = named_rest(self.chain, posture)
+            self._rest = {name: mean + (now[name] - mean) / self._count for name, mean in self._rest.items()}
         return posture
 
     def __repr__(self) -> str:

@@ -20,7 +20,7 @@ pub use goal::{Aim, Goal, level_cost, level_rows};
 pub use image::{Criterion, SAMPLES, Segment};
 pub use model::{Column, Kinematics, Model, Part, Root, Turn};
 pub use project::{project, read};
-pub use solver::{Options, Report, Solver};
+pub use solver::{Options, Report, Rest, Solver};
 pub use trunk::{Carrier, Trunk};
 pub use twist::log;
 pub use view::View;

@@ -48,7 +48,7 @@ impl Solver {
             }
         }
         // A refused step is not rest: more damping comes next.
-        if self.trust[0] < 1e5 { f64::INFINITY } else { 0.0 }
+        if self.trust.first().is_none_or(|trust| *trust < 1e5) { f64::INFINITY } else { 0.0 }
     }
 
     fn propose(&mut self, problem: &Problem, angles: &[f64], stage: usize, share: f64) {

@@ -1,6 +1,8 @@
-//! The solver (J10 eq. 4): damped pseudo-inverse steps, strictly ordered levels, the image criterion in what is left free.
+//! The solver (J10 eq. 4): damped pseudo-inverse steps, strictly ordered levels, the image criterion in what is left free, and
+//! a rest posture in what that leaves.
 
 mod accept;
+mod rest;
 mod step;
 
 use std::ops::Range;
@@ -10,6 +12,8 @@ use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{Kinematics, Model};
 use crate::geometry::Pose;
+
+pub use rest::Rest;
 
 /// Residual that a lower level may leave in a higher one, metres.
 const SETTLED: f64 = 1e-10;
@@ -61,7 +65,7 @@ pub struct Report {
     pub h: f64,
 }
 
-/// Working memory; nothing is allocated after the first call with a problem of the same size.
+/// Working memory, and the posture at rest; nothing is allocated after the first call with a problem of the same size.
 #[derive(Clone, Debug, Default)]
 pub struct Solver {
     at: Kinematics,
@@ -97,6 +101,10 @@ pub struct Solver {
     /// How many of them were compared with the images.
     looked: usize,
     looking: bool,
+    /// What angles are drawn to below all else; empty: nothing.
+    rest: Vec<Rest>,
+    /// Gradients of the criterion where the images refused a step to rest.
+    objections: Vec<f64>,
 }
 
 struct Problem<'a> {
@@ -145,6 +153,9 @@ impl Solver {
             if phase < count {
                 self.best.push(self.cost[phase].sqrt());
             }
+        }
+        if !self.rest.is_empty() {
+            self.draw(&problem, angles, &mut report);
         }
         report.h = self.h;
         (report.tried, report.looked) = (self.tried, self.looked);

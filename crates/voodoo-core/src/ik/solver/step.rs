@@ -95,7 +95,7 @@ impl Solver {
     }
 
     /// Adds the part to a stage as far as the limits allow; true when one was hit, whose unknown then is taken.
-    fn add_part(&mut self, problem: &Problem, stage: usize, angles: &[f64]) -> bool {
+    pub(super) fn add_part(&mut self, problem: &Problem, stage: usize, angles: &[f64]) -> bool {
         let n = angles.len();
         let most = largest(&self.part);
         if !most.is_finite() {

@@ -1,0 +1,128 @@
+//! The lowest level: a posture the angles are drawn to where neither the goals nor the images object.
+
+use super::super::goal::level_rows;
+use super::super::linear::largest;
+use super::{Problem, Report, Solver};
+
+/// What the image criterion may rise by, pixels: rounding.
+const LEVEL: f64 = 1e-9;
+/// Shares of a step that are tried, one after the other.
+const SHARES: [f64; 4] = [1.0, 0.25, 0.0625, 0.015_625];
+
+/// An unknown and where it is drawn to, below all goals and the images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// Index of the unknown.
+    pub unknown: usize,
+    /// Its value at rest; beyond its limits: as near as these allow.
+    pub angle: f64,
+}
+
+impl Solver {
+    /// A solver that draws angles to `rest`: least squares of what they are off, in what goals and images leave free.
+    pub fn with_rest(rest: Vec<Rest>) -> Self {
+        Self { rest, ..Self::default() }
+    }
+
+    /// Steps towards the rest posture (few solves have one, so this stays out of the way of the others), each made good by the goals; none is taken that leaves one of them or the images worse.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn draw(&mut self, problem: &Problem, angles: &mut [f64], report: &mut Report) {
+        // What lower levels improved in higher ones on their way counts, too.
+        self.best.clear();
+        self.best.extend(self.cost.iter().map(|cost| cost.sqrt()));
+        let most = self.h + LEVEL;
+        let mut rest = false;
+        for _ in 0..problem.options.steps {
+            report.steps += 1;
+            if self.draw_once(problem, most, angles) < problem.options.still {
+                rest = true;
+                break;
+            }
+        }
+        report.converged &= rest;
+    }
+
+    /// One step, `h` at most `most`; the largest change of an unknown, zero if there is none to be taken.
+    fn draw_once(&mut self, problem: &Problem, most: f64, angles: &mut [f64]) -> f64 {
+        let (n, count, limits) = (angles.len(), self.levels.len(), problem.model.limits());
+        self.phase_start.clear();
+        self.phase_start.extend_from_slice(angles);
+        let off = self.off(angles);
+        self.objections.clear();
+        self.objections.reserve((n + 1) * n);
+        for refused in 0..=n {
+            self.rest_part(problem, angles);
+            if largest(&self.stages[count * n..]) < problem.options.still {
+                return 0.0;
+            }
+            for share in SHARES {
+                for (i, [low, high]) in limits.iter().enumerate() {
+                    angles[i] = (self.phase_start[i] + share * self.stages[count * n + i]).clamp(*low, *high);
+                }
+                problem.model.normalise(angles);
+                self.looking = false;
+                self.evaluate_here(problem, angles);
+                let kept = self.settle(problem, count, angles);
+                self.objections.truncate(refused * n);
+                if kept && self.off(angles) < off {
+                    if problem.criterion.is_some() {
+                        self.looking = true;
+                        self.evaluate_here(problem, angles);
+                    }
+                    if self.h <= most {
+                        let moves = angles.iter().zip(&self.phase_start).map(|(new, old)| (new - old).abs());
+                        return moves.fold(0.0, f64::max);
+                    }
+                    self.objections.extend_from_slice(&self.gradient);
+                }
+                angles.copy_from_slice(&self.phase_start);
+                // A border of the images is met nearer than this by going along it.
+                if share < 1.0 && self.objections.len() > refused * n {
+                    break;
+                }
+            }
+            self.looking = problem.criterion.is_some();
+            self.evaluate_here(problem, angles);
+            // Along the border of where the images are content, if it is they who object to the least step.
+            if self.objections.len() == refused * n {
+                return 0.0;
+            }
+        }
+        0.0
+    }
+
+    /// The step to rest in the null space of all goals and of what the images objected to, within the limits. Its stage is
+    /// the one after those of the goals.
+    fn rest_part(&mut self, problem: &Problem, angles: &[f64]) {
+        let (n, count) = (angles.len(), self.levels.len());
+        self.taken.clear(n);
+        for level in &self.levels {
+            let goals = &problem.goals[level.clone()];
+            level_rows(problem.model, goals, &self.at, &mut self.jacobian, &mut self.residual);
+            self.taken.take(&self.jacobian);
+        }
+        // One by one: the images may object more or less strongly, but each objection counts.
+        for gradient in self.objections.chunks_exact(n.max(1)) {
+            self.taken.take(gradient);
+        }
+        self.stages[count * n..].fill(0.0);
+        for _ in 0..=n {
+            self.part.fill(0.0);
+            for rest in self.rest.iter().filter(|rest| rest.unknown < n) {
+                let now = angles[rest.unknown] + self.stages[count * n + rest.unknown];
+                self.part[rest.unknown] = rest.angle - now;
+            }
+            self.taken.project(&mut self.part);
+            if !self.add_part(problem, count, angles) {
+                break;
+            }
+        }
+    }
+
+    /// Sum of the squares of what the angles are off their rest.
+    fn off(&self, angles: &[f64]) -> f64 {
+        let drawn = self.rest.iter().filter_map(|rest| angles.get(rest.unknown).map(|angle| angle - rest.angle));
+        drawn.map(|off| off * off).sum()
+    }
+}
