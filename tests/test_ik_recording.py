@@ -88,6 +88,16 @@ def test_wrists_stand_in_for_hands_that_nobody_measured(some):
     assert {"l_wrist", "r_wrist", "skullbase"} <= set(errors)
 
 
+def test_what_nothing_tells_goes_back_to_the_mean_unless_told_otherwise(some):
+    drawn, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none")
+    left, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none", rest=False)
+    # Targets come first: to be drawn costs them nothing.
+    assert (drawn.residual <= left.residual + 1e-4).all()
+    joints = slice(6, None)
+    away = [np.abs(found.angles[:, joints] - found.angles[0, joints]).sum(axis=1) for found in (drawn, left)]
+    assert away[0][-1] < away[1][-1]
+
+
 def test_pictures_change_the_posture_and_nothing_known(some):
     tracker = start_tracker(some)
     plain, _ = follow(some, tracker, Positions.of(some), pictures="none")

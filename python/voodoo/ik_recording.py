@@ -73,6 +73,7 @@ def follow(
     pictures: Pictures = "depth",
     options: Options | None = None,
     warm: bool = True,
+    rest: bool = True,
 ) -> tuple[Track, dict[str, FloatArray]]:
     """Postures of all frames from the known sites and the silhouettes.
 
@@ -87,6 +88,7 @@ def follow(
             plain inverse kinematics.
         options: see voodoo.ik.Options.
         warm: start each frame from the posture before; else solve it by itself, from the first pose.
+        rest: with `warm`: what neither sites nor silhouettes tell goes back to the mean of the postures so far, see ik.Follower.
 
     Returns:
         The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
@@ -107,7 +109,8 @@ def follow(
         raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
     options = Options() if options is None else options
     start = chain.project(tracker.estimate.world_from_limb)
-    follower = Follower(chain, start=start, **{name: getattr(options, name) for name in Options.__dataclass_fields__})
+    chosen = {name: getattr(options, name) for name in Options.__dataclass_fields__}
+    follower = Follower(chain, start=start, rest="mean" if rest else None, **chosen)
     scenes = {} if pictures == "none" else _scenes(recording, positions, known, pictures)
     others = [name for name in there if name not in known]
     postures: list[Posture] = []

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use voodoo_core::body::HumanModel;
 use voodoo_core::frame::{Frame, PositionRelation, RayRelation};
 use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::ik::{Aim, Criterion, Goal, Model, Options, Root, Solver, View, bones, trunk};
+use voodoo_core::ik::{Aim, Criterion, Goal, Model, Options, Rest, Root, Solver, View, bones, trunk};
 use voodoo_core::render::{Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Tracker};
 
@@ -81,7 +81,7 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     count
 }
 
-/// Allocations of a warm solver with two levels, limits and an image, for targets and starts it has not seen.
+/// Allocations of a warm solver with two levels, limits, an image and a rest posture, for targets and starts it has not seen.
 fn ik_allocations() -> usize {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let model = Model::new(&body, &[], Root::Free).unwrap();
@@ -103,7 +103,7 @@ fn ik_allocations() -> usize {
     let segments = bones(&body, &model, 1.0);
     let trunk = trunk(&body, &model);
     let criterion = Criterion { views: &[view], segments: &segments, thin: 1.7, trunk: &trunk };
-    let mut solver = Solver::default();
+    let mut solver = Solver::with_rest((6..model.freedoms()).map(|unknown| Rest { unknown, angle: 0.1 }).collect());
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {
         let by = 0.02 * index as f64;

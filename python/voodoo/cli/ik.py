@@ -43,6 +43,13 @@ def ik_command(
     alone: Annotated[
         bool, typer.Option("--alone", help="Solve every frame by itself, from the first pose, not from the one before.")
     ] = False,
+    rest: Annotated[
+        bool,
+        typer.Option(
+            "--rest/--no-rest",
+            help="Draw what nothing tells to the mean of the postures so far, or leave it where it is (not with --alone).",
+        ),
+    ] = True,
     init: InitOption = None,
     body: BodyOption = None,
     height: HeightOption = None,
@@ -86,7 +93,7 @@ def ik_command(
             model=model,
         )
         known = None if sites is None else tuple(name.strip() for name in sites.split(","))
-        how: Any = {"sites": known, "pictures": pictures, "warm": not alone}
+        how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
         result, errors = follow(source, tracker, positions, **how)
         for file in written:
             export(result, file, body=tracker.body, root_frame=source.root_frame)

@@ -190,7 +190,11 @@ class Follower:
         world_from_base: npt.ArrayLike | None = None,
         others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> Posture:
-        """The next posture; see `solve`. A refused call leaves the follower where it was."""
+        """The next posture; see `solve`. A refused call leaves the follower where it was.
+
+        A frame that tells nothing, neither targets nor images, is no reason to go to the mean of the postures so far.
+        """
+        silent = bool(self._count) and not targets and not images
         posture = solve(
             self.chain,
             targets,
@@ -198,11 +202,11 @@ class Follower:
             start=self.angles,
             world_from_base=world_from_base,
             others=others,
-            rest=self._rest,
+            rest=None if silent else self._rest,
             options=self.options,
         )
         self.angles = posture.angles
-        if self._count:
+        if self._count and not silent:
             self._count += 1
             now = named_rest(self.chain, posture)
             self._rest = {name: mean + (now[name] - mean) / self._count for name, mean in self._rest.items()}

@@ -24,7 +24,8 @@ impl Solver {
         Self { rest, ..Self::default() }
     }
 
-    /// Steps towards the rest posture (few solves have one, so this stays out of the way of the others), each made good by the goals; none is taken that leaves one of them or the images worse.
+    /// Steps towards the rest posture, each made good by the goals; none is taken that leaves one of them or the images worse.
+    /// Few solves have one: it stays out of the way of the others.
     #[cold]
     #[inline(never)]
     pub(super) fn draw(&mut self, problem: &Problem, angles: &mut [f64], report: &mut Report) {
