@@ -57,7 +57,7 @@ def test_a_recording_without_truth_is_refused(disturbed):
     class Bare:
         name, start, reference = "bare", None, None
 
-    with pytest.raises(SystemExit, match="bare: expected a recording with a start and exact truth, found none"):
+    with pytest.raises(SystemExit, match="bare: expected a recording with a start and a reference, found none"):
         disturbed.run(Bare(), np.random.default_rng(0), 0.0)
 
 

@@ -155,14 +155,17 @@ def evaluate(
     return _score(recording, path, selection, steps)
 
 
-def compare(recording: Recording, result: Track) -> FloatArray:
-    """Errors (F, 12) [m] of metrics.JOINTS against the recording's reference at lag 0; NaN where it is missing."""
+def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
+    """Errors (F, 12) [m] of metrics.JOINTS against the recording's reference, at lag 0 or at the best one; NaN where it is
+    missing."""
     column = {name: index for index, name in enumerate(result.joint_names)}
     positions = np.full((len(result), len(metrics.JOINTS), 3), np.nan)
     for index, name in enumerate(metrics.JOINTS):
         if name in column:
             positions[:, index] = result.joints[:, column[name]]
-    return metrics.joint_errors(positions, _reference_positions(recording, result.stamps))
+    reference = _reference_positions(recording, result.stamps)
+    lag = metrics.best_lag(positions, reference) if at_best_lag else 0
+    return metrics.joint_errors(positions, reference, lag=lag)
 
 
 def select_by(recording: Recording) -> Selection:
