@@ -5,16 +5,17 @@
 //! Depth hardly tells a person's front from the back. What a body cannot do since it was last seen (turn far in short time)
 //! and does not do (walk backwards) costs as well.
 
+mod trials;
+
 use super::Tracker;
 use super::places::thin;
 use super::score::limit_strain;
 use crate::blobs::{Blob, Blobs};
 use crate::candidates::{REFERENCE_PATCH, body_box};
 use crate::estimate::{LimbStatus, Status};
-use crate::evidence::{Visibility, look};
 use crate::frame::Frame;
 use crate::geometry::{Aabb, Points, Pose, Quat, Vec3};
-use crate::view::Views;
+use trials::{Trial, put};
 
 /// The body is searched from this many frames on in which it was lost.
 const PATIENCE: usize = 3;
@@ -33,11 +34,8 @@ const EXTENT: [f64; 3] = [0.35, 1.4, 1.5];
 const MARGIN: f64 = 0.20;
 /// Blobs that are tried.
 const BLOBS: usize = 2;
-/// Directions the body is turned to.
-const HEADINGS: usize = 8;
-/// Points that rough trials look at, and up to which distance they explain one, metres.
+/// Points that rough trials look at.
 const SAMPLE: usize = 300;
-const ROUGHLY: f64 = 0.10;
 /// Rough trials that are refined, in so many ICP steps, with motion this much freer than between two frames.
 const REFINED: usize = 4;
 const STEPS: usize = 10;
@@ -56,18 +54,6 @@ const WALK: [f64; 2] = [0.3, 0.2];
 const WALKED: f64 = 0.7;
 /// A blob farther than this from where it was in the frame before is another one, metres.
 const JUMP: f64 = 0.4;
-/// Depth of a body's middle behind the middle of what a camera sees of it, metres.
-const BEHIND: f64 = 0.08;
-
-/// A rough trial: its cost and its place.
-#[derive(Clone, Copy, Debug)]
-struct Trial {
-    cost: f64,
-    heading: f64,
-    root: Pose,
-    /// Joints as when last tracked, instead of at rest.
-    kept: bool,
-}
 
 /// Working memory, and what is remembered of the lost body.
 #[derive(Debug, Default)]
@@ -352,99 +338,6 @@ impl Tracker {
         }
         walked(work, stamp).map_or(cost, |direction| cost + TURNED * (1.0 - ahead.dot(direction)))
     }
-
-    /// Puts the body at the blob in every way and keeps the best of different directions, the opposite of the best among them.
-    fn rough_trials(&self, work: &mut Search, blob: &Blob, frame: &Frame) {
-        let mut all = [const { None::<Trial> }; HEADINGS];
-        for (number, slot) in all.iter_mut().enumerate() {
-            let heading = std::f64::consts::TAU * number as f64 / HEADINGS as f64;
-            for kept in [false, true] {
-                for height in 0..3 {
-                    let Some(root) = self.place(work, blob, frame, heading, kept, height) else { continue };
-                    let mut trial = Trial { cost: 0.0, heading, root, kept };
-                    trial.cost = self.rough_cost(work, &trial, frame);
-                    if slot.is_none_or(|best| trial.cost < best.cost) {
-                        *slot = Some(trial);
-                    }
-                }
-            }
-        }
-        work.trials.clear();
-        let mut ranked = all;
-        ranked.sort_unstable_by(|a, b| {
-            let cost = |slot: &Option<Trial>| slot.map_or(f64::INFINITY, |trial| trial.cost);
-            cost(a).total_cmp(&cost(b))
-        });
-        work.trials.extend(ranked.into_iter().flatten().take(REFINED - 1));
-        let Some(best) = work.trials.first().copied() else { return };
-        let opposite = |heading: f64| (heading - best.heading).cos() < -0.99;
-        let behind = all.into_iter().flatten().find(|trial| opposite(trial.heading));
-        if let Some(behind) = behind.filter(|_| !work.trials.iter().any(|trial| opposite(trial.heading))) {
-            work.trials.push(behind);
-        }
-    }
-
-    /// Root of the body at a blob: the middles together, or the tops, or on the ground.
-    fn place(
-        &self,
-        work: &Search,
-        blob: &Blob,
-        frame: &Frame,
-        heading: f64,
-        kept: bool,
-        height: usize,
-    ) -> Option<Pose> {
-        let posture = if kept { &work.kept } else { &work.rest };
-        let root = posture.first()?.rotation;
-        let level = |v: Vec3| v - work.up * v.dot(work.up);
-        // Upright by the axis of the root limb; a kept posture keeps its lean.
-        let stand = if kept { root } else { Quat::from_rotation_arc(root * Vec3::Z, work.up) * root };
-        let axis = work.up.any_orthonormal_vector();
-        let ahead = level(stand * Vec3::X).normalize_or(axis);
-        let now = ahead.dot(work.up.cross(axis)).atan2(ahead.dot(axis));
-        let turn = Quat::from_axis_angle(work.up, heading - now) * stand * root.inverse();
-        let (mut middle, mut weight) = (Vec3::ZERO, 0.0);
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let origin = posture[0].translation;
-        for (limb, pose) in self.body.limbs().iter().zip(posture) {
-            let ends = [Vec3::ZERO, Vec3::Z * limb.shape.length()].map(|end| turn * (*pose * end - origin));
-            let size = limb.shape.length() * (limb.shape.a0() + limb.shape.b1());
-            middle += size * 0.5 * (ends[0] + ends[1]);
-            weight += size;
-            for end in ends {
-                low = low.min(end.dot(work.up));
-                high = high.max(end.dot(work.up));
-            }
-        }
-        let across = blob.centre + BEHIND * level(blob.view) - middle / weight;
-        let rise = match height {
-            0 => across.dot(work.up),
-            1 => (blob.low * work.up).max(blob.high * work.up).element_sum() - high,
-            _ => frame.ground.map(|ground| ground.offset - ground.normal.dot(self.origin) - low)?,
-        };
-        Some(Pose::from_parts(level(across) + work.up * rise, (turn * root).normalize()))
-    }
-
-    fn rough_cost(&self, work: &mut Search, trial: &Trial, frame: &Frame) -> f64 {
-        let mut poses = std::mem::take(&mut work.trial);
-        put(work, trial, &mut poses);
-        let Search { sample, weights, best, distances, .. } = work;
-        best.clear();
-        best.resize(sample.len(), f32::INFINITY);
-        let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
-        let mut seen = Visibility::default();
-        for (limb, pose) in self.body.limbs().iter().zip(&poses) {
-            limb.shape.approximate_distances(pose, sample, distances);
-            for (best, distance) in best.iter_mut().zip(distances.iter()) {
-                *best = best.min(distance.abs());
-            }
-            seen += look(views, limb, pose);
-        }
-        let points: f64 =
-            best.iter().zip(weights.iter()).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum();
-        work.trial = poses;
-        points + seen.cost() + self.facing_cost(work, trial.root.rotation, frame.stamp)
-    }
 }
 
 /// Where to what may be the body walks, if it does.
@@ -453,12 +346,4 @@ fn walked(work: &Search, stamp: f64) -> Option<Vec3> {
     let way = work.last - first;
     let way = way - work.up * way.dot(work.up);
     (way.length() > WALK[1].max(WALK[0] * (stamp - since))).then(|| way.normalize_or_zero())
-}
-
-/// The body in one of the remembered postures with its root somewhere.
-fn put(work: &Search, trial: &Trial, poses: &mut Vec<Pose>) {
-    let posture = if trial.kept { &work.kept } else { &work.rest };
-    let moved = posture.first().map_or(Pose::identity(), |root| trial.root * root.inverse());
-    poses.clear();
-    poses.extend(posture.iter().map(|pose| moved * *pose));
 }
