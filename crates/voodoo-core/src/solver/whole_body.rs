@@ -6,12 +6,15 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
-use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
+use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Stance, Surface, Term};
 
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
 /// Standard deviation of an axis that lies in another limb, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
+/// Standard deviation of a foot that stands, and how far from its place one may still be held there, metres.
+const STANCE_SIGMA: f64 = 0.01;
+const STANCE_SCALE: f64 = 0.03;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
@@ -141,6 +144,9 @@ impl WholeBody {
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);
+        }
+        if config.stance {
+            Stance { feet: problem.feet, sigma: STANCE_SIGMA, scale: STANCE_SCALE }.add(body, poses, &mut self.normal);
         }
         if config.limits {
             Limits { sigma: LIMIT_SIGMA }.add(body, poses, &mut self.normal);

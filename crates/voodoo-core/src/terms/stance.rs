@@ -1,0 +1,47 @@
+//! A foot that stands stays where it is: the prior holds joint angles, so that a body that bends its knees would push straight legs
+//! through the floor.
+
+use super::{Term, surface::geman_mcclure};
+use crate::body::Body;
+use crate::geometry::{Mat3, Pose, Vec3};
+use crate::normal::Normal;
+
+/// The far end of a leg's lower limb.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    /// The limb.
+    pub limb: usize,
+    /// Where it stands, working frame.
+    pub place: Vec3,
+}
+
+impl Foot {
+    /// Where it is.
+    pub fn at(&self, body: &Body, poses: &[Pose]) -> Vec3 {
+        poses[self.limb] * (Vec3::Z * body.limbs()[self.limb].shape.length())
+    }
+}
+
+/// `r = x - place` under the Geman-McClure kernel: a foot that makes a step leaves it behind.
+#[derive(Debug)]
+pub struct Stance<'a> {
+    /// The feet.
+    pub feet: &'a [Foot],
+    /// Standard deviation of a foot that stands, metres.
+    pub sigma: f64,
+    /// Scale of the kernel, metres.
+    pub scale: f64,
+}
+
+impl Term for Stance<'_> {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
+        let information = 1.0 / (self.sigma * self.sigma);
+        for foot in self.feet {
+            let x = foot.at(body, poses);
+            let r = x - foot.place;
+            let (rho, kernel) = geman_mcclure(r.length(), self.scale);
+            normal.cost += information * rho;
+            normal.limbs[foot.limb].add_point(&(Mat3::IDENTITY * (information * kernel)), x, r);
+        }
+    }
+}
