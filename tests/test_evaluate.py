@@ -166,6 +166,23 @@ def test_capsules_take_the_person_and_leave_the_room():
     assert not near_joints(inside[:1], {**joints, "l_elbow": np.full(3, np.nan)}).any()
 
 
+def test_a_chair_that_is_left_in_the_picture_is_no_part_of_the_person(opened):
+    tracker_class, _ = opened
+    tracker = tracker_class(None, config=None)
+    tracker.body, tracker.estimate = pose(T_POSE)
+    truth = {name: np.array(position) for name, position in T_POSE.items()}
+    depth = depth_of(T_POSE)
+    chair = depth.image.copy()
+    chair[-12:, :20] = 2000
+    alone, beside = (
+        witness(RecordedFrame(0.0, (replace(depth, image=image),)), tracker, tracker.estimate, truth, "segmented")
+        for image in (depth.image, chair)
+    )
+    assert len(beside.distances) == len(alone.distances) + 240
+    assert beside.distances[beside.about_joints] == pytest.approx(alone.distances[alone.about_joints])
+    assert 0.9 * len(alone.distances) < beside.about_joints.sum() < len(alone.distances) + 1
+
+
 def test_silhouette_overlap_falls_when_the_model_moves(opened):
     tracker_class, _ = opened
     tracker = tracker_class(None, config=None)

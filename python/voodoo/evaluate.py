@@ -62,6 +62,7 @@ class Score:
         lost_joints: the joints that were ever lost.
         selection: how the person's depth points were found, see witness.
         depth_within_5cm, depth_median_m, depth_p95_m: of their distances to the model.
+        person_within_5cm: share within 5 cm of the points about the joints of truth or reference, see FrameWitness.
         silhouette_iou: mean over the frames.
         jitter_m, reference_jitter_m: mean norm of the second difference of the twelve joints, over all frames.
         standing_jitter_m, reference_standing_jitter_m: the same over the joints and frames in which the reference stands
@@ -91,6 +92,7 @@ class Score:
     depth_within_5cm: float = np.nan
     depth_median_m: float = np.nan
     depth_p95_m: float = np.nan
+    person_within_5cm: float = np.nan
     silhouette_iou: float = np.nan
     jitter_m: float = np.nan
     reference_jitter_m: float = np.nan
@@ -148,7 +150,7 @@ def evaluate(
         truth = _truth_at(recording, estimate.stamp)
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
         seen = witness(frame.recorded, tracker, estimate, truth, selection)
-        measured = np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
+        measured = called_measured(estimate)
         steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, joints, measured, seen))
     if not steps:
         raise RecordingError(f"{path}: expected at least one frame, found none")
@@ -166,6 +168,17 @@ def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -
     reference = _reference_positions(recording, result.stamps)
     lag = metrics.best_lag(positions, reference) if at_best_lag else 0
     return metrics.joint_errors(positions, reference, lag=lag)
+
+
+def called_measured(estimate: voodoo.Estimate) -> npt.NDArray[np.bool_]:
+    """Of which of metrics.JOINTS (12,) the limb that ends there is called measured; joints of the trunk end none."""
+    return np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
+
+
+def limb_ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
+    """Which of the joints (F, 12) are ends of limbs, and farther than LIMIT_EXACT_M from the truth or nearer."""
+    ends = np.array([name in _CARRIER for name in metrics.JOINTS])
+    return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
 
 
 def select_by(recording: Recording) -> Selection:
@@ -308,8 +321,9 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     class_, lost = metrics.tracking_class(errors, stamps, limit=limit)
     still = metrics.standing_still(reference, stamps)
     distances = np.concatenate([step.witness.distances for step in steps])
+    about_joints = np.concatenate([step.witness.about_joints for step in steps])
     measured = np.array([step.measured for step in steps])
-    far, near = (_ends(errors, far=which) for which in (True, False))
+    far, near = (limb_ends(errors, far=which) for which in (True, False))
     score = Score(
         name=recording.name,
         path=path,
@@ -328,6 +342,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         depth_within_5cm=metrics.share_within(distances, 0.05),
         depth_median_m=float(np.median(distances)) if distances.size else np.nan,
         depth_p95_m=float(np.percentile(distances, 95.0)) if distances.size else np.nan,
+        person_within_5cm=metrics.share_within(distances[about_joints], 0.05),
         silhouette_iou=metrics.mean_or_nan(overlaps),
         jitter_m=metrics.jitter(positions),
         reference_jitter_m=metrics.jitter(reference),
@@ -343,12 +358,6 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     )
     within = np.array([step.witness.within for step in steps])
     return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
-
-
-def _ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
-    """Which of the joints (F, 12) are ends of limbs, and farther than LIMIT_EXACT_M from the truth or nearer."""
-    ends = np.array([name in _CARRIER for name in metrics.JOINTS])
-    return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
 
 
 def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:

@@ -50,7 +50,7 @@ class Summary:
 
 _MEANS = (
     "error_m", "error_lag0_m", "error_best_lag_m", "within_5cm", "within_10cm", "depth_within_5cm", "depth_median_m",
-    "depth_p95_m", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
+    "depth_p95_m", "person_within_5cm", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
     "reference_standing_jitter_m", "degraded_share", "lost_share", "far_told", "near_doubted", "step_s",
 )  # fmt: skip
 
@@ -68,6 +68,7 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("depth_within_5cm", "depth within 5 cm of the model", lambda value: f"{100 * value:.1f} %"),
     ("depth_median_m", "depth to model, median", lambda value: f"{1000 * value:.1f} mm"),
     ("depth_p95_m", "depth to model, 95th percentile", lambda value: f"{1000 * value:.1f} mm"),
+    ("person_within_5cm", "within 5 cm, of depth about the known joints", lambda value: f"{100 * value:.1f} %"),
     ("silhouette_iou", "silhouette IoU", lambda value: f"{value:.3f}"),
     ("jitter_m", "second difference of the joints", lambda value: f"{1000 * value:.1f} mm"),
     ("reference_jitter_m", "... of the reference", lambda value: f"{1000 * value:.1f} mm"),

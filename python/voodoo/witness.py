@@ -52,10 +52,12 @@ WITHIN_M = 0.05
 
 @dataclass(frozen=True, eq=False)
 class FrameWitness:
-    """One frame: unsigned distances (N,) [m] of the person's points to the model, and the silhouettes' overlap (NaN
-    without a depth image or without a person in it)."""
+    """One frame: unsigned distances (N,) [m] of the person's points to the model, which of them (N,) lie within CAPSULES
+    about known joints (chair and floor mostly do not), and the silhouettes' overlap (NaN without a depth image or without a
+    person in it)."""
 
     distances: FloatArray
+    about_joints: BoolArray
     iou: float
 
     @property
@@ -77,10 +79,10 @@ def witness(
         recorded: the frame just tracked.
         tracker: gives the distance to its current model.
         estimate: of this frame.
-        truth: true joint positions [m] in the root frame; only used for the selection "truth".
+        truth: true joint positions [m] in the root frame, or those of a reference; only "truth" selects by them.
         selection: see the module.
     """
-    distances, overlaps = [np.empty(0)], [np.empty(0)]
+    distances, about, overlaps = [np.empty(0)], [np.empty(0, dtype=bool)], [np.empty(0)]
     for item in recorded.measurements:
         if isinstance(item, DepthImage):
             points, valid = depth_points(item)
@@ -93,9 +95,10 @@ def witness(
         person[valid] = _select(points[valid], tracker.body, estimate, truth, selection)
         if person.any():
             distances.append(np.abs(tracker.distance(points[person])).astype(np.float64))
+            about.append(near_joints(points[person], truth))
         if isinstance(item, DepthImage):
             overlaps.append(np.array([_overlap(item, person, tracker.body, estimate)]))
-    return FrameWitness(np.concatenate(distances), mean_or_nan(np.concatenate(overlaps)))
+    return FrameWitness(np.concatenate(distances), np.concatenate(about), mean_or_nan(np.concatenate(overlaps)))
 
 
 def depth_points(depth: DepthImage) -> tuple[FloatArray, BoolArray]:

@@ -27,7 +27,11 @@ impl Assignment {
         let Self { members, search, nearest, inside } = self;
         // One more for those in no limb's box.
         members.resize_with(poses.len() + 1, Vec::new);
-        members.iter_mut().for_each(Vec::clear);
+        for limb in members.iter_mut() {
+            limb.clear();
+            // Room at once, not when a limb comes to hold more than ever before.
+            limb.reserve(candidates.len());
+        }
         nearest.resize(candidates.len(), NONE);
         inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
         search.find(body, poses, box_margin, &candidates.clusters, nearest, inside);
@@ -70,6 +74,7 @@ impl Assignment {
         let members = &self.members[index];
         let kept = sampled_count(members.len(), config);
         matches.candidate.clear();
+        matches.reserve(config.max_limb_points.min(candidates.len()));
         if kept == members.len() {
             matches.candidate.extend_from_slice(members);
         } else {

@@ -89,7 +89,7 @@ pub struct Correspondences {
 
 impl LimbMatches {
     /// Makes room for `len` pairs in all.
-    fn reserve(&mut self, len: usize) {
+    pub(crate) fn reserve(&mut self, len: usize) {
         self.candidate.reserve(len.saturating_sub(self.candidate.len()));
         self.measured.reserve(len);
         self.given.reserve(len.saturating_sub(self.given.len()));

@@ -111,10 +111,10 @@ proptest! {
         let poses = random_pose(&body, &angles);
         let calves = ["l_calf", "r_calf"].map(|name| body.limb_index(name).unwrap());
         let feet: Vec<Foot> = calves.iter().zip(offsets.chunks(3)).map(|(limb, offset)| {
-            let foot = Foot { limb: *limb, place: Vec3::ZERO };
+            let foot = Foot { limb: *limb, place: Vec3::ZERO, sure: 0.6 };
             Foot { place: foot.at(&body, &poses) + Vec3::new(offset[0], offset[1], offset[2]), ..foot }
         }).collect();
-        check(&body, &poses, &|poses, normal| Stance { feet: &feet, sigma: 0.5, scale: 0.05 }.add(&body, poses, normal))?;
+        check(&body, &poses, &|poses, normal| Stance { feet: &feet, shown: &[0.7; 18], sigma: 0.5, scale: 0.05 }.add(&body, poses, normal))?;
     }
 
     #[test]

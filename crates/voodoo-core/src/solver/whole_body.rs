@@ -51,6 +51,8 @@ pub struct WholeBody {
     lengths: Lengths,
     guide: Guide,
     joint_sigmas: Vec<f64>,
+    /// How much of each limb shows, one at most.
+    shown: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
 }
@@ -120,12 +122,14 @@ impl WholeBody {
             }
         }
         self.joint_sigmas.clear();
+        self.shown.clear();
         for (limb, part) in body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = correspondences.limbs[limb].total_weight() + self.sites[limb];
-            let shown = (measured / SHOWN).clamp(HIDDEN_MOTION, 1.0);
-            self.joint_sigmas.push(motion * shown * problem.pace * config.motion_scale);
+            let shown = (measured / SHOWN).min(1.0);
+            self.shown.push(shown);
+            self.joint_sigmas.push(motion * shown.max(HIDDEN_MOTION) * problem.pace * config.motion_scale);
         }
         let root =
             [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
@@ -146,7 +150,11 @@ impl WholeBody {
             term.add(body, poses, &mut self.normal);
         }
         if config.stance {
-            Stance { feet: problem.feet, sigma: STANCE_SIGMA, scale: STANCE_SCALE }.add(body, poses, &mut self.normal);
+            Stance { feet: problem.feet, shown: &self.shown, sigma: STANCE_SIGMA, scale: STANCE_SCALE }.add(
+                body,
+                poses,
+                &mut self.normal,
+            );
         }
         if config.limits {
             Limits { sigma: LIMIT_SIGMA }.add(body, poses, &mut self.normal);

@@ -13,6 +13,8 @@ pub struct Foot {
     pub limb: usize,
     /// Where it stands, working frame.
     pub place: Vec3,
+    /// How sure it is that it stands there, 0 to 1.
+    pub sure: f64,
 }
 
 impl Foot {
@@ -27,6 +29,8 @@ impl Foot {
 pub struct Stance<'a> {
     /// The feet.
     pub feet: &'a [Foot],
+    /// How much of each limb shows, one at most: where a foot that nobody sees stands, nobody knows.
+    pub shown: &'a [f64],
     /// Standard deviation of a foot that stands, metres.
     pub sigma: f64,
     /// Scale of the kernel, metres.
@@ -35,8 +39,8 @@ pub struct Stance<'a> {
 
 impl Term for Stance<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
-        let information = 1.0 / (self.sigma * self.sigma);
         for foot in self.feet {
+            let information = foot.sure * self.shown[foot.limb] / (self.sigma * self.sigma);
             let x = foot.at(body, poses);
             let r = x - foot.place;
             let (rho, kernel) = geman_mcclure(r.length(), self.scale);
