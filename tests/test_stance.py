@@ -57,7 +57,7 @@ def test_feet_that_nobody_sees_go_along_with_the_body(body):
 
 def test_feet_that_walk_are_not_late(body):
     source = Walk(body=body, stops=(Stop(0.0, 3.0, -0.6, 1.57), Stop(1.2, 3.0, 0.6, 1.57)))
-    tracker, errors = voodoo.Tracker(body), []
+    tracker, errors = voodoo.Tracker(body, config=voodoo.Config(stance=True)), []
     for frame in source:
         if not errors:
             tracker.reset_pose(frame.world_from_limb)
