@@ -37,7 +37,7 @@ const SHOWN: f64 = 0.35;
 const RELIABLE: [f64; 2] = [0.14, 0.05];
 /// It is told to be measured when it is this for the whole limb, and for the upper one as well: one in twenty good ones is doubted
 /// so on the rendered recordings.
-const TOLD: f64 = 0.09;
+const TOLD: f64 = 0.1;
 /// The outer part of a limb shows when what speaks for it is this at least.
 const SHOWS: f64 = 0.01;
 /// Without a depth image, points on a limb that make it measured.
