@@ -1,5 +1,5 @@
-//! A foot that stands stays where it is: the prior holds joint angles, so that a body that bends its knees would push straight legs
-//! through the floor.
+//! A foot that stands stays where it is. The prior holds joint angles, and by itself would carry the feet along with a trunk that
+//! moves over them.
 
 use super::{Term, surface::geman_mcclure};
 use crate::body::Body;
