@@ -278,9 +278,6 @@ config! {
     limits: bool = true, "";
     /// Axes of limbs are pushed out of other limbs that they are not joined to (whole-body solvers).
     penetration: bool = true, "";
-    /// Hold feet that are seen to stand where they are, softly (whole-body solvers): steadier ankles of people who stand and walk,
-    /// where the world frame stands as well.
-    stance: bool = false, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
     /// After a reset that fits sizes, the frames that follow refine the limbs' lengths (whole-body solvers).

@@ -18,7 +18,6 @@ use crate::outline::Outline;
 use crate::predict::predict;
 use crate::recover::TwoBone;
 use crate::solver::{Gate, Problem, Solver, solver};
-use crate::terms::Foot;
 use crate::view::{Views, find_cut_out};
 
 /// Step of a frame from which the outline speaks: earlier, it would push thin limbs off their points (method section 8).
@@ -47,7 +46,6 @@ pub struct Tracker {
     previous: Vec<Pose>,
     interval: Option<f64>,
     predicted: Vec<Pose>,
-    feet: Vec<Foot>,
     origin: Vec3,
     backgrounds: Backgrounds,
     /// In which images of this frame the body was cut out.
@@ -93,7 +91,6 @@ impl Tracker {
             previous: Vec::new(),
             interval: None,
             predicted: Vec::new(),
-            feet: Vec::new(),
             origin: Vec3::ZERO,
             backgrounds: Backgrounds::default(),
             cut_out: Vec::new(),
@@ -165,7 +162,6 @@ impl Tracker {
         self.prepare_hypotheses();
         self.poses = world_from_limb;
         self.origin = Vec3::ZERO;
-        self.set_feet();
         self.prepare_search();
         self.stamp = None;
         self.interval = None;
@@ -245,7 +241,6 @@ impl Tracker {
             self.search(frame);
         }
         self.remember_ends();
-        self.follow_feet();
         self.admit_doubt();
         Ok(&self.estimate)
     }
@@ -256,9 +251,6 @@ impl Tracker {
         self.origin += shift;
         for pose in self.poses.iter_mut().chain(&mut self.previous) {
             *pose = shifted(pose, shift);
-        }
-        for foot in &mut self.feet {
-            foot.place -= shift;
         }
     }
 
@@ -314,9 +306,8 @@ impl Tracker {
             } else {
                 self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
             }
-            let Self { body, correspondences, previous, feet, config, solver, poses, .. } = self;
-            let problem = Problem { body, correspondences, predicted: previous, feet, step, pace, config };
-            if !solver.lead(&problem, poses) {
+            let Self { body, correspondences, previous, config, solver, poses, .. } = self;
+            if !solver.lead(&Problem { body, correspondences, predicted: previous, step, pace, config }, poses) {
                 break;
             }
             step += 1;
@@ -336,8 +327,8 @@ impl Tracker {
             self.correspondences.add_bands(&self.body, &self.poses, self.config.band_ratio, &mut self.measured);
         }
         // 7 Fit the model.
-        let Self { body, correspondences, predicted, feet, config, solver, poses, .. } = self;
-        solver.solve(&Problem { body, correspondences, predicted, feet, step, pace, config }, poses);
+        let Self { body, correspondences, predicted, config, solver, poses, .. } = self;
+        solver.solve(&Problem { body, correspondences, predicted, step, pace, config }, poses);
     }
 
     /// Sets the predicted poses, and the current ones to them where the solver wants it; the current ones become the previous.
@@ -395,7 +386,6 @@ impl Tracker {
 mod changes;
 mod distances;
 mod doubt;
-mod feet;
 mod hypotheses;
 mod named;
 mod places;

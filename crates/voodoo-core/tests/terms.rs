@@ -9,7 +9,7 @@ use voodoo_core::chain::exp;
 use voodoo_core::correspondence::{Correspondences, EdgePair, LimbMatches, SitePair};
 use voodoo_core::geometry::{Mat3, Pose, Vec3};
 use voodoo_core::normal::Normal;
-use voodoo_core::terms::{Foot, Limits, Outline, Penetration, Prior, Sites, Stance, Surface, Term};
+use voodoo_core::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Compares the analytic gradient with central differences of the cost; `evaluate` fills the system at given poses.
 fn check(body: &Body, poses: &[Pose], evaluate: &dyn Fn(&[Pose], &mut Normal)) -> Result<(), TestCaseError> {
@@ -103,18 +103,6 @@ proptest! {
             let correspondences = Correspondences { sites: pairs, ..Default::default() };
             Sites { correspondences: &correspondences, information: 1.0, scale: 0.5, biased: true }.add(&body, poses, normal);
         })?;
-    }
-
-    #[test]
-    fn stance(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 6)) {
-        let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let poses = random_pose(&body, &angles);
-        let calves = ["l_calf", "r_calf"].map(|name| body.limb_index(name).unwrap());
-        let feet: Vec<Foot> = calves.iter().zip(offsets.chunks(3)).map(|(limb, offset)| {
-            let foot = Foot { limb: *limb, place: Vec3::ZERO, sure: 0.6 };
-            Foot { place: foot.at(&body, &poses) + Vec3::new(offset[0], offset[1], offset[2]), ..foot }
-        }).collect();
-        check(&body, &poses, &|poses, normal| Stance { feet: &feet, shown: &[0.7; 18], sigma: 0.5, scale: 0.05 }.add(&body, poses, normal))?;
     }
 
     #[test]

@@ -19,7 +19,6 @@ use crate::body::{Body, Pair};
 use crate::config::{Config, SolverKind};
 use crate::correspondence::Correspondences;
 use crate::geometry::Pose;
-use crate::terms::Foot;
 
 /// What a solver works on: one ICP step of one frame.
 #[derive(Debug)]
@@ -30,8 +29,6 @@ pub struct Problem<'a> {
     pub correspondences: &'a Correspondences,
     /// The poses expected before the frame was seen.
     pub predicted: &'a [Pose],
-    /// Where the feet stand, working frame.
-    pub feet: &'a [Foot],
     /// Index of the step in its frame.
     pub step: usize,
     /// Seconds since the last frame, as multiples of 1/30 s; the standard deviations of motion grow with it.

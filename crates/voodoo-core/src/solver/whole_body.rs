@@ -6,15 +6,12 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::normal::Normal;
-use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Stance, Surface, Term};
+use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
 
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
 /// Standard deviation of an axis that lies in another limb, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
-/// Standard deviation of a foot that stands, and how far from its place one may still be held there, metres.
-const STANCE_SIGMA: f64 = 0.01;
-const STANCE_SCALE: f64 = 0.03;
 /// Factor from step to step.
 const NARROWING: f64 = 0.7;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
@@ -51,8 +48,6 @@ pub struct WholeBody {
     lengths: Lengths,
     guide: Guide,
     joint_sigmas: Vec<f64>,
-    /// How much of each limb shows, one at most.
-    shown: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
 }
@@ -122,14 +117,12 @@ impl WholeBody {
             }
         }
         self.joint_sigmas.clear();
-        self.shown.clear();
         for (limb, part) in body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = correspondences.limbs[limb].total_weight() + self.sites[limb];
-            let shown = (measured / SHOWN).min(1.0);
-            self.shown.push(shown);
-            self.joint_sigmas.push(motion * shown.max(HIDDEN_MOTION) * problem.pace * config.motion_scale);
+            let shown = (measured / SHOWN).clamp(HIDDEN_MOTION, 1.0);
+            self.joint_sigmas.push(motion * shown * problem.pace * config.motion_scale);
         }
         let root =
             [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
@@ -148,13 +141,6 @@ impl WholeBody {
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);
-        }
-        if config.stance {
-            Stance { feet: problem.feet, shown: &self.shown, sigma: STANCE_SIGMA, scale: STANCE_SCALE }.add(
-                body,
-                poses,
-                &mut self.normal,
-            );
         }
         if config.limits {
             Limits { sigma: LIMIT_SIGMA }.add(body, poses, &mut self.normal);

@@ -5,7 +5,6 @@ mod outline;
 mod penetration;
 mod prior;
 mod sites;
-mod stance;
 mod surface;
 
 pub use limits::Limits;
@@ -14,7 +13,6 @@ pub use penetration::Penetration;
 pub use prior::Prior;
 pub(crate) use prior::ShortestAxis;
 pub use sites::Sites;
-pub use stance::{Foot, Stance};
 pub use surface::Surface;
 
 use crate::body::Body;

@@ -70,7 +70,6 @@ impl Tracker {
                 self.poses[index].translation = centre - self.poses[index].rotation * joint.limb_from_joint.translation;
             }
         }
-        self.set_feet();
         self.girths.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();

@@ -76,12 +76,11 @@ impl Tracker {
 
     /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
     pub(super) fn refine_lengths(&mut self, pace: f64) {
-        let Self { body, correspondences, predicted, feet, config, solver, poses, pairs, stretched, change, .. } = self;
+        let Self { body, correspondences, predicted, config, solver, poses, pairs, stretched, change, .. } = self;
         change.clear();
         change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
         let step = config.max_steps;
-        let problem = Problem { body, correspondences, predicted, feet, step, pace, config };
-        if !solver.lengths(&problem, poses, pairs, change) {
+        if !solver.lengths(&Problem { body, correspondences, predicted, step, pace, config }, poses, pairs, change) {
             return;
         }
         for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
