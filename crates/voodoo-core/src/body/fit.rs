@@ -16,6 +16,8 @@ const STEADY: f64 = 2.5;
 const RIGID: f64 = 1.0;
 /// Nobody's limb is shorter than its pair by more than this share: it was foreshortened, and is as long as its pair.
 const UNLIKE: f64 = 0.75;
+/// Limbs whose axes are no farther apart than 30 degrees (cosine) are in line: where their joint is along it is hard to see.
+const STRAIGHT: f64 = 0.866;
 /// Weight and lever (metres) of the prior orientation against landmarks of weight one.
 const PRIOR_WEIGHT: f64 = 0.01;
 const PRIOR_LEVER: f64 = 0.1;
@@ -67,7 +69,7 @@ impl Body {
             }
         }
         if fit_sizes {
-            body.even_out();
+            body.even_out(&poses);
         }
         // The last limbs may have stretched after their parents were placed; every joint is closed once more.
         body.close_joints(&mut poses);
@@ -257,14 +259,31 @@ impl Body {
         });
     }
 
-    fn even_out(&mut self) {
-        for pair in self.pairs() {
-            let length = |limb: &usize| self.limbs[*limb].shape.length();
-            let longest = pair.iter().map(length).fold(0.0, f64::max);
-            let factors: Vec<f64> = pair.iter().map(|limb| longest / length(limb)).collect();
-            for (limb, factor) in pair.iter().zip(factors).filter(|(_, factor)| factor * UNLIKE > 1.0) {
-                self.change_length(*limb, factor);
+    /// A limb far shorter than its pair becomes as long. If it is in line with the limb that it hangs on or carries, and that
+    /// one is longer than its own pair, their joint was set along the line: both together keep their length, in the proportion
+    /// of the other side.
+    fn even_out(&mut self, poses: &[Pose]) {
+        let pairs = self.pairs();
+        let length = |limb: usize| self.limbs[limb].shape.length();
+        let pair = |limb: usize| pairs.iter().find(|pair| pair.len() == 2 && pair.contains(&limb));
+        let twin = |limb: usize| pair(limb).and_then(|pair| pair.iter().copied().find(|one| *one != limb));
+        let mut factors = Vec::new();
+        for limb in 0..self.limbs.len() {
+            let Some(other) = twin(limb).filter(|other| length(*other) * UNLIKE > length(limb)) else { continue };
+            let parent = self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
+            let next = parent.into_iter().chain(self.children(limb)).find_map(|next| Some((next, twin(next)?)));
+            let straight = |next: usize| (poses[limb].rotation * Vec3::Z).dot(poses[next].rotation * Vec3::Z) > STRAIGHT;
+            match next.filter(|(next, beside)| straight(*next) && length(*next) > length(*beside)) {
+                Some((next, beside)) => {
+                    let share = (length(limb) + length(next)) / (length(other) + length(beside));
+                    factors.push((limb, share * length(other) / length(limb)));
+                    factors.push((next, share * length(beside) / length(next)));
+                }
+                None => factors.push((limb, length(other) / length(limb))),
             }
+        }
+        for (limb, factor) in factors {
+            self.change_length(limb, factor);
         }
     }
 
