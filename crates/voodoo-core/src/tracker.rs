@@ -38,8 +38,8 @@ pub struct Tracker {
     threads: Option<rayon::ThreadPool>,
     stamp: Option<f64>,
     started: bool,
-    /// The next frame shall fit the girths.
-    girths_open: bool,
+    /// The next frame shall fit the sizes.
+    sizes_open: bool,
     /// Current poses in the working frame, whose origin lies at `origin` in the world.
     poses: Vec<Pose>,
     /// The poses of the frame before and the stamp difference that led to the current ones; none after a reset.
@@ -86,7 +86,7 @@ impl Tracker {
             threads,
             stamp: None,
             started: false,
-            girths_open: false,
+            sizes_open: false,
             poses: Vec::new(),
             previous: Vec::new(),
             interval: None,
@@ -136,7 +136,7 @@ impl Tracker {
         let start = if fit_sizes { &self.given } else { &self.body };
         let (body, poses) = start.fit(positions, fit_sizes)?;
         self.restart(body, poses);
-        self.girths_open = fit_sizes && self.config.fit_girths;
+        self.sizes_open = fit_sizes;
         if fit_sizes && self.config.fit_lengths {
             self.follow_lengths();
         }
@@ -167,7 +167,7 @@ impl Tracker {
         self.interval = None;
         self.previous.clear();
         self.started = true;
-        self.girths_open = false;
+        self.sizes_open = false;
         self.girths.clear();
         self.pairs.clear();
         self.correspondences.limbs.clear();
@@ -198,8 +198,8 @@ impl Tracker {
             self.learn_background(frame, &bounds);
         }
         self.candidates.gather(frame, self.origin, &bounds, &self.backgrounds, &self.config);
-        if std::mem::take(&mut self.girths_open) {
-            self.fit_girths(frame);
+        if std::mem::take(&mut self.sizes_open) {
+            self.fit_sizes(frame);
         }
         self.lead(frame, pace);
         let mut steps = 0;

@@ -132,6 +132,35 @@ proptest! {
     }
 
     #[test]
+    fn a_knee_set_too_low_on_a_straight_leg_is_moved_along_it(low in 0.27..0.5_f64, bend in 0.6..1.5_f64) {
+        let truth = Body::human(1.7, HumanModel::Full).unwrap();
+        let measured = sites(&truth, &truth.rest_pose(Pose::identity()));
+        let site = |name: &str| truth.site_index(name).unwrap();
+        let (hip, knee, ankle) = (site("l_hip"), site("l_knee"), site("l_ankle"));
+        let fitted = |low: f64, bend: f64| {
+            let mut named: Vec<(usize, Vec3)> = measured.iter().copied().enumerate().collect();
+            named[knee].1 = named[knee].1.lerp(named[ankle].1, low);
+            named[ankle].1 = named[knee].1 + Quat::from_axis_angle(Vec3::Y, bend) * (named[ankle].1 - named[knee].1);
+            named.retain(|(site, _)| !truth.sites()[*site].name.ends_with("toe"));
+            let total: f64 = [[hip, knee], [knee, ankle]]
+                .map(|ends| ends.map(|end| named.iter().find(|(site, _)| *site == end).unwrap().1))
+                .map(|[from, to]| (to - from).length())
+                .iter()
+                .sum();
+            let (body, _) = truth.fit(&named, true).unwrap();
+            let length = |name: &str| body.limbs()[body.limb_index(name).unwrap()].shape.length();
+            let right = length("r_thigh") + length("r_calf");
+            (length("l_thigh") / length("r_thigh"), length("l_calf") / length("r_calf"), total / right)
+        };
+        // Straight: both are as long together as they were set, in the right leg's proportion.
+        let (thigh, calf, total) = fitted(low, 0.0);
+        prop_assert!((thigh - calf).abs() < 1e-6 && (thigh - total).abs() < 0.02, "{thigh} {calf} {total}");
+        // Bent, the knee shows where it is, and the calf was foreshortened.
+        let (thigh, calf, _) = fitted(low.min(0.3), bend);
+        prop_assert!(thigh > 1.1 && (calf - 1.0).abs() < 1e-6, "{thigh} {calf}");
+    }
+
+    #[test]
     fn a_single_ray_draws_its_site_onto_itself(offset in [-0.06..0.06_f64, -0.06..0.06, -0.06..0.06], from: u64) {
         let poses = scene::standing(&human());
         let site = human().site_index("l_wrist").unwrap();

@@ -100,3 +100,45 @@ fn sizes_of_a_second_reset_start_from_the_body_as_given() {
     tracker.reset(&positions, false).unwrap();
     assert_eq!(*tracker.body(), fitted);
 }
+
+/// Lengths of the left thigh and calf over those of the right ones after the first frame of a person whose left leg has
+/// `real` times its length, set with `set` times it.
+fn left_over_right(real: f64, set: f64, config: Config) -> [f64; 2] {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let mut person = body.clone();
+    for name in ["l_thigh", "l_calf"] {
+        let s = body.limbs()[body.limb_index(name).unwrap()].shape;
+        let shape = voodoo_core::TaperedEllipticCylinder::new(real * s.length(), s.a0(), s.b0(), s.a1(), s.b1());
+        person = person.with_shape(name, shape.unwrap()).unwrap();
+    }
+    let poses = scene::standing(&person);
+    let mut positions: Vec<(usize, Vec3)> =
+        (0..person.sites().len()).map(|site| (site, person.site_position(&poses, site))).collect();
+    let hip = positions[person.site_index("l_hip").unwrap()].1;
+    for name in ["l_knee", "l_ankle"] {
+        let site = person.site_index(name).unwrap();
+        positions[site].1 = hip + (positions[site].1 - hip) * (set / real);
+    }
+    positions.retain(|(site, _)| !person.sites()[*site].name.ends_with("toe"));
+    let (pixels, _) = CAMERA.shoot(&person, &poses, 0.005, &mut scene::Noise(7));
+    let images = [CAMERA.image(&pixels)];
+    let mut tracker = Tracker::new(body, config).unwrap();
+    tracker.reset(&positions, true).unwrap();
+    tracker.step(&Frame { images: &images, ..Frame::empty(0.0) }).unwrap();
+    let body = tracker.body();
+    let length = |name: &str| body.limbs()[body.limb_index(name).unwrap()].shape.length();
+    [length("l_thigh") / length("r_thigh"), length("l_calf") / length("r_calf")]
+}
+
+#[test]
+fn a_leg_set_too_long_or_too_short_takes_the_lengths_of_the_other() {
+    for set in [1.25, 0.78] {
+        let ratios = left_over_right(1.0, set, Config::default());
+        assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.02), "set {set}: {ratios:?}");
+        let without = left_over_right(1.0, set, Config { fit_lengths: false, ..Config::default() });
+        assert!(without.iter().all(|ratio| (ratio / set - 1.0).abs() < 0.02), "set {set}: {without:?}");
+    }
+    // Someone whose legs differ so much keeps them.
+    let ratios = left_over_right(0.8, 0.8, Config::default());
+    assert!(ratios.iter().all(|ratio| (ratio - 0.8).abs() < 0.04), "{ratios:?}");
+}

@@ -69,7 +69,7 @@ impl Body {
             }
         }
         if fit_sizes {
-            body.even_out(&poses);
+            body.even_out(self, &poses);
         }
         // The last limbs may have stretched after their parents were placed; every joint is closed once more.
         body.close_joints(&mut poses);
@@ -259,25 +259,40 @@ impl Body {
         });
     }
 
-    /// A limb far shorter than its pair becomes as long. If it is in line with the limb that it hangs on or carries, and that
-    /// one is longer than its own pair, their joint was set along the line: both together keep their length, in the proportion
-    /// of the other side.
-    fn even_out(&mut self, poses: &[Pose]) {
+    /// A limb far shorter than its pair becomes as long. If the limb that it hangs on or carries is longer than its own pair
+    /// instead, a joint was set along the line of both: on the side that is less like `given`, if it is straight, they keep
+    /// their length together, in the proportion of the other side.
+    fn even_out(&mut self, given: &Self, poses: &[Pose]) {
         let pairs = self.pairs();
         let length = |limb: usize| self.limbs[limb].shape.length();
-        let pair = |limb: usize| pairs.iter().find(|pair| pair.len() == 2 && pair.contains(&limb));
-        let twin = |limb: usize| pair(limb).and_then(|pair| pair.iter().copied().find(|one| *one != limb));
-        let mut factors = Vec::new();
+        let twin = |limb: usize| {
+            let pair = pairs.iter().find(|pair| pair.len() == 2 && pair.contains(&limb));
+            pair.and_then(|pair| pair.iter().copied().find(|one| *one != limb))
+        };
+        let sum = |bones: [usize; 2]| bones.map(length).iter().sum::<f64>();
+        let unlike = |bones: [usize; 2]| {
+            let [first, second] = bones.map(|limb| (length(limb) / given.limbs[limb].shape.length()).ln());
+            (first - second).abs()
+        };
+        let straight = |bones: [usize; 2]| {
+            let [first, second] = bones.map(|limb| poses[limb].rotation * Vec3::Z);
+            first.dot(second) > STRAIGHT
+        };
+        let mut factors: Vec<(usize, f64)> = Vec::new();
         for limb in 0..self.limbs.len() {
             let Some(other) = twin(limb).filter(|other| length(*other) * UNLIKE > length(limb)) else { continue };
             let parent = self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
             let next = parent.into_iter().chain(self.children(limb)).find_map(|next| Some((next, twin(next)?)));
-            let straight = |next: usize| (poses[limb].rotation * Vec3::Z).dot(poses[next].rotation * Vec3::Z) > STRAIGHT;
-            match next.filter(|(next, beside)| straight(*next) && length(*next) > length(*beside)) {
-                Some((next, beside)) => {
-                    let share = (length(limb) + length(next)) / (length(other) + length(beside));
-                    factors.push((limb, share * length(other) / length(limb)));
-                    factors.push((next, share * length(beside) / length(next)));
+            let sides = next.filter(|(next, beside)| length(*next) > length(*beside)).map(|(next, beside)| {
+                let (own, opposite) = ([limb, next], [other, beside]);
+                if unlike(own) < unlike(opposite) { (opposite, own) } else { (own, opposite) }
+            });
+            match sides.filter(|(wrong, _)| straight(*wrong)) {
+                // Both limbs of a side may find this out.
+                Some((wrong, _)) if factors.iter().any(|(limb, _)| wrong.contains(limb)) => {}
+                Some((wrong, right)) => {
+                    let share = sum(wrong) / sum(right);
+                    factors.extend(wrong.into_iter().zip(right).map(|(a, b)| (a, share * length(b) / length(a))));
                 }
                 None => factors.push((limb, length(other) / length(limb))),
             }

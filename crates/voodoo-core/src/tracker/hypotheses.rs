@@ -31,7 +31,7 @@ const PATIENCE: usize = 2;
 const LONG_PATIENCE: usize = 4;
 /// A hypothesis must cost so many patches less than the current pose, and so many of them by what cameras see: to come out of
 /// hiding, or out of another limb, is no reason to jump.
-const GAIN: f64 = 25.0;
+pub(super) const GAIN: f64 = 25.0;
 const SEEN_GAIN: f64 = 10.0;
 /// ICP steps that refine the best hypothesis.
 const REFINE: usize = 8;

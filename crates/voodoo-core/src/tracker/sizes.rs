@@ -1,31 +1,79 @@
 //! Sizes of the body: girths from the first frame, lengths from those that follow.
 
 use super::Tracker;
+use super::hypotheses::GAIN;
 use crate::calibrate::{Girth, GirthFit, girth_step};
 use crate::frame::Frame;
 use crate::geometry::Vec3;
 use crate::outline::edges;
+use crate::recover::TwoBone;
 use crate::solver::{Gate, Problem};
 use crate::view::Views;
 
 /// Gauss-Newton steps of the girth fit.
 const GIRTH_STEPS: usize = 6;
-/// Points farther than this from the set pose say nothing about girths, metres.
-const GIRTH_GATE: f64 = 0.10;
+/// Points farther than this from the set pose say nothing about sizes, metres.
+const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
 /// A limb becomes longer or shorter by at most this share in one frame.
 const LENGTH_STEP: f64 = 0.02;
+/// Nobody's arm is so much shorter than the other one, nor a leg: one of them was set wrong.
+const UNLIKE_REACH: f64 = 0.88;
 
 impl Tracker {
-    /// Fits the girths to the first frame after a reset, whose pose is known.
-    pub(super) fn fit_girths(&mut self, frame: &Frame) {
+    /// Fits the sizes to the first frame after a reset, whose pose is known.
+    pub(super) fn fit_sizes(&mut self, frame: &Frame) {
+        if self.config.fit_lengths {
+            self.even_reaches(frame);
+        }
+        if self.config.fit_girths {
+            self.fit_girths(frame);
+        }
+    }
+
+    /// Where one arm or leg of the start is much longer than the other, gives one the lengths of the other if that explains the
+    /// first frame clearly better: a skeleton whose foot is under the floor, or ends at the shin.
+    fn even_reaches(&mut self, frame: &Frame) {
+        for pair in self.body.pairs() {
+            let bones = |limb: &usize| self.chains.iter().find(|c| c.upper == *limb).map(|c| [c.upper, c.lower]);
+            let [one, other] = pair.iter().filter_map(bones).collect::<Vec<_>>()[..] else { continue };
+            let given = (self.body.clone(), self.poses.clone());
+            let length = |limb: usize| given.0.limbs()[limb].shape.length();
+            let ratio = one.map(length).iter().sum::<f64>() / other.map(length).iter().sum::<f64>();
+            if ratio.min(1.0 / ratio) > UNLIKE_REACH {
+                continue;
+            }
+            let (mut least, mut best) = (self.cost_of_start(frame) - GAIN, given.clone());
+            for (from, to) in [(one, other), (other, one)] {
+                (self.body, self.poses) = given.clone();
+                for (from, to) in from.into_iter().zip(to) {
+                    self.body.change_length(to, length(from) / length(to));
+                }
+                self.body.close_joints(&mut self.poses);
+                let cost = self.cost_of_start(frame);
+                if cost < least {
+                    (least, best) = (cost, (self.body.clone(), self.poses.clone()));
+                }
+            }
+            (self.body, self.poses) = best;
+            self.chains = TwoBone::of(&self.body);
+        }
+    }
+
+    /// What the first frame has against the pose that was set, in unexplained patches.
+    fn cost_of_start(&mut self, frame: &Frame) -> f64 {
+        self.assign(&START_GATE);
+        self.match_points(&START_GATE, true, false);
+        self.overall_cost(frame).evidence
+    }
+
+    fn fit_girths(&mut self, frame: &Frame) {
         self.girths = vec![Girth::default(); self.poses.len()];
         let mut totals = vec![GirthFit::default(); self.poses.len()];
-        let gate = Gate { box_margin: GIRTH_GATE, distance: GIRTH_GATE };
         let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
             // The pose is known: what is closest is what was seen.
-            self.assign(&gate);
-            self.match_points(&gate, true, false);
+            self.assign(&START_GATE);
+            self.match_points(&START_GATE, true, false);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = self.body.limbs()[limb].shape;
                 let matches = &self.correspondences.limbs[limb];
