@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -51,8 +52,24 @@ class Trial:
         return 1.0 + SCALE * float(np.median(np.abs(self.offsets[camera])))
 
     def best(self, count: int) -> tuple[str, ...]:
-        """So many cameras: those that agree best with the known sites, which is known before anything is estimated."""
-        return tuple(sorted(sorted(self.apart, key=lambda name: self.apart[name])[:count]))
+        """So many cameras, chosen before anything is estimated: one is that which agrees best with the known sites. Several
+        are those by which a point amid these sites is known best, if each is off by as much as it is there: cameras that agree
+        and look from directions that complement each other."""
+        if count == 1:
+            return (min(self.apart, key=lambda name: self.apart[name]),)
+        return min(combinations(self.views, count), key=self._uncertainty)
+
+    def _uncertainty(self, cameras: Sequence[str]) -> float:
+        """Standard deviation [m] of a point amid the known sites, from pixels off by `apart` along both axes."""
+        middle = np.mean([places for name, places in self.truth.items() if name not in LIMBS], axis=(0, 1))
+        information = np.zeros((3, 3))
+        for name in cameras:
+            view = self.keypoints.views[name]
+            way = middle - view.root_from_sensor[:3, 3]
+            distance = float(np.linalg.norm(way))
+            sigma = self.apart[name] * distance / view.camera.fx
+            information += (np.eye(3) - np.outer(way, way) / distance**2) / sigma**2
+        return float(np.sqrt(np.trace(np.linalg.inv(information))))
 
     @property
     def agreeing(self) -> tuple[str, ...]:
