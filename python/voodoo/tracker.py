@@ -52,7 +52,9 @@ class Tracker:
         Args:
             joints: site name -> (x, y, z) [m] in the world frame. Any subset that fixes the pose: at least three
                 positions that do not lie on a line. Limbs the positions do not reach keep their rest orientation.
-            fit_sizes: also scale the body and stretch its limbs to the distances between the positions.
+            fit_sizes: also scale the body and stretch its limbs to the distances between the positions. What no body can be
+                is corrected: a limb far shorter than its pair, a knee or elbow far along a straight leg or arm, and with
+                the first depth image one arm or leg much longer than the other.
 
         Raises:
             BodyError: an unknown name, or an entry that is not three finite numbers.
