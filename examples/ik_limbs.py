@@ -34,26 +34,53 @@ def rotation(local: np.ndarray, world: np.ndarray) -> np.ndarray:
     return vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
 
 
+class Bodies:
+    """The ten-limb body sized by the first frame of `steady`, its arms and legs as chains on the trunk, and where the trunk is.
+
+    Args:
+        truth: site -> positions (F, 3) [m].
+        height: stature [m].
+    """
+
+    def __init__(self, truth: Truth, height: float) -> None:
+        tracker = voodoo.Tracker(voodoo.Body.human(height=height, model="papers"))
+        for sites, fit_sizes in ((steady(truth), True), (truth, False)):
+            estimate = tracker.reset(joints={name: places[0] for name, places in sites.items()}, fit_sizes=fit_sizes)
+        torso = estimate.world_from_limb["torso"]
+        self._truth = truth
+        self._local = {name: (np.linalg.inv(torso) @ [*places[0], 1.0])[:3] for name, places in truth.items()}
+        self._trunk = [name for name in TRUNK if name in truth]
+        self.chains = {joint: ik.Chain(tracker.body, limbs=limbs) for joint, (limbs, _, _) in LIMBS.items()}
+        self.starts = {
+            joint: chain.project(estimate.world_from_limb, world_from_base=torso, closest=False)
+            for joint, chain in self.chains.items()
+        }
+
+    def base(self, frame: int, joint: str) -> np.ndarray:
+        """Pose (4, 4) of the trunk by its known sites, with the first joint of this arm or leg where it is known to be."""
+        first = LIMBS[joint][1]
+        base = np.eye(4)
+        base[:3, :3] = rotation(
+            np.stack([self._local[name] for name in self._trunk]),
+            np.stack([self._truth[name][frame] for name in self._trunk]),
+        )
+        base[:3, 3] = self._truth[first][frame] - base[:3, :3] @ self._local[first]
+        return base
+
+
 def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **options: Any) -> dict[str, np.ndarray]:
     """Positions (F, 3) of elbows and knees, each a chain of two limbs on the trunk that ends at its known joint.
 
     Args:
-        truth: site -> positions (F, 3) [m]; the ten-limb body is sized by the first frame of `steady`.
+        truth: site -> positions (F, 3) [m].
         height: stature [m].
         silhouettes: None: plain inverse kinematics.
         **options: of ik.Follower; `rest` may be a function of the chain and its first angles.
     """
-    tracker = voodoo.Tracker(voodoo.Body.human(height=height, model="papers"))
-    for sites, fit_sizes in ((steady(truth), True), (truth, False)):
-        estimate = tracker.reset(joints={name: places[0] for name, places in sites.items()}, fit_sizes=fit_sizes)
-    torso = estimate.world_from_limb["torso"]
-    local = {name: (np.linalg.inv(torso) @ [*places[0], 1.0])[:3] for name, places in truth.items()}
-    trunk = [name for name in TRUNK if name in truth]
+    bodies = Bodies(truth, height)
     followers = {}
-    for joint, (limbs, _, _) in LIMBS.items():
-        chain = ik.Chain(tracker.body, limbs=limbs)
-        start = chain.project(estimate.world_from_limb, world_from_base=torso, closest=False)
-        rest = options.get("rest")
+    for joint, chain in bodies.chains.items():
+        start, rest = bodies.starts[joint], options.get("rest")
         chosen = {**options, "rest": rest(chain, start) if callable(rest) else rest}
         followers[joint] = ik.Follower(chain, start=start, **chosen)
     last = {joint: truth[joint][0] for joint in LIMBS}
@@ -61,17 +88,12 @@ def follow(truth: Truth, height: float, silhouettes: Silhouettes | None, **optio
     postures: dict[str, ik.Posture] = {}
     for frame in range(len(truth["l_hip"])):
         images = [] if silhouettes is None else silhouettes(frame, last)
-        base = np.eye(4)
-        base[:3, :3] = rotation(
-            np.stack([local[name] for name in trunk]), np.stack([truth[name][frame] for name in trunk])
-        )
-        for joint, (_, first, end) in LIMBS.items():
-            base[:3, 3] = truth[first][frame] - base[:3, :3] @ local[first]
+        for joint, (_, _, end) in LIMBS.items():
             other = postures.get(OTHER[joint])
             posture = followers[joint].step(
                 {end: truth[end][frame]},
                 images=images,
-                world_from_base=base,
+                world_from_base=bodies.base(frame, joint),
                 others=None if other is None else other.world_from_limb,
             )
             postures[joint] = posture

@@ -8,6 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))
 import ik_limbs
+import ik_open
 import ik_pose2sim
 import ik_tables
 
@@ -57,6 +58,26 @@ def test_depths_tell_of_arms_before_the_trunk(voodoo_data):
     sequence = ik_tables.rendered(voodoo_data / "rendered" / "dev_07_sword_cmu")
     outline, deep = (means(sequence.solve(1, deep=deep), sequence.truth) for deep in (False, True))
     assert deep[0] < 0.5 * outline[0] and deep[1] < outline[1] + 0.001
+
+
+def test_one_view_leaves_open_what_it_cannot_see(voodoo_data, monkeypatch):
+    monkeypatch.setattr(ik_open, "EVERY", 8)
+
+    def left(name: str, views: int) -> np.ndarray:
+        found = ik_open.left_open(ik_tables.rendered(voodoo_data / "rendered" / name), views)
+        return np.mean([values.mean(axis=0) for values in found.values()], axis=0)
+
+    # A boxer before the camera: his legs are one shape, and his arms lie before the trunk. A walk hides little.
+    assert (left("dev_03_punch", 1) > 2.5 * left("dev_03_punch", 2)).all()
+    assert (left("dev_05_walk", 1) < 1.2 * left("dev_05_walk", 2)).all()
+
+
+def test_the_best_guess_among_turns():
+    places = np.array([[float(x), 0.0, 0.0] for x in (0, 1, 2, 9, 9, 9, 9, 1)])
+    content = np.array([True, True, False, True, False, False, False, True])
+    every, around = ik_open.scatter(places, content)
+    # 0, 1, 9 and 1: from 1 it is 1, 0, 8 and 0. Around the first: 0, 1 and, the circle being closed, the last.
+    assert every == pytest.approx(9 / 4) and around == pytest.approx(1 / 3)
 
 
 def test_four_real_cameras(voodoo_data):
