@@ -3,7 +3,8 @@
     python examples/ik_open.py DATA/rendered
 
 Every second frame by itself: arms and legs at the truth, then turned about the line between their known ends in steps of 5
-degrees. Where the image criterion is no more than 0.1 px above that of the truth, nothing in the pictures speaks against a turn.
+degrees. Where the image criterion is no more than 0.1 px above that of the truth, and no joint limit is broken, nothing speaks
+against a turn.
 The number is the mean distance of these places from the one that is nearest to all of them, the best guess: of all, and of those
 that hang together with the truth, which is what is left to someone who knows where the joint was before.
 """
@@ -22,6 +23,7 @@ from ik_tables import Rendered, rendered
 from voodoo import ik
 
 CONTENT_PX = 0.1
+REACHED_M = 0.005
 TURNS = np.radians(np.arange(0.0, 360.0, 5.0))
 EVERY = 2
 STEPS = 60
@@ -32,7 +34,7 @@ def left_open(sequence: Rendered, views: int) -> dict[str, np.ndarray]:
     truth = sequence.truth
     bodies = Bodies(truth, sequence.height)
     found: dict[str, list[tuple[float, float]]] = {joint: [] for joint in LIMBS}
-    angles = bodies.starts
+    angles = dict(bodies.starts)
     for frame in range(0, len(sequence.depths), EVERY):
         true = {joint: truth[joint][frame] for joint in LIMBS}
         images = [sequence.front(frame, true), sequence.side[frame]][:views]
@@ -50,7 +52,11 @@ def left_open(sequence: Rendered, views: int) -> dict[str, np.ndarray]:
             costs, places = [], []
             for world_from_limb, place in turned(chain, postures[joint], joint, base):
                 turn = chain.project(world_from_limb, world_from_base=base, closest=False)
-                costs.append(chain.criterion(turn, images, world_from_base=base, others=others)[0])
+                # Angles are moved into their limits, and the joint with them.
+                reached = chain.forward(turn, world_from_base=base)[1][joint]
+                allowed = np.linalg.norm(reached - place) < REACHED_M
+                cost = chain.criterion(turn, images, world_from_base=base, others=others)[0]
+                costs.append(cost if allowed else np.inf)
                 places.append(place)
             found[joint].append(scatter(np.array(places), np.array(costs) <= costs[0] + CONTENT_PX))
     return {joint: np.array(values) for joint, values in found.items()}

@@ -68,7 +68,7 @@ def test_one_view_leaves_open_what_it_cannot_see(voodoo_data, monkeypatch):
         return np.mean([values.mean(axis=0) for values in found.values()], axis=0)
 
     # A boxer before the camera: his legs are one shape, and his arms lie before the trunk. A walk hides little.
-    assert (left("dev_03_punch", 1) > 2.5 * left("dev_03_punch", 2)).all()
+    assert (left("dev_03_punch", 1) > 2.0 * left("dev_03_punch", 2)).all()
     assert (left("dev_05_walk", 1) < 1.2 * left("dev_05_walk", 2)).all()
 
 

@@ -1,4 +1,4 @@
-//! Sizes of the body: girths from the first frame, lengths from those that follow.
+//! Sizes of the body: what the first frame corrects and fits, and what those that follow refine.
 
 use super::Tracker;
 use super::hypotheses::GAIN;
