@@ -12,7 +12,7 @@ that hang together with the truth, which is what is left to someone who knows wh
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -98,10 +98,10 @@ def words(found: dict[str, np.ndarray], part: str) -> str:
     return " / ".join(f"{1e3 * value:.1f}" for value in some)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("rendered", type=Path)
-    folder = parser.parse_args(arguments).rendered
+    folder = parser.parse_args().rendered
     parts = ("elbow", "knee", "both")
     print(
         "| left open [mm], all turns / around the truth | " + " | ".join(f"one: {p} | two: {p}" for p in parts) + " |"

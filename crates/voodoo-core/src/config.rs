@@ -280,8 +280,8 @@ config! {
     penetration: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
-    /// After a reset that fits sizes, the first frame decides between arms or legs of unlike lengths, and the frames that
-    /// follow refine the limbs' lengths (whole-body solvers).
+    /// After a reset that fits sizes, the first frame decides between arms or legs of unlike lengths, and with the
+    /// whole-body solvers the frames that follow refine the limbs' lengths.
     fit_lengths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.
     ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;

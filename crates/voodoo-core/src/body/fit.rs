@@ -14,7 +14,7 @@ const FAR_END: f64 = 0.5;
 const STEADY: f64 = 2.5;
 /// A limb whose joint turns by less than this about any axis carries its landmarks for its parent: a clavicle for the chest.
 const RIGID: f64 = 1.0;
-/// Nobody's limb is shorter than its pair by more than this share: it was foreshortened, and is as long as its pair.
+/// Nobody's limb is shorter than this share of its pair: it was foreshortened, or one of its joints was set along it.
 const UNLIKE: f64 = 0.75;
 /// Limbs whose axes are no farther apart than 30 degrees (cosine) are in line: where their joint is along it is hard to see.
 const STRAIGHT: f64 = 0.866;

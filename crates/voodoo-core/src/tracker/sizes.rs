@@ -16,7 +16,7 @@ const GIRTH_STEPS: usize = 6;
 const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
 /// A limb becomes longer or shorter by at most this share in one frame.
 const LENGTH_STEP: f64 = 0.02;
-/// Nobody's arm is so much shorter than the other one, nor a leg: one of them was set wrong.
+/// Nobody's arm is shorter than this share of the other one, nor a leg: one of them was set wrong.
 const UNLIKE_REACH: f64 = 0.88;
 
 impl Tracker {
@@ -36,17 +36,17 @@ impl Tracker {
         for pair in self.body.pairs() {
             let bones = |limb: &usize| self.chains.iter().find(|c| c.upper == *limb).map(|c| [c.upper, c.lower]);
             let [one, other] = pair.iter().filter_map(bones).collect::<Vec<_>>()[..] else { continue };
-            let given = (self.body.clone(), self.poses.clone());
-            let length = |limb: usize| given.0.limbs()[limb].shape.length();
-            let ratio = one.map(length).iter().sum::<f64>() / other.map(length).iter().sum::<f64>();
-            if ratio.min(1.0 / ratio) > UNLIKE_REACH {
+            let lengths = [one, other].map(|bones| bones.map(|limb| self.body.limbs()[limb].shape.length()));
+            let [first, second] = lengths.map(|lengths| lengths.iter().sum::<f64>());
+            if first.min(second) > UNLIKE_REACH * first.max(second) {
                 continue;
             }
+            let given = (self.body.clone(), self.poses.clone());
             let (mut least, mut best) = (self.cost_of_start(frame) - GAIN, given.clone());
-            for (from, to) in [(one, other), (other, one)] {
+            for (bones, own, wanted) in [(other, lengths[1], lengths[0]), (one, lengths[0], lengths[1])] {
                 (self.body, self.poses) = given.clone();
-                for (from, to) in from.into_iter().zip(to) {
-                    self.body.change_length(to, length(from) / length(to));
+                for (limb, (own, wanted)) in bones.into_iter().zip(own.into_iter().zip(wanted)) {
+                    self.body.change_length(limb, wanted / own);
                 }
                 self.body.close_joints(&mut self.poses);
                 let cost = self.cost_of_start(frame);
