@@ -387,6 +387,7 @@ mod changes;
 mod distances;
 mod doubt;
 mod hypotheses;
+mod lean;
 mod named;
 mod places;
 mod report;

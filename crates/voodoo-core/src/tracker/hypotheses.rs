@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::Tracker;
 use super::doubt::Doubt;
+use super::lean::Lean;
 use super::places::{carry, targets, thin};
 use crate::candidates::shifted;
 use crate::correspondence::Correspondences;
@@ -38,7 +39,7 @@ const REFINE: usize = 8;
 /// A new configuration that costs more than this, and more than the old one, is no pose of a body.
 const STRAINED: f64 = 60.0;
 /// Bends about the line from the root of a chain to a new end that are tried, and to the end it had.
-const SWIVELS: usize = 6;
+pub(super) const SWIVELS: usize = 6;
 const SWIVELS_AT_REST: usize = 12;
 /// A rough hypothesis explains points up to this distance, metres: they are drawn in when it is refined.
 const ROUGHLY: f64 = 0.08;
@@ -65,7 +66,7 @@ pub(super) struct Hypotheses {
     trial: Vec<Pose>,
     kept: Vec<Pose>,
     at_rest: Vec<Pose>,
-    both: Vec<Pose>,
+    lean: Lean,
     kept_predicted: Vec<Pose>,
     /// What was matched before the hypothesis.
     matched: Correspondences,
@@ -93,15 +94,10 @@ impl Tracker {
         work.wanted_drawn.clear();
         work.wanted_drawn.resize(self.chains.len(), true);
         work.wanted.resize_with(self.chains.len(), room);
+        work.lean.prepare(&self.body, &self.chains);
         // Room at once, not when the first hard frame comes.
-        for poses in [
-            &mut work.trial,
-            &mut work.kept,
-            &mut work.at_rest,
-            &mut work.both,
-            &mut work.kept_predicted,
-            &mut work.asked_for,
-        ] {
+        for poses in [&mut work.trial, &mut work.kept, &mut work.at_rest, &mut work.kept_predicted, &mut work.asked_for]
+        {
             poses.clear();
             poses.reserve(self.body.limbs().len());
         }
@@ -143,6 +139,7 @@ impl Tracker {
         work.own_weight.reserve(most);
         work.others.reserve(most);
         work.distances.reserve(most);
+        work.lean.make_room(most);
         work.matched.reserve_as(&self.correspondences);
         work.best.clear();
         work.best.resize(self.candidates.len(), f32::INFINITY);
@@ -259,13 +256,13 @@ impl Tracker {
         // What the last frame asked for comes first: two frames that ask for a change shall ask for the same one.
         let mut wanted = std::mem::take(&mut work.wanted[index]);
         wanted.iter_mut().for_each(|pose| *pose = shifted(pose, self.origin));
-        let both = rested && self.rest_both(index, views, work);
+        let leans = self.chains[index].leg && self.lean(&work.ends, views, &mut work.lean);
         // Found; drawn by open points; the body.
         let tried = [
+            (leans, false, std::mem::take(&mut work.lean.best)),
             (work.doubts[index].asked() && !wanted.is_empty(), work.wanted_drawn[index], wanted),
             (rested, false, std::mem::take(&mut work.at_rest)),
             (least < enough, true, std::mem::take(&mut work.kept)),
-            (both, false, std::mem::take(&mut work.both)),
         ];
         let mut steps = 0;
         for (_, drawn, poses) in tried.iter().filter(|(found, ..)| *found) {
@@ -278,40 +275,10 @@ impl Tracker {
                 }
             }
         }
-        [(.., work.wanted[index]), (.., work.at_rest), (.., work.kept), (.., work.both)] = tried;
+        [(.., work.lean.best), (.., work.wanted[index]), (.., work.at_rest), (.., work.kept)] = tried;
         std::mem::swap(&mut work.wanted[index], &mut work.asked_for);
         work.asked_for.clear();
         steps
-    }
-
-    /// Both legs where they ended when all was well, into `both`, from one of them there in `at_rest`; whether there is another
-    /// and it is in doubt as well. A body that sinks pushes both legs out of place, and each alone is held by the other.
-    fn rest_both(&self, index: usize, views: Views, work: &mut Hypotheses) -> bool {
-        let chain = &self.chains[index];
-        let other = (0..self.chains.len()).find(|other| *other != index && chain.leg && self.chains[*other].leg);
-        let Some(other) = other.filter(|other| !work.doubts[*other].none()) else { return false };
-        let Some(end) = work.ends[other] else { return false };
-        let other = &self.chains[other];
-        let Hypotheses { near, near_weight, best, distances, trial, at_rest, both, .. } = work;
-        let mut least = f64::INFINITY;
-        for swivel in 0..SWIVELS_AT_REST {
-            trial.clone_from(at_rest);
-            other.point_at(&self.body, trial, end - self.origin, TAU * swivel as f64 / SWIVELS_AT_REST as f64);
-            best.fill(f32::INFINITY);
-            for limb in chain.limbs().chain(other.limbs()) {
-                self.body.limbs()[limb].shape.approximate_distances(&trial[limb], near, distances);
-                for (best, distance) in best.iter_mut().zip(distances.iter()) {
-                    *best = best.min(distance.abs());
-                }
-            }
-            let seen: f64 = other.limbs().map(|limb| look(views, &self.body.limbs()[limb], &trial[limb]).cost()).sum();
-            let cost = rough_cost(best, near_weight) + seen + self.strain(other, trial);
-            if cost < least {
-                least = cost;
-                both.clone_from(trial);
-            }
-        }
-        least < f64::INFINITY
     }
 
     /// The poses from before the hypothesis, and what was matched there.
@@ -427,6 +394,6 @@ impl Tracker {
 }
 
 /// Cost of points at these distances from the nearest limb of a rough hypothesis.
-fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
+pub(super) fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
     distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum()
 }
