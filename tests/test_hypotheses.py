@@ -19,8 +19,10 @@ def test_nobody_is_lost_who_stands_up(voodoo_data):
     assert score.tracking_class > 0, f"lost at the end: {score.lost_joints}"
 
 
-def lost_at_the_end(path, *, hypotheses: bool) -> int:
-    """Of so many runs, the first from the recording's own start and the others with 4 mm of noise on its joints."""
+def legs_lost_at_the_end(path, *, hypotheses: bool) -> int:
+    """Runs that end with a knee or ankle lost; the first is from the recording's own start, the others have 4 mm of noise on
+    its joints. Hips do not count: sitting, the reference shortens the thighs by a quarter, and hips in their place are 10 to
+    15 cm behind its own."""
     recording = voodoo.open_recording(path)
     start = Init.of(recording)
     chance = np.random.default_rng(0)
@@ -33,17 +35,18 @@ def lost_at_the_end(path, *, hypotheses: bool) -> int:
         init = Init(height_m=start.height_m, joints=joints)
         tracker = start_tracker(recording, init=init, config=voodoo.Config(hypotheses=hypotheses))
         result = Track.of([frame.estimate for frame in track(recording, tracker)], body=tracker.body)
-        kind, _ = metrics.tracking_class(compare(recording, result), result.stamps, limit=0.15)
-        lost += kind == 0
+        _, gone = metrics.tracking_class(compare(recording, result), result.stamps, limit=0.15)
+        lost += any(gone[-1][metrics.JOINTS.index(f"{side}_{joint}")] for side in "lr" for joint in ("knee", "ankle"))
     return lost
 
 
-def test_half_of_those_who_are_lost_while_they_sit_down_are_not_with_hypotheses(voodoo_data):
-    """The sinking body pushes straight legs through the floor, one or both; no foot has moved."""
+def test_no_leg_of_those_who_sit_down_goes_through_the_floor(voodoo_data):
+    """The sinking body pushes straight legs through it, one or both; no foot has moved, and the trunk leans."""
     files = [voodoo_data / "utd-mhad" / "Depth" / f"a25_s1_t{trial}_depth.mat" for trial in (1, 2, 3, 4)]
-    without, having = (sum(lost_at_the_end(file, hypotheses=on) for file in files) for on in (False, True))
+    without, having = (sum(legs_lost_at_the_end(file, hypotheses=on) for file in files) for on in (False, True))
+    print(without, having)
     assert without >= STARTS * len(files) // 2
-    assert having <= without // 2, f"{having} of {without}"
+    assert having == 0, f"{having} of {without}"
 
 
 def errors_of(folder, joint: str, *, mode: str, start: int) -> np.ndarray:

@@ -46,6 +46,17 @@ const ROUGHLY: f64 = 0.08;
 /// Points looked at when hypotheses are compared, at most.
 const SAMPLE: usize = 400;
 
+/// What a hypothesis rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ground {
+    /// Open points have drawn the chain there.
+    Points,
+    /// It ended there when all was well.
+    Rest,
+    /// The body leans: not the chain alone is judged by it.
+    Lean,
+}
+
 /// Working memory.
 #[derive(Debug, Default)]
 pub(super) struct Hypotheses {
@@ -77,8 +88,8 @@ pub(super) struct Hypotheses {
     /// The body as the frame wanted it that last asked for a change of each chain, world.
     wanted: Vec<Vec<Pose>>,
     asked_for: Vec<Pose>,
-    /// Whether that one was drawn by open points.
-    wanted_drawn: Vec<bool>,
+    /// What that one rests on.
+    wanted_ground: Vec<Ground>,
 }
 
 impl Tracker {
@@ -91,8 +102,8 @@ impl Tracker {
         work.doubts.resize(self.chains.len(), Doubt::default());
         let room = || Vec::with_capacity(self.body.limbs().len());
         work.wanted.clear();
-        work.wanted_drawn.clear();
-        work.wanted_drawn.resize(self.chains.len(), true);
+        work.wanted_ground.clear();
+        work.wanted_ground.resize(self.chains.len(), Ground::Points);
         work.wanted.resize_with(self.chains.len(), room);
         work.lean.prepare(&self.body, &self.chains);
         // Room at once, not when the first hard frame comes.
@@ -257,19 +268,19 @@ impl Tracker {
         let mut wanted = std::mem::take(&mut work.wanted[index]);
         wanted.iter_mut().for_each(|pose| *pose = shifted(pose, self.origin));
         let leans = self.chains[index].leg && self.lean(&work.ends, views, &mut work.lean);
-        // Found; drawn by open points; the body.
+        // Found; what it rests on; the body.
         let tried = [
-            (leans, false, std::mem::take(&mut work.lean.best)),
-            (work.doubts[index].asked() && !wanted.is_empty(), work.wanted_drawn[index], wanted),
-            (rested, false, std::mem::take(&mut work.at_rest)),
-            (least < enough, true, std::mem::take(&mut work.kept)),
+            (leans, Ground::Lean, std::mem::take(&mut work.lean.best)),
+            (work.doubts[index].asked() && !wanted.is_empty(), work.wanted_ground[index], wanted),
+            (rested, Ground::Rest, std::mem::take(&mut work.at_rest)),
+            (least < enough, Ground::Points, std::mem::take(&mut work.kept)),
         ];
         let mut steps = 0;
-        for (_, drawn, poses) in tried.iter().filter(|(found, ..)| *found) {
+        for (_, ground, poses) in tried.iter().filter(|(found, ..)| *found) {
             if !work.doubts[index].asks() {
                 steps += REFINE;
-                if self.refine(index, frame, pace, poses, work, *drawn) && !work.doubts[index].ask() {
-                    work.wanted_drawn[index] = *drawn;
+                if self.refine(index, frame, pace, poses, work, *ground) && !work.doubts[index].ask() {
+                    work.wanted_ground[index] = *ground;
                     work.asked_for.extend(self.poses.iter().map(|pose| shifted(pose, -self.origin)));
                     self.take_back(work);
                 }
@@ -364,7 +375,7 @@ impl Tracker {
         pace: f64,
         hypothesis: &Vec<Pose>,
         work: &mut Hypotheses,
-        drawn: bool,
+        ground: Ground,
     ) -> bool {
         let before = self.overall_cost(frame);
         let strained = self.strain(&self.chains[index], &self.poses).max(STRAINED);
@@ -382,9 +393,10 @@ impl Tracker {
         let cost = self.overall_cost(frame);
         if cost.total < before.total - GAIN && cost.evidence < before.evidence - SEEN_GAIN {
             let views = Views { frame, backgrounds: &self.backgrounds, cut_out: &self.cut_out, origin: self.origin };
+            let chain = &self.chains[index];
             // What is as suspect as before is not worth a jump.
-            let strain = self.strain(&self.chains[index], &self.poses);
-            if strain <= strained && !self.suspect(&self.chains[index], views, work, drawn)[0] {
+            let mut sure = || !self.suspect(chain, views, work, ground == Ground::Points)[0];
+            if self.strain(chain, &self.poses) <= strained && (ground == Ground::Lean || sure()) {
                 return true;
             }
         }
