@@ -1,5 +1,6 @@
 """BVH, TRC and ROS 2 bags, read back by readers that share no code with the writers."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -187,6 +188,14 @@ def test_bag_read_by_rosbags(tmp_path, tracked):
     assert len(shapes[0][1].markers) == len(body.limbs) + 1
     with pytest.raises(VoodooError, match="does not exist"):
         write_bag(tmp_path / "bag", track, body, root_frame="odom")
+
+
+def test_stamps_that_no_bag_can_hold_leave_no_folder(tmp_path, tracked):
+    track, body = tracked
+    early = replace(track, stamps=track.stamps - track.stamps[0] - 1.0)
+    with pytest.raises(VoodooError, match=r"stamps: expected none before zero.*-1\.0 s"):
+        write_bag(tmp_path / "bag", early, body, root_frame="odom")
+    assert not (tmp_path / "bag").exists()
 
 
 def test_a_track_without_limb_poses_is_refused(tmp_path, tracked):

@@ -94,6 +94,12 @@ def test_truncated_npz_and_short_csv_row(tmp_path):
             Track.load(tmp_path / name)
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_a_path_may_be_a_string(tmp_path, suffix):
+    Track.of(list(estimates(2))).save(str(tmp_path / f"pose{suffix}"))
+    assert len(Track.load(str(tmp_path / f"pose{suffix}"))) == 2
+
+
 def test_other_suffixes_are_refused(tmp_path):
     with pytest.raises(VoodooError, match=r"\.csv or \.npz, found '\.txt'"):
         Track.of(list(estimates(1))).save(tmp_path / "pose.txt")

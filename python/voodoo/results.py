@@ -118,13 +118,14 @@ class Track:
             ),
         )
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | Path) -> None:
         """Write .csv (positions to 1 um) or .npz (everything, exactly); the file appears only when it is complete.
 
         Raises:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
+        path = Path(path)
         check_suffix(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_name(f".{path.name}.part")
@@ -164,12 +165,13 @@ class Track:
             )
 
     @classmethod
-    def load(cls, path: Path) -> Track:
+    def load(cls, path: str | Path) -> Track:
         """Read what save() wrote.
 
         Raises:
             VoodooError: another suffix, damage, or a file of another kind.
         """
+        path = Path(path)
         check_suffix(path)
         with reading(path, "a result of voodoo track"):
             try:

@@ -51,7 +51,8 @@ def write_bag(
         markers: also write the markers.
 
     Raises:
-        VoodooError: the folder exists, an empty name, or a track without limb poses or of another body.
+        VoodooError: the folder exists, an empty name, stamps before zero (a bag has none), or a track without limb poses or
+            of another body.
         OSError: the bag cannot be written.
     """
     path = Path(path)
@@ -59,6 +60,8 @@ def write_bag(
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
     if not root_frame or not person.isidentifier():
         raise VoodooError(f"root_frame, person: expected names, found {root_frame!r} and {person!r}")
+    if (track.stamps < 0.0).any():
+        raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
     posed = skeleton(track, body)
     names, angles = joint_angles(posed)
     topic = f"/humans/bodies/{person}"
