@@ -91,6 +91,8 @@ def test_zero_distortion_is_no_distortion_and_cameras_compare_by_value():
         ({"cx": "a"}, "cx"),
         ({"distortion": (1.0, 2.0)}, "0 or 4 or 5 coefficients"),
         ({"distortion": (float("inf"), 0, 0, 0)}, "finite"),
+        ({"distortion": None}, "distortion: expected numbers, found None"),
+        ({"distortion": 0.1}, "distortion: expected numbers, found 0.1"),
         ({"model": "ftheta"}, "plumb_bob, rational_polynomial, equidistant"),
     ],
 )
@@ -133,3 +135,17 @@ class TestCameraInfo:
     def test_unknown_model_is_refused(self):
         with pytest.raises(CameraError, match="inverse_brown"):
             Camera.from_camera_info(width=8, height=6, k=self.k, d=(0.1,), model="inverse_brown")
+
+    def test_matrices_may_be_matrices(self):
+        """As message types and OpenCV have them."""
+        fields = {"width": 8, "height": 6, "k": np.reshape(self.k, (3, 3)), "d": np.array([[0.1, 0, 0, 0, 0]])}
+        assert Camera.from_camera_info(**fields).distortion == (0.1, 0.0, 0.0, 0.0, 0.0)
+        assert Camera.from_camera_info(**fields, p=np.reshape(self.p, (3, 4)), rectified=True).fx == 9.0
+
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [({"k": None}, "k: expected numbers, found None"), ({"k": np.eye(2)}, "k: expected 9 numbers, found 4")],
+    )
+    def test_what_is_no_matrix_is_refused(self, change, words):
+        with pytest.raises(CameraError, match=words):
+            Camera.from_camera_info(**({"width": 8, "height": 6, "k": self.k} | change))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import cv2
 import numpy as np
@@ -68,7 +68,7 @@ class Camera:
             object.__setattr__(self, name, value)
         if self.model not in get_args(CameraModel):
             raise CameraError(f"camera model: expected one of {', '.join(get_args(CameraModel))}, found {self.model!r}")
-        coefficients = tuple(_number("camera distortion", value) for value in self.distortion)
+        coefficients = _numbers("camera distortion", self.distortion)
         if len(coefficients) not in _COEFFICIENTS[self.model]:
             counts = " or ".join(map(str, _COEFFICIENTS[self.model]))
             raise CameraError(
@@ -97,26 +97,23 @@ class Camera:
 
         Args:
             width, height: image size [px].
-            k: 3x3 intrinsics, row by row (9 numbers).
+            k: 3x3 intrinsics, row by row: 9 numbers, or (3, 3).
             d: distortion coefficients.
             model: `distortion_model`; "" and "none" mean no distortion, "fisheye" means equidistant.
-            p: 3x4 projection matrix, row by row (12 numbers), of the rectified image.
+            p: 3x4 projection matrix of the rectified image, row by row: 12 numbers, or (3, 4).
             rectified: the image is a rectified one: use `p` (when it is set) and no distortion.
 
         Raises:
-            CameraError: wrong counts, an uncalibrated camera (fx = 0), or an unknown model.
+            CameraError: no numbers, wrong counts, an uncalibrated camera (fx = 0), or an unknown model.
         """
-        k = [float(value) for value in k]
-        if len(k) != 9:
-            raise CameraError(f"camera k: expected 9 numbers, found {len(k)}")
+        k = _numbers("camera k", k, count=9)
         if rectified and p is not None:
-            projection = [float(value) for value in p]
-            if len(projection) != 12:
-                raise CameraError(f"camera p: expected 12 numbers, found {len(projection)}")
+            projection = _numbers("camera p", p, count=12)
             if projection[0] > 0.0:  # an all-zero P means "not filled in"
                 return cls(width, height, projection[0], projection[5], projection[2], projection[6])
         name = _ALIASES.get(model, model)
-        coefficients = () if model in ("", "none") and not any(d) else tuple(float(value) for value in d)
+        d = _numbers("camera d", d)
+        coefficients = () if model in ("", "none") and not any(d) else d
         return cls(width, height, k[0], k[4], k[2], k[5], coefficients, name)  # type: ignore[arg-type]
 
     @property
@@ -220,3 +217,14 @@ def _number(name: str, value: object) -> float:
     if not math.isfinite(number):
         raise CameraError(f"{name}: expected a finite number, found {number!r}")
     return number
+
+
+def _numbers(name: str, values: Any, *, count: int | None = None) -> tuple[float, ...]:  # noqa: ANN401 - checked here
+    """The numbers of an iterable, or of an array of any shape row by row."""
+    try:
+        rows = np.asarray(values if hasattr(values, "__len__") else list(values), dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CameraError(f"{name}: expected numbers, found {values!r}") from None
+    if count is not None and rows.size != count:
+        raise CameraError(f"{name}: expected {count} numbers, found {rows.size}")
+    return tuple(_number(name, value) for value in rows.reshape(-1).tolist())
