@@ -63,6 +63,7 @@ def assert_one_line(result, code, *words):
                 "--overlay",
                 "--frame",
                 "--loader",
+                "--topic",
                 "l_shoulder",
                 "Examples",
             ),

@@ -7,8 +7,10 @@ import zipfile
 import cv2
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from bag_writer import Messages, write_bag
+from voodoo.cli import app
 from voodoo.errors import RecordingError
 from voodoo.recordings import ColorImage, DepthImage, LaserScan, PointCloud, open_recording
 
@@ -250,6 +252,24 @@ def test_several_depth_topics_need_a_choice_and_may_all_be_chosen(tmp_path):
     assert len(open_recording(path, depth_topic="/e/depth/image")) == 1
     (frame,) = open_recording(path, depth_topic=["/d/depth/image", "/e/depth/image"])
     assert [m.sensor for m in frame.measurements] == ["/e/depth/image", "/d/depth/image"] and frame.stamp == 10.3
+
+
+def test_the_command_line_chooses_topics_too(tmp_path):
+    def info(*options):
+        return CliRunner().invoke(app, ["info", str(path), *options], env={"COLUMNS": "200"})
+
+    info_of_e = ("/e/depth/camera_info", 10.0, M.camera_info(10.0))
+    path = bag(tmp_path, TF, INFO, info_of_e, depth_entry(10.2, topic="/e/depth/image"), depth_entry(10.3))
+    assert "--topic depth=NAME" in info().stderr
+    both = info("--topic", "depth=/d/depth/image", "--topic", "depth=/e/depth/image")
+    assert both.exit_code == 0 and "/d/depth/image" in both.stdout and "/e/depth/image" in both.stdout
+    one = info("--topic", "depth=/e/depth/image", "--topic", "camera_info=/d/depth/camera_info")
+    assert one.exit_code == 0 and "/d/depth/image" not in one.stdout
+    for wrong in ("depth", "depth=", "sonar=/e"):
+        assert f"expected KIND=NAME with one of depth, points, scan, color, camera_info, found '{wrong}'" in (
+            info("--topic", wrong).stderr
+        )
+    assert "expected one camera_info" in info("--topic", "camera_info=/a", "--topic", "camera_info=/b").stderr
 
 
 class TestTransforms:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import voodoo
+from voodoo.cli.options import TOPICS
 from voodoo.errors import VoodooError
 from voodoo.overlay import Overlay
 from voodoo.overlay_inputs import Picture
@@ -33,6 +34,23 @@ def opened(path: Path, loader: str | None, frame: str | None, **options: Any) ->
     if frame is not None:
         options["root_frame"] = frame
     return open_recording(path, loader=loader, **options)
+
+
+def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
+    """The loader's options of "depth=/front/depth/image" each.
+
+    Raises:
+        VoodooError: another form or kind, or several calibrations.
+    """
+    names: dict[str, list[str]] = {}
+    for word in words or ():
+        kind, _, name = word.partition("=")
+        if kind not in TOPICS or not name:
+            raise VoodooError(f"topic: expected KIND=NAME with one of {', '.join(TOPICS)}, found {word!r}")
+        names.setdefault(kind, []).append(name)
+    if len(names.get("camera_info", ())) > 1:
+        raise VoodooError(f"topic: expected one camera_info, found {', '.join(names['camera_info'])}")
+    return {f"{kind}_topic": found if len(found) > 1 else found[0] for kind, found in names.items()}
 
 
 def kinds_of(words: str | None) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, opened, states
+from voodoo.cli.common import clear_errors, opened, states, topics_of
 from voodoo.cli.options import (
     BodyOption,
     FrameOption,
@@ -18,6 +18,7 @@ from voodoo.cli.options import (
     LoaderOption,
     ModelOption,
     RecordingArgument,
+    TopicOption,
 )
 from voodoo.export.files import check_target
 from voodoo.export.files import save as export
@@ -61,6 +62,7 @@ def ik_command(
             help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME_ik.csv.",
         ),
     ] = None,
+    topic: TopicOption = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
 ) -> None:
@@ -80,7 +82,7 @@ def ik_command(
     with clear_errors():
         if body is not None and height is not None:
             raise typer.BadParameter("give --body or --height, not both")
-        source = opened(recording, loader, frame)
+        source = opened(recording, loader, frame, **topics_of(topic))
         written = out or [Path(f"{source.name}_ik.csv")]
         for file in written:
             check_target(file)

@@ -8,8 +8,12 @@ from typing import Annotated
 import typer
 
 from voodoo.recordings import LOADERS
+from voodoo.recordings.ros_topics import KINDS
 from voodoo.running import HumanModel
 from voodoo.sensors.front_end import INPUTS
+
+TOPICS = (*KINDS, "camera_info")
+"""What a topic can be chosen for."""
 
 RecordingArgument = Annotated[
     Path, typer.Argument(metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, Pose2Sim or PNG folder, .trc, .c3d.")
@@ -38,6 +42,14 @@ ModelOption = Annotated[
 FrameOption = Annotated[
     str | None,
     typer.Option("--frame", metavar="NAME", help="Root frame of the result, instead of the recording's own."),
+]
+TopicOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--topic",
+        metavar="KIND=NAME",
+        help=f"Topic of a bag, where it has several of a kind: {', '.join(TOPICS)}; repeatable, depth cameras add up.",
+    ),
 ]
 UseOption = Annotated[
     str | None,

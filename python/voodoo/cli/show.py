@@ -8,14 +8,19 @@ from typing import Annotated
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, opened
-from voodoo.cli.options import FrameOption, HeightOption, LoaderOption, ModelOption, RecordingArgument
+from voodoo.cli.common import clear_errors, opened, topics_of
+from voodoo.cli.options import FrameOption, HeightOption, LoaderOption, ModelOption, RecordingArgument, TopicOption
 
 
-def info_command(recording: RecordingArgument, frame: FrameOption = None, loader: LoaderOption = None) -> None:
+def info_command(
+    recording: RecordingArgument,
+    topic: TopicOption = None,
+    frame: FrameOption = None,
+    loader: LoaderOption = None,
+) -> None:
     """Say what is in a recording: sensors, topics, frames, rates, root frame and reference."""
     with clear_errors():
-        typer.echo(str(opened(recording, loader, frame).info()))
+        typer.echo(str(opened(recording, loader, frame, **topics_of(topic)).info()))
 
 
 def config_command() -> None:

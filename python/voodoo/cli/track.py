@@ -10,7 +10,17 @@ import numpy as np
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, config_of, depth_filter_of, kinds_of, opened, run, states, viewer_of
+from voodoo.cli.common import (
+    clear_errors,
+    config_of,
+    depth_filter_of,
+    kinds_of,
+    opened,
+    run,
+    states,
+    topics_of,
+    viewer_of,
+)
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -20,6 +30,7 @@ from voodoo.cli.options import (
     LoaderOption,
     ModelOption,
     RecordingArgument,
+    TopicOption,
     UseOption,
 )
 from voodoo.export.files import check_target
@@ -76,6 +87,7 @@ def track_command(
         Path | None,
         typer.Option(metavar="FILE", help="TOML: which sites the markers of .trc and .c3d files stand for."),
     ] = None,
+    topic: TopicOption = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
 ) -> None:
@@ -107,8 +119,9 @@ def track_command(
         kinds = kinds_of(use)
         depth_filter = depth_filter_of(depth_range)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
+        options = loader_options(recording, loader, markers=markers, layout=layout) | topics_of(topic)
         source = join(
-            opened(recording, loader, frame, **loader_options(recording, loader, markers=markers, layout=layout)),
+            opened(recording, loader, frame, **options),
             keypoints=keypoint_folders(keypoints or ()),
             layout=layout,
             others=with_ or (),

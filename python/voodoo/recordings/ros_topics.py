@@ -122,7 +122,7 @@ class TopicFinder:
         if len(bases) > 1:
             raise RecordingError(
                 f"{self.bag.path}: expected one topic for {kind}, found {', '.join(sorted(bases.values()))}; "
-                f"choose with {kind}_topic= or leave it out with use="
+                f"choose with {kind}_topic= (--topic {kind}=NAME) or leave it out with use="
             )
         return list(bases.values())
 
@@ -191,7 +191,8 @@ class TopicFinder:
             infos = ", ".join(t.name for t in self.bag.topics if t.type == CAMERA_INFO and t.messages) or "none"
             raise RecordingError(
                 f"{self.bag.path}: expected the calibration of {name} (frame {frame!r}) on {expected}, "
-                f"found CameraInfo topics: {infos}" + (" (choose with camera_info_topic=)" if kind == "depth" else "")
+                f"found CameraInfo topics: {infos}"
+                + (" (choose with camera_info_topic=, --topic camera_info=NAME)" if kind == "depth" else "")
             )
         return expected, camera_of(self._message(expected), name, f"{self.bag.path}, topic {expected}")
 
