@@ -74,6 +74,7 @@ def test_depths_beside_the_person_and_edges_say_nothing():
         (np.ones((160, 120)), CAMERA, "shape"),
         (np.full((120, 160), -1.0), CAMERA, "negative"),
         ("far", CAMERA, "expected numbers"),
+        (np.full((120, 160), 2500, np.uint16), CAMERA, "expected metres, as floats, found uint16"),
         (
             np.ones((120, 160)),
             voodoo.Camera(160, 120, 150.0, 150.0, 79.5, 59.5, distortion=(0.1, 0, 0, 0)),

@@ -84,6 +84,18 @@ def test_criterion_gradient(arm):
     assert np.allclose(gradient, numeric, rtol=2e-2, atol=1e-2)
 
 
+@pytest.mark.parametrize("wrong", [{"margin": np.nan}, {"margin": -1.0}, {"thin": np.nan}, {"thin": 9.0}])
+def test_the_criterion_refuses_what_the_solver_refuses(arm, wrong):
+    """A margin that is no number had every bone content, h = 0."""
+    camera, pose = front_camera()
+    mask = np.zeros((120, 160))
+    mask[:5, :5] = 1
+    image = ik.Silhouette(mask, camera=camera, world_from_camera=pose)
+    assert arm.criterion(arm.rest(), [image])[0] > 1.0
+    with pytest.raises(voodoo.MeasurementError, match=rf"^{next(iter(wrong))}: expected 0 to"):
+        arm.criterion(arm.rest(), [image], **wrong)
+
+
 def test_a_bone_lies_in_the_middle_of_a_limb_and_is_content_in_a_trunk():
     camera = voodoo.Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
     v, u = np.mgrid[:120, :160]

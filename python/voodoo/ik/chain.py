@@ -12,6 +12,7 @@ from voodoo import _core
 from voodoo.body import Body
 from voodoo.errors import MeasurementError
 from voodoo.ik.image import Silhouette, seen_views
+from voodoo.ik.options import Options
 from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, vector
 
 
@@ -107,7 +108,18 @@ class Chain:
         bones: Sequence[Bone] | None = None,
         others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> tuple[float, FloatArray]:
-        """The image criterion h [px] and its gradient (n,) (J10 eq. 5, 8); see `solve` for the arguments."""
+        """The image criterion h [px] and its gradient (n,) (J10 eq. 5, 8).
+
+        Args:
+            angles: (n,).
+            images, world_from_base, others: see `solve`.
+            margin, thin, bones: see `Options`.
+
+        Raises:
+            BodyError: a site or limb that is not where it should be: bones on the chain, others beside it.
+            MeasurementError: a number that cannot be used; it says which.
+        """
+        Options(margin=margin, thin=thin)  # refuses what `solve` refuses
         views = seen_views(images)
         return self._core.criterion(
             base_pose(world_from_base),

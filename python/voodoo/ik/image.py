@@ -41,12 +41,12 @@ class Silhouette:
             world_from_camera: rigid (4, 4) pose of the optical frame.
             border: how far the outline may be from where the camera should see it [px], by its own error and by that of the
                 calibration: bones need not lie deep inside, or in the middle, more exactly than that.
-            depth: (height, width) along the optical axis [m] as a depth camera saw it, 0 or not finite where nothing
+            depth: (height, width) floats, along the optical axis [m] as a depth camera saw it, 0 or not finite where nothing
                 returned: bones lie behind what is seen, too, and no farther than that where the silhouette is the limb itself.
 
         Raises:
             MeasurementError: the border is no number of pixels, mask or depth have not the camera's size, depths are
-                negative or of a camera with lens distortion, or the pose is not rigid.
+                whole numbers (millimetres), negative or of a camera with lens distortion, or the pose is not rigid.
         """
         if not isinstance(camera, Camera):
             raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
@@ -141,6 +141,10 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
 
 def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
     """Depths of the person as the core takes them: zero where there is none."""
+    if isinstance(depth, np.ndarray) and depth.dtype.kind in "iu":
+        raise MeasurementError(
+            f"depth: expected metres, as floats, found {depth.dtype}: multiply by the metres of a unit"
+        )
     found = np.nan_to_num(numbers("depth", depth), nan=0.0, posinf=0.0, neginf=0.0)
     if found.shape != (camera.height, camera.width) or (found < 0.0).any():
         raise MeasurementError(

@@ -23,8 +23,8 @@ class Options:
         caution: damping of the image step where few samples lie outside, or the cameras look along the motion: the
             change of h per radian, as a share of the bones' length in the images, that counts; 0 trusts every pixel.
         largest_turn: largest change of an angle in one step [rad].
-        margin: how deep bones shall lie inside the silhouettes, in radii of their limbs, less a pixel; 0 is J10's
-            criterion.
+        margin: how deep bones shall lie inside the silhouettes, in radii of their limbs, less the silhouette's border; 0 is
+            J10's criterion.
         thin: up to how many times that depth a silhouette is the limb itself, in whose middle the bone shall lie; 0: bones are
             nowhere centred.
         bones: the segments that are projected; None: joint to joint.
