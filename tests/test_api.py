@@ -1,3 +1,4 @@
+import copy
 import subprocess
 import sys
 import threading
@@ -82,13 +83,18 @@ def test_points_of_either_precision_and_any_layout_are_taken(body, cloud, dtype)
     points = cloud.astype(dtype)
     spread = np.zeros((len(points), 6), dtype=dtype)[:, ::2]
     spread[:] = points
+    # As np.ndarray(..., message.data, offset=1) gives it.
+    odd = np.ndarray(points.shape, dtype, bytearray(points.nbytes + 1), offset=1)
+    odd[:] = points
+    assert not odd.flags.aligned
     results = []
-    for array in (points, spread, np.asfortranarray(points)):
+    for array in (points, spread, np.asfortranarray(points), odd):
         tracker = voodoo.Tracker(body)
         tracker.reset_pose(rest_pose(body))
         results.append(tracker.step(frame_of(array)).joint_positions)
     np.testing.assert_array_equal(results[0], results[1])
     np.testing.assert_array_equal(results[0], results[2])
+    np.testing.assert_array_equal(results[0], results[3])
 
 
 def test_contiguous_arrays_are_not_copied(body):
@@ -160,7 +166,10 @@ def test_images_that_cannot_be_meant_are_refused_by_name():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda frame: frame.add_points(np.full((4, 3), np.inf)), ["points[0].points", "finite metres", "row 0"]),
+        (
+            lambda frame: frame.add_points(np.full((4, 3), np.inf)),
+            ["points[0].points", "finite metres", "[inf, inf, inf] in row 0"],
+        ),
         (lambda frame: frame.add_points(np.zeros((4, 3)), weight=0.0), ["points[0].weight", "above zero"]),
         (lambda frame: frame.add_points(np.zeros((4, 3)), limb="tail"), ["tail", "l_forearm"]),
         (lambda frame: frame.add_position("nose", (0, 0, 0)), ["nose", "l_wrist"]),
@@ -170,7 +179,10 @@ def test_images_that_cannot_be_meant_are_refused_by_name():
             lambda frame: frame.add_ray("l_wrist", origin=(0, 0, 0), direction=(0, 0, 0)),
             ["rays[0].direction", "not zero"],
         ),
-        (lambda frame: frame.set_ground(normal=(0, 0, 2)), ["ground", "unit normal"]),
+        (
+            lambda frame: frame.set_ground(normal=(0, 0, 2)),
+            ["ground", "unit normal", "found normal [0.0, 0.0, 2.0] and offset 0"],
+        ),
     ],
 )
 def test_a_refused_frame_names_what_is_wrong_and_leaves_no_trace(body, cloud, change, words):
@@ -209,6 +221,35 @@ def test_a_reset_needs_positions_that_fix_the_pose(body):
             tracker.reset(joints={"l_wrist": bad})
     with pytest.raises(BodyError, match="world_from_limb"):
         tracker.reset_pose({"torso": np.eye(4)})
+    with pytest.raises(BodyError, match="world_from_limb: expected a mapping of limbs to poses, found NoneType"):
+        tracker.reset_pose(None)
+    for bad in (2.0 * np.eye(4), np.eye(3), "upright"):
+        with pytest.raises(MeasurementError, match=r"world_from_limb\[l_calf\]: expected a rigid 4x4 transform"):
+            tracker.reset_pose(rest_pose(body) | {"l_calf": bad})
+
+
+def test_a_reset_in_millimetres_is_refused(body):
+    """It made a body of 1750 m, status tracking."""
+    tracker = voodoo.Tracker(body)
+    wanted = standing_joints(body)
+    for factor in (1000.0, 100.0, 0.001):
+        with pytest.raises(MeasurementError, match=rf"joints: expected metres, .* found {factor:.4f} times"):
+            tracker.reset(joints={name: factor * position for name, position in wanted.items()})
+    child = tracker.reset(joints={name: 0.4 * position for name, position in wanted.items()})
+    assert child.joints["l_wrist"] == pytest.approx(0.4 * wanted["l_wrist"], abs=1e-6)
+
+
+def test_before_a_reset_nothing_is_known(body):
+    estimate = voodoo.Tracker(body).estimate
+    assert estimate.status == "lost" and np.isnan(estimate.stamp) and np.isnan(estimate.residual)
+    assert not estimate.joints and not estimate.world_from_limb
+
+
+def test_a_tracker_is_not_copied(tracker):
+    """A shallow copy had the same core: stepping one moved the other."""
+    for copied in (copy.copy, copy.deepcopy):
+        with pytest.raises(TypeError, match="cannot"):
+            copied(tracker)
 
 
 def test_a_reset_reproduces_positions_and_sizes(body):

@@ -29,6 +29,10 @@ _Points = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 class _Camera(Protocol):
     @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
     def fx(self) -> float: ...
     @property
     def fy(self) -> float: ...
@@ -162,9 +166,17 @@ class TaperedEllipticCylinder:
     def closest_point(
         self, point: Sequence[float] | npt.NDArray[np.float64]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], float]:
-        """Closest surface point (3,), outward normal (3,) and signed distance of one point, all in the limb frame."""
+        """Closest surface point (3,) [m], outward normal (3,) and signed distance [m] of one point, all in the limb frame.
+
+        Raises:
+            MeasurementError: not three finite numbers.
+        """
     def closest_points(self, points: _Points) -> ClosestPoints:
-        """Closest surface points of many points (N, 3) in the limb frame, by the tracker's SIMD kernel."""
+        """Closest surface points of many points (N, 3) [m] in the limb frame, by the tracker's SIMD kernel.
+
+        Raises:
+            MeasurementError: wrong shape or dtype, or points that are not finite.
+        """
     def __eq__(self, value: object, /) -> bool: ...
     def __ne__(self, value: object, /) -> bool: ...
 
@@ -197,10 +209,11 @@ class Body:
 class Frame:
     """All measurements of one instant, from any number of sensors.
 
-    Arrays are referenced, not copied (unless they are not contiguous): leave them unchanged until the step.
+    Arrays are referenced, not copied (unless they are not contiguous): leave them unchanged until the step. Names of limbs
+    and sites, weights, finiteness and the stamp are checked by the step, which refuses the whole frame.
 
     Args:
-        stamp: time [s].
+        stamp: time [s] by any clock; every step's is after the last one's.
     """
 
     def __new__(cls, stamp: float) -> Frame: ...
@@ -224,11 +237,11 @@ class Frame:
             world_from_sensor: rigid (4, 4); identity by default.
             weight: weight of each point, above zero; a larger one costs no time.
             limb: the points are known to be on this limb.
-            on_body: the points are known to be on the body.
+            on_body: the points are known to be on the body; not needed with `limb`.
             source: name for the report in `Estimate.sources`.
 
         Raises:
-            MeasurementError: wrong shape or dtype, or no rigid transform (finiteness is checked by the step).
+            MeasurementError: wrong shape or dtype, or no rigid transform.
         """
     def add_depth(
         self,
@@ -240,10 +253,18 @@ class Frame:
         weight: float = 1.0,
         source: str = "depth",
     ) -> None:
-        """Add an organised depth image (height, width): depth along the optical axis, 0 or NaN where nothing returned.
+        """Add an organised depth image: depth along the optical axis (z, not range).
+
+        Args:
+            image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned.
+            camera: its calibration, a voodoo.Camera of the same size.
+            metres_per_unit: of the image. The default is that of uint16 in millimetres; an image in metres needs 1.0.
+            world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
+            weight: weight of each pixel, above zero; a larger one costs no time.
+            source: name for the report in `Estimate.sources`.
 
         Raises:
-            MeasurementError: wrong shape or dtype, or no rigid transform.
+            MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
         """
     def add_position(
         self,
@@ -256,8 +277,16 @@ class Frame:
     ) -> None:
         """Add the position (3,) [m] of a named site in the world (3-D point-to-point relation).
 
-        It may always be `bias` [m] off: within that distance of the site it says nothing, beyond, its force is that of the
-        rest of the distance.
+        Args:
+            site: one of `Body.site_names`.
+            position: (3,) [m].
+            weight: above zero; 20 is that of a datum good to 2.2 cm, see voodoo.sensors.model.
+            bias: it may always be so far off [m]: within that distance of the site it says nothing, beyond, its force is that
+                of the rest of the distance.
+            source: name for the report in `Estimate.sources`.
+
+        Raises:
+            MeasurementError: not three numbers.
         """
     def add_ray(
         self,
@@ -269,10 +298,27 @@ class Frame:
         bias: float = 0.0,
         source: str = "rays",
     ) -> None:
-        """Add a ray in the world on which a named site was seen (2-D point-to-line relation); `bias` [m] as in
-        `add_position`."""
+        """Add a ray in the world on which a named site was seen (2-D point-to-line relation).
+
+        Args:
+            site: one of `Body.site_names`.
+            origin: (3,) [m] where it starts, the focal point of the camera.
+            direction: (3,) where it goes, of any length.
+            weight, bias, source: as in `add_position`.
+
+        Raises:
+            MeasurementError: not three numbers.
+        """
     def set_ground(self, *, normal: Sequence[float] | npt.NDArray[np.float64], offset: float = 0.0) -> None:
-        """Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background."""
+        """Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background.
+
+        Args:
+            normal: (3,) unit vector upwards, in the world.
+            offset: height of the floor along it [m].
+
+        Raises:
+            MeasurementError: not three numbers.
+        """
 
 @final
 class Estimate:
@@ -280,7 +326,7 @@ class Estimate:
 
     @property
     def stamp(self) -> float:
-        """Time of the frame [s]; NaN after a reset."""
+        """Time of the frame [s]; NaN after a reset and before the first one."""
     @property
     def status(self) -> str:
         """tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured,
@@ -302,7 +348,7 @@ class Estimate:
         """Names of the rows of limb_poses."""
     @property
     def joint_positions(self) -> npt.NDArray[np.float64]:
-        """Positions (J, 3) [m] of all joints and sites."""
+        """Positions (J, 3) [m] of all joints and sites; J = 0 before the first reset."""
     @property
     def limb_poses(self) -> npt.NDArray[np.float64]:
         """world_from_limb (L, 4, 4) of all limbs."""

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from voodoo import _core
 from voodoo._core import TaperedEllipticCylinder
-from voodoo.errors import BodyError
+from voodoo.errors import BodyError, MeasurementError
 from voodoo.toml_text import parse_toml, read_text
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -223,6 +224,32 @@ def checked_joints(
             raise BodyError(f"{what}[{name}]: expected finite metres, found {position!r}")
         checked[name] = (x, y, z)
     return checked
+
+
+def listed_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.float64]]:
+    """Poses (4, 4) by name in the order of the body's limbs; the core checks that they are rigid.
+
+    Raises:
+        BodyError: no mapping, or a limb is missing or unknown.
+        MeasurementError: a pose that is no array of numbers; it names the limb.
+    """
+    if not isinstance(world_from_limb, Mapping):
+        raise BodyError(
+            f"world_from_limb: expected a mapping of limbs to poses, found {type(world_from_limb).__name__}"
+        )
+    names = body.limb_names
+    if set(world_from_limb) != set(names):
+        raise BodyError(
+            f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(map(str, world_from_limb))}"
+        )
+    poses = []
+    for name in names:
+        try:
+            poses.append(np.asarray(world_from_limb[name], dtype=np.float64))
+        except (TypeError, ValueError):
+            found = _short(world_from_limb[name])
+            raise MeasurementError(f"world_from_limb[{name}]: expected a rigid 4x4 transform, found {found}") from None
+    return poses
 
 
 def _problems(values: dict[str, Any], error: ValidationError) -> str:

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo import _core
-from voodoo.body import Body
+from voodoo.body import Body, listed_poses
 from voodoo.camera import Camera
-from voodoo.errors import BodyError
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,17 +53,9 @@ def render_depth(
         BodyError: a limb is missing or unknown.
         MeasurementError: a matrix is not rigid.
     """
-    if not isinstance(world_from_limb, Mapping):
-        raise BodyError(
-            f"world_from_limb: expected a mapping of limbs to poses, found {type(world_from_limb).__name__}"
-        )
-    if set(world_from_limb) != set(body.limb_names):
-        raise BodyError(
-            f"world_from_limb: expected the limbs {', '.join(body.limb_names)}, found {', '.join(world_from_limb)}"
-        )
     depth, limb = _core.render_depth(
         body.core,
-        [np.asarray(world_from_limb[name], dtype=np.float64) for name in body.limb_names],
+        listed_poses(body, world_from_limb),
         width=camera.width,
         height=camera.height,
         intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),

@@ -9,13 +9,16 @@ import numpy.typing as npt
 
 from voodoo import _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
-from voodoo.body import Body, Joint, checked_joints
+from voodoo.body import Body, Joint, checked_joints, listed_poses
 from voodoo.config import Config
 from voodoo.errors import BodyError, ConfigError
 
 
 class Tracker:
     """Follows one body through frames.
+
+    A tracker belongs to one thread at a time: while one steps, any other call to it raises RuntimeError. Different trackers
+    run side by side, since `step` releases the GIL.
 
     Args:
         body: what to track, in its initial sizes.
@@ -43,7 +46,7 @@ class Tracker:
 
     @property
     def estimate(self) -> Estimate:
-        """The last estimate."""
+        """The last estimate; before the first reset one that is lost, with NaN as its stamp and no poses."""
         return self._core.estimate
 
     def reset(self, *, joints: Mapping[str, Sequence[float]], fit_sizes: bool = True) -> Estimate:
@@ -58,23 +61,19 @@ class Tracker:
 
         Raises:
             BodyError: an unknown name, or an entry that is not three finite numbers.
-            MeasurementError: the positions do not fix the pose.
+            MeasurementError: the positions do not fix the pose, or with `fit_sizes` would make the body more than ten times
+                larger or smaller: they are not in metres. The tracker is unchanged.
         """
         return self._core._reset(checked_joints(joints), fit_sizes=fit_sizes)
 
     def reset_pose(self, world_from_limb: Mapping[str, npt.ArrayLike]) -> Estimate:
-        """Set the pose of every limb directly: limb name -> rigid (4, 4).
+        """Set the pose of every limb directly: limb name -> rigid (4, 4) world_from_limb; sizes stay as they are.
 
         Raises:
             BodyError: a limb is missing or unknown.
-            MeasurementError: a matrix is not rigid.
+            MeasurementError: a matrix is not rigid; it names the limb.
         """
-        names = self.body.limb_names
-        if set(world_from_limb) != set(names):
-            raise BodyError(
-                f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(world_from_limb)}"
-            )
-        return self._core._reset_pose([np.asarray(world_from_limb[name], dtype=np.float64) for name in names])
+        return self._core._reset_pose(listed_poses(self.body, world_from_limb))
 
     def step(self, frame: Frame) -> Estimate:
         """The pose at the frame's time. Releases the GIL; a refused frame leaves the tracker as it was.
@@ -86,19 +85,35 @@ class Tracker:
         return self._core.step(frame)
 
     def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside."""
+        """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside.
+
+        Raises:
+            MeasurementError: no pose yet, wrong shape or dtype, or points that are not finite.
+        """
         return self._core.distance(points)
 
     def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """Signed distances (limbs, N) [m] of world points (N, 3) to each limb, in the order of `Body.limb_names`."""
+        """Signed distances (limbs, N) [m] of world points (N, 3) to each limb, in the order of `Body.limb_names`.
+
+        Raises:
+            MeasurementError: as `distance`.
+        """
         return self._core.limb_distances(points)
 
     def scale(self, factor: float) -> None:
-        """Scale the whole body without losing the track."""
+        """Scale the whole body by a factor above zero without losing the track.
+
+        Raises:
+            BodyError: a factor that leaves no body.
+        """
         self._core.scale(factor)
 
     def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None:
-        """Change the dimensions of one limb without losing the track."""
+        """Change the dimensions [m] of one limb without losing the track; joints and sites on it move along with its length.
+
+        Raises:
+            BodyError: an unknown limb.
+        """
         self._core.set_shape(limb, shape)
 
     def add_limb(
@@ -118,13 +133,24 @@ class Tracker:
             shape: its surface.
             joint: where it is joined.
             sites: named points on it: name -> position [m] in the new limb's frame.
+
+        Raises:
+            BodyError: a name that is taken, an unknown parent, or numbers that make no joint.
         """
         places = list(checked_joints(sites or {}, what="sites").items())
         self._core._add_limb(name, parent, shape, joint.parts(), places)
 
     def remove_limb(self, name: str) -> None:
-        """Remove a limb, and all that hangs on it, without losing the track."""
+        """Remove a limb, and all that hangs on it, without losing the track.
+
+        Raises:
+            BodyError: an unknown limb, or the root.
+        """
         self._core.remove_limb(name)
+
+    def __copy__(self) -> Tracker:
+        """Refused: a copy that shares the state would be stepped along with this one."""
+        raise TypeError("a tracker cannot be copied: make another with Tracker(tracker.body), and reset_pose")
 
     def __repr__(self) -> str:
         """Body, limbs and last estimate."""

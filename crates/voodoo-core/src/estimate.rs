@@ -41,9 +41,9 @@ pub struct SourceReport {
 }
 
 /// Pose and quality of one frame. World frame, metres, seconds.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Time of the frame.
+    /// Time of the frame; NaN after a reset and before the first one.
     pub stamp: f64,
     /// How much it can be relied on.
     pub status: Status,
@@ -65,4 +65,23 @@ pub struct Estimate {
     pub joint_gaps: Vec<f64>,
     /// What each source gave.
     pub sources: Vec<SourceReport>,
+}
+
+impl Default for Estimate {
+    /// Of a tracker without a pose: lost, nothing measured.
+    fn default() -> Self {
+        Self {
+            stamp: f64::NAN,
+            status: Status::default(),
+            limb_status: Vec::new(),
+            world_from_limb: Vec::new(),
+            sites: Vec::new(),
+            mean_squared_distance: f64::NAN,
+            steps: 0,
+            limb_points: Vec::new(),
+            limb_residual: Vec::new(),
+            joint_gaps: Vec::new(),
+            sources: Vec::new(),
+        }
+    }
 }

@@ -219,7 +219,7 @@ impl<'a> Frame<'a> {
                 PointSlice::F64(points) => points.iter().position(|p| !p.iter().all(|value| value.is_finite())),
             };
             if let Some(row) = bad {
-                let found = format!("{:?} in row {row}", cloud.points.get(row));
+                let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
                 return Err(TrackError::measurement(what("points"), "finite metres", found));
             }
         }
@@ -244,14 +244,15 @@ impl<'a> Frame<'a> {
                 return Err(TrackError::measurement(
                     what("direction"),
                     "a vector that is not zero",
-                    format!("{:?}", relation.direction),
+                    format!("{:?}", relation.direction.to_array()),
                 ));
             }
         }
         if let Some(ground) = self.ground
             && (!ground.offset.is_finite() || !ground.normal.is_normalized())
         {
-            return Err(TrackError::measurement("ground", "a unit normal and a finite offset", format!("{ground:?}")));
+            let found = format!("normal {:?} and offset {}", ground.normal.to_array(), ground.offset);
+            return Err(TrackError::measurement("ground", "a unit normal and a finite offset", found));
         }
         Ok(())
     }
@@ -311,7 +312,7 @@ fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), Track
     if vector.is_finite() {
         Ok(())
     } else {
-        Err(TrackError::measurement(what(), "finite metres", format!("{vector:?}")))
+        Err(TrackError::measurement(what(), "finite metres", format!("{:?}", vector.to_array())))
     }
 }
 

@@ -132,6 +132,8 @@ fn bad_sites_and_floors_are_refused() {
 fn a_tracker_without_a_pose_refuses_every_frame() {
     let mut tracker = Tracker::new(Body::human(1.75, HumanModel::Papers).unwrap(), Config::default()).unwrap();
     assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+    // No residual of zero before anything was measured.
+    assert!(tracker.estimate().stamp.is_nan() && tracker.estimate().mean_squared_distance.is_nan());
 }
 
 #[test]
@@ -145,11 +147,17 @@ fn a_refused_reset_changes_nothing() {
     assert!(matches!(tracker.reset(&line, true), Err(TrackError::Underdetermined(_))));
     assert!(tracker.reset(&[(99, Vec3::ZERO)], true).unwrap_err().to_string().contains("99"));
     assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
+    let millimetres: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();
+    assert!(tracker.reset(&millimetres, true).unwrap_err().to_string().contains("found 1000.0000 times"));
     assert!(tracker.reset_pose(&[Pose::identity()]).unwrap_err().to_string().contains("10 limbs"));
     assert!(tracker.scale(0.0).is_err() && tracker.scale(f64::NAN).is_err());
     assert!(tracker.remove_limb("torso").is_err() && tracker.remove_limb("tail").is_err());
     assert_eq!(tracker.body(), &body);
     assert_eq!(scene::bits(tracker.estimate()), before);
+}
+
+fn sites_of(tracker: &Tracker) -> Vec<(usize, Vec3)> {
+    tracker.estimate().sites.iter().copied().enumerate().collect()
 }
 
 fn limb(name: &str, parent: Option<usize>) -> Limb {

@@ -2,6 +2,8 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use voodoo_core::Body;
+use voodoo_core::body::Limb;
 use voodoo_core::frame::PointSlice;
 use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
 
@@ -20,7 +22,7 @@ pub enum PointView<'py> {
 }
 
 impl PointArray {
-    /// Takes an `(N, 3)` array of float32 or float64; copies only what is not contiguous.
+    /// Takes an `(N, 3)` array of float32 or float64; copies only what is not contiguous and aligned.
     pub fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = value.py();
         let wrong = || {
@@ -68,10 +70,11 @@ impl PointView<'_> {
 /// The same array, C-contiguous and aligned.
 pub fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let array = value.cast::<PyUntypedArray>()?;
-    if array.is_c_contiguous() {
+    if array.is_c_contiguous() && value.getattr("flags")?.getattr("aligned")?.is_truthy()? {
         return Ok(value.clone());
     }
-    value.py().import("numpy")?.call_method1("ascontiguousarray", (value,))
+    let (py, wanted) = (value.py(), ["C", "A", "E"]);
+    py.import("numpy")?.call_method1("require", (value, py.None(), wanted))
 }
 
 /// A vector from anything with three numbers.
@@ -103,6 +106,15 @@ pub fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
         return Err(wrong());
     }
     Ok(Pose::from_parts(translation, Quat::from_mat3(&rotation).normalize()))
+}
+
+/// Poses of all limbs of a body, in their order; one that is not rigid is named by its limb.
+pub fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose>> {
+    let named = |(index, value): (usize, &Bound<'_, PyAny>)| {
+        let name = body.limbs().get(index).map_or("?", |limb: &Limb| limb.name.as_str());
+        pose(&format!("world_from_limb[{name}]"), Some(value))
+    };
+    values.iter().enumerate().map(named).collect()
 }
 
 /// The rows of a pose's 4x4 matrix.

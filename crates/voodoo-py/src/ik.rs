@@ -9,7 +9,7 @@ use voodoo_core::ik::{
     self, Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Segment, Solver, Trunk,
 };
 
-use crate::arrays::{frozen, matrix, pose};
+use crate::arrays::{frozen, limb_poses, matrix, pose};
 use crate::body::PyBody;
 use crate::errors::{IntoPy, exception};
 
@@ -144,10 +144,6 @@ impl PyChain {
         Ok(found)
     }
 
-    fn poses_of(&self, world_from_limb: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose>> {
-        world_from_limb.iter().map(|value| pose("world_from_limb", Some(value))).collect()
-    }
-
     fn checked(&self, py: Python<'_>, angles: &[f64]) -> PyResult<()> {
         if angles.len() == self.model.freedoms() && angles.iter().all(|angle| angle.is_finite()) {
             return Ok(());
@@ -266,7 +262,7 @@ impl PyChain {
         world_from_limb: Vec<Bound<'_, PyAny>>,
         closest: bool,
     ) -> PyResult<Vec<f64>> {
-        let (base, poses) = (pose("world_from_base", Some(base))?, self.poses_of(&world_from_limb)?);
+        let (base, poses) = (pose("world_from_base", Some(base))?, limb_poses(&self.body, &world_from_limb)?);
         let mut angles = Vec::new();
         if closest {
             ik::project(&self.body, &self.model, &base, &poses, &mut angles);

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods}
 use pyo3::prelude::*;
 use voodoo_core::render::{Rendering, Viewpoint};
 
-use crate::arrays::{contiguous, pose};
+use crate::arrays::{contiguous, limb_poses, pose};
 use crate::body::PyBody;
 use crate::errors::{IntoPy, wrong_argument};
 
@@ -24,8 +24,7 @@ pub fn render_depth<'py>(
     rays: Option<&Bound<'py, PyAny>>,
     world_from_sensor: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Images<'py>> {
-    let poses =
-        world_from_limb.iter().map(|value| pose("world_from_limb", Some(value))).collect::<PyResult<Vec<_>>>()?;
+    let poses = limb_poses(&body.0, &world_from_limb)?;
     let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
     let rays = match rays {
         Some(rays) => {

@@ -6,10 +6,10 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::geometry::{Pose, Vec3};
+use voodoo_core::geometry::Vec3;
 use voodoo_core::{Frame, Tracker};
 
-use crate::arrays::{PointArray, pose, vector};
+use crate::arrays::{PointArray, limb_poses, vector};
 use crate::body::{JointParts, PyBody, joint};
 use crate::config::config;
 use crate::errors::IntoPy;
@@ -74,10 +74,7 @@ impl PyTracker {
     }
 
     fn _reset_pose(&mut self, py: Python<'_>, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
-        let poses = world_from_limb
-            .iter()
-            .map(|value| pose("world_from_limb", Some(value)))
-            .collect::<PyResult<Vec<Pose>>>()?;
+        let poses = limb_poses(self.tracker.body(), &world_from_limb)?;
         self.tracker.reset_pose(&poses).map_err(|error| error.into_py(py))?;
         self.sources.clear();
         Ok(self.snapshot())

@@ -8,6 +8,8 @@ use crate::rigid::Moments;
 
 /// A hinge bent by less than this does not tell its axis; radians.
 const BENT: f64 = 0.3;
+/// Nobody means a body so many times larger or smaller than the one that was given: the positions are not in metres.
+const LARGEST: f64 = 10.0;
 /// A landmark this share of a limb's length from its joint shows where the limb points.
 const FAR_END: f64 = 0.5;
 /// A joint whose every range is narrower than this (radians) belongs to the trunk: spine and neck, not shoulder and hip.
@@ -28,7 +30,7 @@ impl Body {
     /// Any subset of sites will do that holds three positions which do not lie on a line. Limbs about which the positions
     /// say nothing keep their rest orientation to their parent. With `fit_sizes` the body is scaled as a whole by the
     /// distances between known landmarks of the same limb, then every limb is stretched and its landmarks put where they
-    /// were measured.
+    /// were measured. Positions that make it more than ten times larger or smaller are refused.
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         for (site, position) in positions {
             if !position.is_finite() {
@@ -43,6 +45,13 @@ impl Body {
         let scale = if fit_sizes { self.scale_to(positions) } else { 1.0 };
         let mut body = self.scaled(scale)?;
         let world_from_rest = body.overall_orientation(positions)?;
+        if !(1.0 / LARGEST..=LARGEST).contains(&scale) {
+            return Err(TrackError::measurement(
+                "joints",
+                "metres, between a tenth and ten times the body's own distances",
+                format!("{scale:.4} times"),
+            ));
+        }
         let rest = body.rest_pose(Pose::identity());
         let mut poses: Vec<Pose> = Vec::with_capacity(rest.len());
         for limb in 0..rest.len() {
