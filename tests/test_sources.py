@@ -271,7 +271,8 @@ def test_what_is_out_of_a_cameras_range_is_not_used():
     assert counts[7.5] > 500 and counts[1.0] == 0
 
 
-def test_the_examples_of_the_documentation_run(capsys):
+def test_the_examples_of_the_documentation_run(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     text = (Path(__file__).parents[1] / "docs" / "sensors.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     chosen = [block for block in blocks if "front_end.step" in block or "estimate.sources" in block]
@@ -281,6 +282,9 @@ def test_the_examples_of_the_documentation_run(capsys):
     for block in (block for block in chosen if "Viewer" not in block):
         exec(block, names)
     assert "matched" in capsys.readouterr().out.splitlines()[-1]
+    (results,) = [block for block in blocks if "write_bag" in block]
+    exec(results, names | {"estimates": [names["estimate"]]})
+    assert {path.name for path in tmp_path.iterdir()} == {"pose.npz", "pose.bvh", "pose_bag"}
 
 
 def test_a_colour_camera_alone_begins():

@@ -38,8 +38,8 @@ class Pose2SimRecording(Recording):
     """A folder of Pose2Sim::
 
         Calib_*.toml                     cameras, see read_camera_toml; world Z up, metres
-        keypoints/cam01_json/*.json      OpenPose files, one an image, sorted by name; or pose/cam01_json as Pose2Sim
-        has it *.trc                            optional: triangulated joints, Y up
+        keypoints/cam01_json/*.json      OpenPose files, one an image, sorted by name; or pose/cam01_json as Pose2Sim has it
+        *.trc                            optional: triangulated joints, Y up
 
     Cameras and keypoint folders belong together in the order of their names. There is one frame for each image
     number; it holds the keypoints of all cameras. Stamps are k / rate. The reference, and the start, are the .trc

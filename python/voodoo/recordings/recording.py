@@ -47,9 +47,8 @@ class Reference:
 
 @dataclass(frozen=True)
 class SensorInfo:
-    """One source of measurements: topic or folder, kind ("depth", "points", "scan", "color", "keypoints",
-    "markers"), frame id, number of
-    messages, mean rate [Hz] (NaN with less than two messages) and a word on the format."""
+    """One source of measurements: topic or folder, kind ("depth", "points", "scan", "color", "keypoints", "markers"), frame
+    id, number of messages, mean rate [Hz] (NaN with less than two messages) and a word on the format."""
 
     name: str
     kind: str
