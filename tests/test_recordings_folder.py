@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+import voodoo
 from voodoo.errors import RecordingError
 from voodoo.recordings import ColorImage, DepthImage, open_recording
 
@@ -74,6 +75,18 @@ def test_colour_without_calibration_is_left_out_and_said_so(folder):
     add_color(folder)
     (folder / "calibration.toml").write_text(CALIBRATION)
     assert "no [color] table" in str(open_recording(folder).info())
+
+
+@pytest.mark.parametrize("digits", [3, 4, 9])
+def test_a_rotation_typed_with_few_digits_is_made_one(folder, digits):
+    """The file was read and every frame refused."""
+    pose = np.eye(4)
+    pose[:3, :3], _ = cv2.Rodrigues(np.array([0.4, -1.2, 0.9]))
+    typed = np.round(pose, digits)
+    (folder / "calibration.toml").write_text(f"{CALIBRATION}root_from_sensor = {typed.tolist()}\n")
+    depth = next(iter(open_recording(folder))).measurements[0]
+    voodoo.Frame(stamp=0.0).add_depth(depth.image, camera=depth.camera, world_from_sensor=depth.root_from_sensor)
+    np.testing.assert_allclose(depth.root_from_sensor, pose, atol=10.0**-digits)
 
 
 def test_the_calibration_file_says_where_the_camera_is(folder):

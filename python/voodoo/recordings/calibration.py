@@ -15,6 +15,8 @@ from voodoo.toml_text import parse_toml, read_text
 
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
+_ROUNDING, _TYPED = 1e-9, 2e-3
+"""How far from a rotation a matrix may be: by rounding of doubles, and typed with three digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +104,14 @@ def _pose(rows: object, where: str) -> FloatArray:
     rigid = (
         pose.shape == (4, 4)
         and np.isfinite(pose).all()
-        and np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-3)
+        and np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=_TYPED)
         and np.linalg.det(pose[:3, :3]) > 0.0
         and np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0))
     )
     if not rigid:
         raise RecordingError(f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {rows!r}")
+    # Typed with three or four digits it is near a rotation, not one; the tracker wants one.
+    if not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), rtol=0.0, atol=_ROUNDING):
+        u, _, v = np.linalg.svd(pose[:3, :3])
+        pose[:3, :3] = u @ v
     return pose
