@@ -273,7 +273,7 @@ def test_the_body_changes_between_frames(tracker, cloud):
     longer = voodoo.TaperedEllipticCylinder(forearm.length * 1.1, forearm.a0, forearm.b0, forearm.a1, forearm.b1)
     tracker.set_shape("l_forearm", longer)
     held = voodoo.TaperedEllipticCylinder(0.3, 0.1, 0.1, 0.1, 0.1)
-    joint = voodoo.Joint(name="grip", on_parent={"position": (0, 0, longer.length)}, semi_axes=(0.05, 0.05))
+    joint = voodoo.Joint(name="grip", on_parent=voodoo.Place(position=(0, 0, longer.length)), semi_axes=(0.05, 0.05))
     tracker.add_limb("box", parent="l_forearm", shape=held, joint=joint, sites={"box_end": (0, 0, 0.3)})
     assert tracker.step(frame_of(cloud, stamp=1.0)).joints["box_end"].shape == (3,)
     with pytest.raises(BodyError, match="box"):

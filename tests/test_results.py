@@ -100,6 +100,11 @@ def test_a_path_may_be_a_string(tmp_path, suffix):
     assert len(Track.load(str(tmp_path / f"pose{suffix}"))) == 2
 
 
+def test_a_file_that_is_not_there_is_no_damage(tmp_path):
+    with pytest.raises(VoodooError, match=r"pose\.csv: expected a result of voodoo track, found no such file$"):
+        Track.load(tmp_path / "pose.csv")
+
+
 def test_other_suffixes_are_refused(tmp_path):
     with pytest.raises(VoodooError, match=r"\.csv or \.npz, found '\.txt'"):
         Track.of(list(estimates(1))).save(tmp_path / "pose.txt")

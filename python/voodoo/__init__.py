@@ -2,7 +2,7 @@
 
 from voodoo import ik
 from voodoo._core import ClosestPoints, Estimate, Frame, TaperedEllipticCylinder, __version__
-from voodoo.body import Body, Joint, Limb
+from voodoo.body import Body, Joint, Limb, Place
 from voodoo.camera import Camera
 from voodoo.config import Config
 from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
@@ -23,6 +23,7 @@ __all__ = [
     "Joint",
     "Limb",
     "MeasurementError",
+    "Place",
     "RecordingError",
     "RenderedDepth",
     "TaperedEllipticCylinder",

@@ -36,7 +36,9 @@ class _ShapeSpec(_Strict):
     b1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
-class _PlaceSpec(_Strict):
+class Place(_Strict):
+    """Where a joint's ellipse is on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame."""
+
     position: _Vector = _ZERO
     rotation: _Vector = _ZERO
 
@@ -46,8 +48,8 @@ class Joint(_Strict):
 
     Attributes:
         name: usually that of the site at its centre.
-        on_parent: position [m] and rotation vector [rad] of the joint's ellipse in the parent's frame.
-        on_limb: the same in the limb's own frame.
+        on_parent: the joint's ellipse in the parent's frame, e.g. `voodoo.Place(position=(0.0, 0.0, 0.2))`.
+        on_limb: the same in the limb's own frame; with the joint at rest the two coincide.
         semi_axes: semi-axes of the ellipse along the joint frame's x and y [m]: (0, 0) universal, one positive: hinge
             about that axis, both positive: elliptic.
         weight: strength relative to the other joints of a limb.
@@ -56,8 +58,8 @@ class Joint(_Strict):
     """
 
     name: str
-    on_parent: _PlaceSpec = _PlaceSpec()
-    on_limb: _PlaceSpec = _PlaceSpec()
+    on_parent: Place = Place()
+    on_limb: Place = Place()
     semi_axes: tuple[_Number, _Number] = (0.0, 0.0)
     weight: _Number = 1.0
     limits: tuple[_Range, _Range, _Range] | None = None

@@ -48,6 +48,8 @@ def reading(source: object, expected: str) -> Iterator[None]:
         yield
     except VoodooError:
         raise
+    except FileNotFoundError:
+        raise RecordingError(f"{source}: expected {expected}, found no such file") from None
     except Exception as error:
         found = str(error).strip() or "no further detail"
         raise RecordingError(f"{source}: expected {expected}, found damage: {type(error).__name__}: {found}") from error
