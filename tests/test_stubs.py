@@ -1,11 +1,15 @@
 """The package as type checkers and linters see it."""
 
+import ast
 import importlib.util
+import inspect
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+import voodoo
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -20,6 +24,18 @@ def run(module, *arguments):
 
 def test_the_stub_agrees_with_the_compiled_module():
     run("mypy.stubtest", "voodoo._core")
+
+
+@pytest.mark.parametrize("name", ["Frame", "Estimate", "TaperedEllipticCylinder", "ClosestPoints"])
+def test_help_says_what_the_stub_says(name):
+    """Editors read the stub, `help()` and notebooks the compiled module."""
+    stub = ast.parse((ROOT / "python" / "voodoo" / "_core.pyi").read_text(encoding="utf-8"))
+    (described,) = [node for node in stub.body if isinstance(node, ast.ClassDef) and node.name == name]
+    compiled = getattr(voodoo, name)
+    assert inspect.getdoc(compiled) == ast.get_docstring(described)
+    for entry in described.body:
+        if isinstance(entry, ast.FunctionDef) and ast.get_docstring(entry):
+            assert inspect.getdoc(getattr(compiled, entry.name)) == ast.get_docstring(entry), entry.name
 
 
 def test_the_package_is_typed_throughout():

@@ -28,6 +28,7 @@ impl Names {
     }
 }
 
+/// What a step found; immutable. World frame, metres, seconds.
 #[pyclass(name = "Estimate", module = "voodoo", frozen)]
 pub struct PyEstimate {
     pub estimate: Estimate,
@@ -66,58 +67,72 @@ fn limb_status_word(status: LimbStatus) -> &'static str {
 
 #[pymethods]
 impl PyEstimate {
+    /// Time of the frame [s]; NaN after a reset and before the first one.
     #[getter]
     fn stamp(&self) -> f64 {
         self.estimate.stamp
     }
 
+    /// tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured,
+    /// or what is seen there is flat).
     #[getter]
     fn status(&self) -> &'static str {
         status_word(self.estimate.status)
     }
 
+    /// What the frame says about every limb: "measured", "inferred" (hidden, out of view, or nothing seen that another
+    /// limb would not explain as well: carried by joints and prediction) or "lost" (it should show where it is, and does
+    /// not).
     #[getter]
     fn limb_status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
         mapping(py, self.names.limbs.iter().zip(self.estimate.limb_status.iter().copied().map(limb_status_word)))
     }
 
+    /// ICP steps used.
     #[getter]
     fn steps(&self) -> usize {
         self.estimate.steps
     }
 
+    /// Weighted mean of the squared distances of all measurements to the final pose [m^2]; NaN without any.
     #[getter]
     fn mean_squared_distance(&self) -> f64 {
         self.estimate.mean_squared_distance
     }
 
+    /// Root of the mean squared distance [m].
     #[getter]
     fn residual(&self) -> f64 {
         self.estimate.mean_squared_distance.sqrt()
     }
 
+    /// Names of the rows of joint_positions.
     #[getter]
     fn joint_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.names.sites)
     }
 
+    /// Names of the rows of limb_poses.
     #[getter]
     fn limb_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.names.limbs)
     }
 
+    /// Positions (J, 3) [m] of all joints and sites; J = 0 before the first reset.
     #[getter]
     fn joint_positions<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let sites = &self.estimate.sites;
         frozen(py, sites.iter().flat_map(Vec3::to_array).collect(), &[sites.len(), 3])
     }
 
+    /// world_from_limb (L, 4, 4) of all limbs.
     #[getter]
     fn limb_poses<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let poses = &self.estimate.world_from_limb;
         frozen(py, poses.iter().flat_map(|pose| matrix(pose).into_iter().flatten()).collect(), &[poses.len(), 4, 4])
     }
 
+    /// Position (3,) [m] of every named joint and site.
     #[getter]
     fn joints<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let (py, this) = (slf.py(), slf.get());
@@ -128,6 +143,7 @@ impl PyEstimate {
         Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
+    /// Pose (4, 4) of every limb.
     #[getter]
     fn world_from_limb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let (py, this) = (slf.py(), slf.get());
@@ -138,18 +154,21 @@ impl PyEstimate {
         Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
+    /// Matched points of every limb.
     #[getter]
     fn limb_points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
         mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_points.iter().copied()))
     }
 
+    /// Root of the mean squared distance of every limb's points [m]; NaN without any.
     #[getter]
     fn limb_residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
         mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_residual.iter().copied()))
     }
 
+    /// Distance between the two halves of every joint [m].
     #[getter]
     fn joint_gaps<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
@@ -157,7 +176,7 @@ impl PyEstimate {
         mapping(slf.py(), gaps.filter_map(|(name, gap)| Some((name.as_ref()?, *gap))))
     }
 
-    /// Source name -> (count, inliers, residual in metres).
+    /// What each source gave: candidates, those that matched, root of their mean squared distance [m].
     #[getter]
     fn sources<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();

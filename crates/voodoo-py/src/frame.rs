@@ -50,8 +50,16 @@ struct SiteData {
     source: u16,
 }
 
+/// All measurements of one instant, from any number of sensors.
+///
+/// Arrays are referenced, not copied (unless they are not contiguous): leave them unchanged until the step. Names of limbs
+/// and sites, weights, finiteness and the stamp are checked by the step, which refuses the whole frame.
+///
+/// Args:
+///     stamp: time [s] by any clock; every step's is after the last one's.
 #[pyclass(name = "Frame", module = "voodoo")]
 pub struct PyFrame {
+    /// Time [s].
     #[pyo3(get)]
     pub stamp: f64,
     clouds: Vec<CloudData>,
@@ -187,6 +195,18 @@ impl PyFrame {
         Self { stamp, clouds: Vec::new(), images: Vec::new(), sites: Vec::new(), ground: None, sources: Vec::new() }
     }
 
+    /// Add 3-D points (N, 3) [m] in the sensor's frame (K06 IV-A, first three kinds).
+    ///
+    /// Args:
+    ///     points: float32 or float64, finite.
+    ///     world_from_sensor: rigid (4, 4); identity by default.
+    ///     weight: weight of each point, above zero; a larger one costs no time.
+    ///     limb: the points are known to be on this limb.
+    ///     on_body: the points are known to be on the body; not needed with `limb`.
+    ///     source: name for the report in `Estimate.sources`.
+    ///
+    /// Raises:
+    ///     MeasurementError: wrong shape or dtype, or no rigid transform.
     #[pyo3(signature = (points, *, world_from_sensor=None, weight=1.0, limb=None, on_body=false, source="points"))]
     fn add_points(
         &mut self,
@@ -209,6 +229,18 @@ impl PyFrame {
         Ok(())
     }
 
+    /// Add an organised depth image: depth along the optical axis (z, not range).
+    ///
+    /// Args:
+    ///     image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned.
+    ///     camera: its calibration, a voodoo.Camera of the same size.
+    ///     metres_per_unit: of the image. The default is that of uint16 in millimetres; an image in metres needs 1.0.
+    ///     world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
+    ///     weight: weight of each pixel, above zero; a larger one costs no time.
+    ///     source: name for the report in `Estimate.sources`.
+    ///
+    /// Raises:
+    ///     MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
     #[pyo3(signature = (image, *, camera, metres_per_unit=0.001, world_from_sensor=None, weight=1.0, source="depth"))]
     fn add_depth(
         &mut self,
@@ -272,6 +304,18 @@ impl PyFrame {
         Ok(())
     }
 
+    /// Add the position (3,) [m] of a named site in the world (3-D point-to-point relation).
+    ///
+    /// Args:
+    ///     site: one of `Body.site_names`.
+    ///     position: (3,) [m].
+    ///     weight: above zero; 20 is that of a datum good to 2.2 cm, see voodoo.sensors.model.
+    ///     bias: it may always be so far off [m]: within that distance of the site it says nothing, beyond, its force is that
+    ///         of the rest of the distance.
+    ///     source: name for the report in `Estimate.sources`.
+    ///
+    /// Raises:
+    ///     MeasurementError: not three numbers.
     #[pyo3(signature = (site, position, *, weight=1.0, bias=0.0, source="positions"))]
     fn add_position(
         &mut self,
@@ -293,6 +337,16 @@ impl PyFrame {
         Ok(())
     }
 
+    /// Add a ray in the world on which a named site was seen (2-D point-to-line relation).
+    ///
+    /// Args:
+    ///     site: one of `Body.site_names`.
+    ///     origin: (3,) [m] where it starts, the focal point of the camera.
+    ///     direction: (3,) where it goes, of any length.
+    ///     weight, bias, source: as in `add_position`.
+    ///
+    /// Raises:
+    ///     MeasurementError: not three numbers.
     #[pyo3(signature = (site, *, origin, direction, weight=1.0, bias=0.0, source="rays"))]
     fn add_ray(
         &mut self,
@@ -315,6 +369,14 @@ impl PyFrame {
         Ok(())
     }
 
+    /// Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background.
+    ///
+    /// Args:
+    ///     normal: (3,) unit vector upwards, in the world.
+    ///     offset: height of the floor along it [m].
+    ///
+    /// Raises:
+    ///     MeasurementError: not three numbers.
     #[pyo3(signature = (*, normal, offset=0.0))]
     fn set_ground(&mut self, normal: &Bound<'_, PyAny>, offset: f64) -> PyResult<()> {
         self.ground = Some(Ground { normal: vector("normal", normal)?, offset });
