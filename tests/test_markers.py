@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import voodoo
+from voodoo.cli import app
 from voodoo.errors import BodyError, MeasurementError, RecordingError
 from voodoo.markers import Z_UP_FROM_Y_UP, add_markers, body_with_markers, marker_offset, read_markers, read_trc
 from voodoo.recordings.marker_files import MarkerMap
@@ -100,6 +102,17 @@ def test_add_markers_leaves_out_what_is_missing(tmp_path):
     assert add_markers(voodoo.Frame(stamp=0.0), markers, 1, sites=sites, weight=1.0) == ("l_wrist", "r_wrist")
     with pytest.raises(MeasurementError, match="0 to 1"):
         add_markers(voodoo.Frame(stamp=0.0), markers, 2, sites=sites, weight=1.0)
+
+
+def test_a_result_does_not_overwrite_what_is_read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("walk.trc", "other.trc"):
+        Path(name).write_text(TRC)
+    Path("again.trc").symlink_to("walk.trc")
+    for arguments in (["walk.trc"], ["again.trc"], ["other.trc", "--with", "walk.trc"]):
+        result = CliRunner().invoke(app, ["track", *arguments, "--out", "walk.trc"])
+        assert result.exit_code == 1 and "walk.trc: expected another file than what is read" in result.stderr
+        assert Path("walk.trc").read_text() == TRC
 
 
 def test_the_documented_marker_map_fits_the_default_human(tmp_path):

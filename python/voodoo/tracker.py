@@ -18,7 +18,8 @@ class Tracker:
     """Follows one body through frames.
 
     A tracker belongs to one thread at a time: while one steps, any other call to it raises RuntimeError. Different trackers
-    run side by side, since `step` releases the GIL.
+    run side by side, since `step` releases the GIL. One with several threads of its own (`Config.threads`) is made in the
+    process that steps it: its threads do not survive a fork, and a step after one would wait for them for ever.
 
     Args:
         body: what to track, in its initial sizes.

@@ -85,7 +85,7 @@ def ik_command(
         source = opened(recording, loader, frame, **topics_of(topic))
         written = out or [Path(f"{source.name}_ik.csv")]
         for file in written:
-            check_target(file)
+            check_target(file, inputs=(recording,) if targets is None else (recording, targets))
         positions = Positions.of(source, None if targets is None else Track.load(targets))
         tracker = start_tracker(
             source,

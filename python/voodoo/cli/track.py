@@ -130,7 +130,7 @@ def track_command(
         )
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
-            check_target(target)
+            check_target(target, inputs=(recording, *(with_ or ())))
         tracker = start_tracker(
             source,
             init=None if init is None else Init.load(init),

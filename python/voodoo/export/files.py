@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from voodoo.body import Body
@@ -17,12 +18,18 @@ FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
 """Suffixes; a path without one is a ROS 2 bag folder."""
 
 
-def check_target(path: Path) -> None:
-    """Refuse a path that cannot be written to, before the work.
+def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
+    """Refuse a path that cannot or shall not be written to, before the work.
+
+    Args:
+        path: see FORMATS.
+        inputs: what is read, and not overwritten: markers and bags are recordings and results.
 
     Raises:
-        VoodooError: another suffix, or a bag folder that exists.
+        VoodooError: another suffix, a bag folder that exists, or one of the inputs.
     """
+    if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
+        raise VoodooError(f"{path}: expected another file than what is read, found the same")
     if path.suffix not in FORMATS and not _is_folder(path):
         raise VoodooError(
             f"{path}: expected a name that ends in {', '.join(FORMATS)}, or a new folder for a ROS 2 bag, found "
