@@ -70,6 +70,23 @@ proptest! {
     }
 
     #[test]
+    fn a_fit_is_the_same_anywhere_on_a_map(seed: u64, east in 1e5..9e5_f64, north in 0.0..1e7_f64) {
+        let mut noise = scene::Noise(seed);
+        let truth = Body::human(1.6, HumanModel::Full).unwrap();
+        let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
+        let wanted = sites(&truth, &scene::bent(&truth, root, 0.5, &mut noise));
+        let away = Vec3::new(east, north, 100.0);
+        let named = |shift: Vec3| wanted.iter().map(|place| *place + shift).enumerate().collect::<Vec<_>>();
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let (here, poses) = body.fit(&named(Vec3::ZERO), true).unwrap();
+        let (there, mut moved) = body.fit(&named(away), true).unwrap();
+        for pose in &mut moved {
+            pose.translation -= away;
+        }
+        prop_assert!(largest_distance(&sites(&there, &moved), &sites(&here, &poses)) < 1e-5);
+    }
+
+    #[test]
     fn a_fit_puts_shoulders_on_clavicles(seed: u64, stature in 1.2..2.1_f64, rise in 0.0..0.5_f64) {
         let mut noise = scene::Noise(seed);
         let truth = Body::human(stature, HumanModel::Full).unwrap();

@@ -197,6 +197,8 @@ impl PyFrame {
 
     /// Add 3-D points (N, 3) [m] in the sensor's frame (K06 IV-A, first three kinds).
     ///
+    /// Far from the world's origin (map coordinates) float32 has no digits left for a body: give points in the sensor's frame.
+    ///
     /// Args:
     ///     points: float32 or float64, finite.
     ///     world_from_sensor: rigid (4, 4); identity by default.

@@ -8,6 +8,8 @@ use crate::rigid::Moments;
 
 /// A hinge bent by less than this does not tell its axis; radians.
 const BENT: f64 = 0.3;
+/// Squares of coordinates up to these metres leave enough digits for a body; those of a map (UTM) do not.
+const NEAR: f64 = 1e4;
 /// Nobody means a body so many times larger or smaller than the one that was given: the positions are not in metres.
 const LARGEST: f64 = 10.0;
 /// A landmark this share of a limb's length from its joint shows where the limb points.
@@ -42,6 +44,21 @@ impl Body {
                 ));
             }
         }
+        let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
+        if farthest <= NEAR {
+            return self.fit_near(positions, fit_sizes);
+        }
+        let origin = positions[0].1;
+        let near: Vec<_> = positions.iter().map(|(site, position)| (*site, *position - origin)).collect();
+        let (body, mut poses) = self.fit_near(&near, fit_sizes)?;
+        for pose in &mut poses {
+            pose.translation += origin;
+        }
+        Ok((body, poses))
+    }
+
+    /// `fit` in a frame in which the body is near.
+    fn fit_near(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         let scale = if fit_sizes { self.scale_to(positions) } else { 1.0 };
         let mut body = self.scaled(scale)?;
         let world_from_rest = body.overall_orientation(positions)?;
