@@ -235,7 +235,7 @@ config! {
     max_limb_points: usize = 1000, "", 1 ..= 1000000;
     /// A point farther than this from its limb's surface is not matched (K06 IV-B.4; limbwise solver).
     max_distance: f64 = 0.15, "m", 0.001 ..= 10.0;
-    /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7).
+    /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7; limbwise solver).
     band_ratio: f64 = 0.5, "", 0.0 ..= 100.0;
     /// Standard deviation of the length of an elastic band (tree solver).
     band_sigma: f64 = 0.003, "m", 0.00001 ..= 1.0;
@@ -246,15 +246,15 @@ config! {
     slide: f64 = 0.07, "", 0.0 ..= 1.0;
     /// Greatest distance of a matched point in the first step of a frame, for the whole-body solvers; it narrows.
     gate_start: f64 = 0.30, "m", 0.001 ..= 10.0;
-    /// Greatest distance of a matched point once narrowed.
+    /// Greatest distance of a matched point once narrowed, for the whole-body solvers.
     gate_end: f64 = 0.12, "m", 0.001 ..= 10.0;
     /// Scale of the robust kernel in the first step of a frame; it narrows from step to step.
     kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
-    /// Scale at which the robust kernel stops narrowing.
+    /// Scale at which the robust kernel stops narrowing, for the whole-body solvers.
     kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
     /// Standard deviation of an edge of the outline, for the whole-body solvers.
     outline_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
-    /// Share of the last motion that is expected to go on (0: the body is expected to stand still).
+    /// Share of the last motion that is expected to go on (0: the body is expected to stand still; whole-body solvers).
     prediction: f64 = 0.6, "", 0.0 ..= 1.0;
     /// Standard deviation of the root's unexpected turn in 1/30 s.
     root_turn_sigma: f64 = 0.12, "rad", 0.0001 ..= 10.0;
@@ -264,13 +264,13 @@ config! {
     /// Smaller is smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// A motion that hardly differs from the expected one is held tighter by this factor of information, as noise; 0: as any
-    /// other. Greater is calmer at rest and later in slow turns.
+    /// other. Greater is calmer at rest and later in slow turns (whole-body solvers).
     calm: f64 = 30.0, "", 0.0 ..= 10000.0;
-    /// Try other configurations of arms and legs where the frame speaks against the current ones.
+    /// Try other configurations of arms and legs where the frame speaks against the current ones (whole-body solvers).
     hypotheses: bool = true, "";
     /// Look for a lost body in everything that is not background (whole-body solvers).
     recovery: bool = true, "";
-    /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame.
+    /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body solvers).
     outline: bool = true, "";
     /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).
     facing: bool = true, "";
