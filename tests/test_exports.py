@@ -214,3 +214,14 @@ def test_a_folder_may_have_a_dot_and_a_slip_is_told(tmp_path, name, folder):
         (tmp_path / name).mkdir()
     with pytest.raises(VoodooError, match="exists" if folder else "cvs"):
         check_target(tmp_path / name)
+
+
+def test_a_place_where_nothing_can_be_written_is_told_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "pose.csv").mkdir()
+    check_target(tmp_path / "new" / "folders" / "pose.csv")
+    for name in ("file/pose.csv", "file/new/bag"):
+        with pytest.raises(VoodooError, match=r"expected a folder that can be written to, found .*file$"):
+            check_target(tmp_path / name)
+    with pytest.raises(VoodooError, match=r"pose\.csv: expected a file, found a folder"):
+        check_target(tmp_path / "pose.csv")

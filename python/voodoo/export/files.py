@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
         inputs: what is read, and not overwritten: markers and bags are recordings and results.
 
     Raises:
-        VoodooError: another suffix, a bag folder that exists, or one of the inputs.
+        VoodooError: another suffix, a bag folder that exists, one of the inputs, or a place where nothing can be written.
     """
     if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
         raise VoodooError(f"{path}: expected another file than what is read, found the same")
@@ -37,6 +38,11 @@ def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
         )
     if _is_folder(path) and path.exists():
         raise VoodooError(f"{path}: expected a new folder for a ROS 2 bag, found one that exists")
+    if path.is_dir():
+        raise VoodooError(f"{path}: expected a file, found a folder")
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise VoodooError(f"{path}: expected a folder that can be written to, found {above}")
 
 
 def _is_folder(path: Path) -> bool:
