@@ -44,9 +44,16 @@ class Positions:
         """Those of a result, or of the recording's reference.
 
         Raises:
-            VoodooError: the recording has no reference and no result was given.
+            VoodooError: the recording has no reference and no result was given, or the result is of another time.
         """
         if result is not None:
+            about = recording.info()
+            low, high = about.start_stamp - _SAME_TIME_S, about.start_stamp + about.duration + _SAME_TIME_S
+            if not ((result.stamps >= low) & (result.stamps <= high)).any():
+                found = f"{result.stamps.min():.3f} to {result.stamps.max():.3f} s" if len(result) else "none"
+                raise VoodooError(
+                    f"targets: expected stamps between {low:.3f} and {high:.3f} s as in {recording.name}, found {found}"
+                )
             return cls(result.stamps, result.joint_names, result.joints)
         if recording.reference is None:
             raise VoodooError(
