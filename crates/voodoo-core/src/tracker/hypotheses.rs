@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::Tracker;
 use super::doubt::Doubt;
-use super::lean::Lean;
+use super::lean::{Lean, Stance};
 use super::places::{carry, targets, thin};
 use crate::candidates::shifted;
 use crate::correspondence::Correspondences;
@@ -267,13 +267,16 @@ impl Tracker {
         // What the last frame asked for comes first: two frames that ask for a change shall ask for the same one.
         let mut wanted = std::mem::take(&mut work.wanted[index]);
         wanted.iter_mut().for_each(|pose| *pose = shifted(pose, self.origin));
-        let leans = self.chains[index].leg && self.lean(&work.ends, views, &mut work.lean);
+        let stance = if self.chains[index].leg { self.lean(&work.ends, views, &mut work.lean) } else { None };
+        let doubtful = self.chains.iter().zip(&work.doubts).all(|(chain, doubt)| !chain.leg || !doubt.none());
         // Found; what it rests on; the body.
         let tried = [
-            (leans, Ground::Lean, std::mem::take(&mut work.lean.best)),
+            (stance == Some(Stance::Leant), Ground::Lean, std::mem::take(&mut work.lean.leant)),
             (work.doubts[index].asked() && !wanted.is_empty(), work.wanted_ground[index], wanted),
             (rested, Ground::Rest, std::mem::take(&mut work.at_rest)),
             (least < enough, Ground::Points, std::mem::take(&mut work.kept)),
+            // Both feet, when both legs are in doubt.
+            (stance == Some(Stance::Upright) && doubtful, Ground::Rest, std::mem::take(&mut work.lean.upright)),
         ];
         let mut steps = 0;
         for (_, ground, poses) in tried.iter().filter(|(found, ..)| *found) {
@@ -286,7 +289,13 @@ impl Tracker {
                 }
             }
         }
-        [(.., work.lean.best), (.., work.wanted[index]), (.., work.at_rest), (.., work.kept)] = tried;
+        [
+            (.., work.lean.leant),
+            (.., work.wanted[index]),
+            (.., work.at_rest),
+            (.., work.kept),
+            (.., work.lean.upright),
+        ] = tried;
         std::mem::swap(&mut work.wanted[index], &mut work.asked_for);
         work.asked_for.clear();
         steps

@@ -12,8 +12,8 @@ use crate::geometry::{Points, Pose, Quat, Vec3};
 use crate::recover::TwoBone;
 use crate::view::Views;
 
-/// Leans that are tried, radians: the axis points to the second arm.
-const LEANS: [f64; 5] = [0.0, -0.2, 0.2, -0.4, 0.4];
+/// Leans that are tried after none, radians.
+const LEANS: [f64; 4] = [-0.2, 0.2, -0.4, 0.4];
 /// Points looked at when they are compared, at most.
 const SAMPLE: usize = 400;
 
@@ -32,8 +32,18 @@ pub(super) struct Lean {
     tried: Vec<f32>,
     distances: Vec<f32>,
     trial: Vec<Pose>,
-    /// The best of the poses tried.
-    pub(super) best: Vec<Pose>,
+    /// The body as it is, with both feet in place; the best that leans.
+    pub(super) upright: Vec<Pose>,
+    pub(super) leant: Vec<Pose>,
+}
+
+/// How a body stands best with both feet in place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stance {
+    /// Its trunk as it is.
+    Upright,
+    /// Leaning.
+    Leant,
 }
 
 impl Lean {
@@ -57,7 +67,7 @@ impl Lean {
                 }
             }
         }
-        for poses in [&mut self.trial, &mut self.best] {
+        for poses in [&mut self.trial, &mut self.upright, &mut self.leant] {
             poses.clear();
             poses.reserve(body.limbs().len());
         }
@@ -87,17 +97,17 @@ impl Lean {
 }
 
 impl Tracker {
-    /// The body leaning as the frame wants it, with its feet at `ends` (of the chains, world), into `lean.best`; whether there is
-    /// such a thing. A body that sinks pushes both legs out of place, and each alone is held by the other and by the trunk.
-    pub(super) fn lean(&self, ends: &[Option<Vec3>], views: Views, lean: &mut Lean) -> bool {
-        let Some([arms, [one, two]]) = lean.chains else { return false };
-        let (Some(one_end), Some(two_end)) = (ends[one], ends[two]) else { return false };
+    /// Stances of the body with its feet at `ends` (of the chains, world), into `lean`; the one that costs least, none when there
+    /// is no such thing. A body that sinks pushes both legs out of place, and each alone is held by the other and by the trunk.
+    pub(super) fn lean(&self, ends: &[Option<Vec3>], views: Views, lean: &mut Lean) -> Option<Stance> {
+        let [arms, [one, two]] = lean.chains?;
+        let (one_end, two_end) = (ends[one]?, ends[two]?);
         let legs = [(&self.chains[one], one_end - self.origin), (&self.chains[two], two_end - self.origin)];
         let [first, second] = arms.map(|arm| self.chains[arm].root(&self.body, &self.poses));
-        let Some(axis) = (second - first).try_normalize() else { return false };
+        let axis = (second - first).try_normalize()?;
         let shoulders = 0.5 * (first + second);
         lean.take(&self.candidates);
-        let Lean { trunk, points, weight, staying, leaning, tried, distances, trial, best, .. } = lean;
+        let Lean { trunk, points, weight, staying, leaning, tried, distances, trial, upright, leant, .. } = lean;
         let mut explain = |limb: usize, poses: &[Pose], least: &mut [f32]| {
             self.body.limbs()[limb].shape.approximate_distances(&poses[limb], points, distances);
             for (least, distance) in least.iter_mut().zip(distances.iter()) {
@@ -110,8 +120,8 @@ impl Tracker {
         for limb in (0..self.poses.len()).filter(|limb| !trunk.contains(limb) && !stands(*limb)) {
             explain(limb, &self.poses, staying);
         }
-        let mut least = f64::INFINITY;
-        for angle in LEANS {
+        let (mut least, mut stance) = (f64::INFINITY, None);
+        for angle in [0.0].into_iter().chain(LEANS) {
             trial.clone_from(&self.poses);
             leaning.clone_from(staying);
             let turn = Quat::from_axis_angle(axis, angle);
@@ -144,11 +154,119 @@ impl Tracker {
                 cost += own;
             }
             cost += rough_cost(leaning, weight);
-            if cost < least {
-                least = cost;
-                best.clone_from(trial);
+            if stance.is_none() {
+                (least, stance) = (cost, Some(Stance::Upright));
+                upright.clone_from(trial);
+            } else if cost < least {
+                (least, stance) = (cost, Some(Stance::Leant));
+                leant.clone_from(trial);
             }
         }
-        least < f64::INFINITY
+        stance
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::candidates::body_box;
+    use crate::config::Config;
+    use crate::frame::{DepthImage, DepthPixels, Frame};
+    use crate::render::{Rendering, Viewpoint};
+
+    /// A person upright in a camera's frame whose trunk and head are bent forward by `bow`, with thighs and calves at these
+    /// angles from the vertical, the middle of the feet at the same place for all.
+    fn bent(body: &Body, bow: f64, thigh: f64, calf: f64) -> Vec<Pose> {
+        let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+        let rest = body.rest_pose(Pose::from_parts(Vec3::ZERO, upright * Quat::from_axis_angle(Vec3::Z, -1.571)));
+        let mut poses: Vec<Pose> = Vec::new();
+        for (limb, rest) in body.limbs().iter().zip(&rest) {
+            let angle = match limb.name.as_str() {
+                name if name.ends_with("thigh") => -thigh,
+                name if name.ends_with("calf") => calf,
+                name if name.ends_with("foot") => 0.0,
+                _ => bow,
+            };
+            let rotation = Quat::from_axis_angle(Vec3::X, angle) * rest.rotation;
+            let at = limb.parent.as_ref().map_or(Vec3::ZERO, |(parent, joint)| {
+                poses[*parent] * joint.parent_from_joint.translation - rotation * joint.limb_from_joint.translation
+            });
+            poses.push(Pose::from_parts(at, rotation));
+        }
+        let feet: Vec<Vec3> = TwoBone::of(body).iter().filter(|leg| leg.leg).map(|leg| leg.end(&poses)).collect();
+        let shift = Vec3::new(0.0, 0.9, 2.6) - 0.5 * (feet[0] + feet[1]);
+        poses.iter().map(|pose| Pose::from_parts(pose.translation + shift, pose.rotation)).collect()
+    }
+
+    /// Largest distance of a hip or knee from where it is in `truth`.
+    fn off(legs: &[&TwoBone], body: &Body, poses: &[Pose], truth: &[Pose]) -> f64 {
+        let places = |leg: &TwoBone, poses: &[Pose]| [leg.root(body, poses), poses[leg.lower].translation];
+        let distances = legs.iter().flat_map(|leg| {
+            let (is, was) = (places(leg, poses), places(leg, truth));
+            [is[0].distance(was[0]), is[1].distance(was[1])]
+        });
+        distances.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_body_that_sits_down_leans_until_its_feet_stand() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let truth = bent(&body, 0.5, 1.1, 0.15);
+        let view = Viewpoint {
+            width: 160,
+            height: 124,
+            intrinsics: [145.0, 145.0, 79.5, 61.5],
+            rays: None,
+            world_from_sensor: Pose::identity(),
+        };
+        let mut rendering = Rendering::default();
+        rendering.render(&body, &truth, &view, None).unwrap();
+        let pixels: Vec<u16> = rendering.depth().iter().map(|depth| (depth * 1000.0) as u16).collect();
+        let images = [DepthImage {
+            pixels: DepthPixels::U16(&pixels),
+            width: view.width,
+            height: view.height,
+            metres_per_unit: 0.001,
+            intrinsics: view.intrinsics,
+            rays: None,
+            world_from_sensor: view.world_from_sensor,
+            weight: 1.0,
+            source: 0,
+        }];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+        // The trunk has not bent, and straight legs hang on it: hips and feet are off.
+        let [first, second] = {
+            let arms: Vec<Vec3> =
+                TwoBone::of(&body).iter().filter(|arm| !arm.leg).map(|arm| arm.root(&body, &truth)).collect();
+            [arms[0], arms[1]]
+        };
+        let turn = Quat::from_axis_angle((second - first).normalize(), 0.35);
+        let middle = 0.5 * (first + second);
+        let wrong: Vec<Pose> = truth
+            .iter()
+            .map(|pose| Pose::from_parts(middle + turn * (pose.translation - middle), turn * pose.rotation))
+            .collect();
+        tracker.reset_pose(&wrong).unwrap();
+        let bounds = body_box(&body, &wrong, 0.5);
+        tracker.candidates.gather(&frame, Vec3::ZERO, &bounds, &tracker.backgrounds, &tracker.config);
+        let ends: Vec<Option<Vec3>> = tracker.chains.iter().map(|chain| Some(chain.end(&truth))).collect();
+        let views = Views { frame: &frame, backgrounds: &tracker.backgrounds, cut_out: &[true], origin: Vec3::ZERO };
+        let mut lean = Lean::default();
+        lean.prepare(&body, &tracker.chains);
+        let legs: Vec<&TwoBone> = tracker.chains.iter().filter(|chain| chain.leg).collect();
+        let before = off(&legs, &body, &wrong, &truth);
+        assert_eq!(tracker.lean(&ends, views, &mut lean), Some(Stance::Leant));
+        let after = off(&legs, &body, &lean.leant, &truth);
+        assert!(before > 0.12 && after < 0.07, "{before} {after}");
+        for (leg, end) in legs.iter().zip(ends.iter().zip(&tracker.chains).filter(|(_, chain)| chain.leg)) {
+            assert!(leg.end(&lean.leant).distance(end.0.unwrap()) < 0.02);
+        }
+        // Where all is right nothing leans, and without a foot's place nothing is said.
+        tracker.poses.clone_from(&truth);
+        assert_eq!(tracker.lean(&ends, views, &mut lean), Some(Stance::Upright));
+        assert_eq!(tracker.lean(&vec![None; ends.len()], views, &mut lean), None);
     }
 }
