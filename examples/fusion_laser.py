@@ -74,9 +74,11 @@ def two_clusters(points: np.ndarray, place: np.ndarray) -> list[np.ndarray] | No
     return near if len(near) == 2 and np.linalg.norm(near[1] - place) < 0.45 else None
 
 
-def follow(scans: list[LaserScan], truth: np.ndarray, numbers: list[int], config: voodoo.Config) -> np.ndarray | None:
-    """Middle of the two legs at the laser's height (N, 2) for each click from FIRST on; None without two legs to
-    start on."""
+def follow(
+    scans: list[LaserScan], truth: np.ndarray, numbers: list[int], config: voodoo.Config
+) -> tuple[np.ndarray, list[voodoo.Estimate]] | None:
+    """Middle of the two legs at the laser's height (N, 2) for each click from FIRST on, and the estimates of all steps; None
+    without two legs to start on."""
     start, height = numbers[FIRST], float(scans[0].root_from_sensor[2, 3])
     middles = two_clusters(world(scans[start]), truth[FIRST])
     if middles is None:
@@ -92,17 +94,18 @@ def follow(scans: list[LaserScan], truth: np.ndarray, numbers: list[int], config
         joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * LEG_M
     tracker = voodoo.Tracker(legs(), config=config)
     tracker.reset(joints=joints, fit_sizes=False)
-    found = []
+    found, estimates = [], []
     for number in range(start, numbers[-1] + 1):
         frame = voodoo.Frame(stamp=scans[number].stamp)
         frame.add_points(world(scans[number]), source="laser")
         estimate = tracker.step(frame)
+        estimates.append(estimate)
         cuts = []
         for side in "lr":
             pose = estimate.world_from_limb[f"{side}_leg"]
             cuts.append(pose[:3, 3] + pose[:3, 2] * (height - pose[2, 3]) / pose[2, 2])
         found.append(np.mean(cuts, axis=0)[:2])
-    return np.array([found[number - start] for number in numbers[FIRST:]])
+    return np.array([found[number - start] for number in numbers[FIRST:]]), estimates
 
 
 def main() -> None:
@@ -121,8 +124,8 @@ def main() -> None:
     lines = [
         "Distance from the middle of the two legs to the clicked position (cm), person by person.",
         "",
-        "| person | clicks | seconds | person moved / m | robot moved / m | mean | last | within 25 cm |",
-        "|---|---|---|---|---|---|---|---|",
+        "| person | clicks | seconds | person moved / m | robot moved / m | mean | last | within 25 cm | lost | matched |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     paths = {}
     for person, rows in people.items():
@@ -131,19 +134,23 @@ def main() -> None:
         numbers = [int(np.abs(stamps - stamp).argmin()) for stamp in rows[:, 0]]
         poses = [scans[number].root_from_sensor for number in numbers]
         truth = np.array([(p @ [x, y, 0.0, 1.0])[:2] for p, (_, x, y) in zip(poses, rows, strict=True)])
-        found = follow(scans, truth, numbers, config)
+        followed = follow(scans, truth, numbers, config)
         head = f"| {person} | {len(rows)} | {rows[-1, 0] - rows[FIRST, 0]:.1f} "
-        if found is None:
-            lines.append(head + "| | | no two legs at the start | | |")
+        if followed is None:
+            lines.append(head + "| | | no two legs at the start | | | | |")
             continue
+        found, estimates = followed
         ways = [
             float(np.linalg.norm(places[-1] - places[0]))
             for places in (truth[FIRST:], np.array([pose[:2, 3] for pose in poses[FIRST:]]))
         ]
+        statuses = [estimate.status for estimate in estimates]
+        returns = np.array([estimate.sources["laser"][:2] for estimate in estimates])
         error = 100.0 * np.linalg.norm(found - truth[FIRST:], axis=1)
         lines.append(
             head
-            + f"| {ways[0]:.1f} | {ways[1]:.1f} | {error.mean():.0f} | {error[-1]:.0f} | {(error < 25).mean():.0%} |"
+            + f"| {ways[0]:.1f} | {ways[1]:.1f} | {error.mean():.0f} | {error[-1]:.0f} | {(error < 25).mean():.0%} "
+            + f"| {statuses.count('lost') / len(statuses):.0%} | {returns[:, 1].sum() / returns[:, 0].sum():.0%} |"
         )
         paths[person] = (truth[FIRST:], found, world(scans[numbers[-1]]))
     table = "\n".join(lines) + "\n"

@@ -281,7 +281,9 @@ def test_the_examples_of_the_documentation_run(capsys, tmp_path, monkeypatch):
     names: dict[str, object] = {}
     for block in (block for block in chosen if "Viewer" not in block):
         exec(block, names)
-    assert "matched" in capsys.readouterr().out.splitlines()[-1]
+    written = capsys.readouterr().out.splitlines()
+    assert "{'lost'} {'inferred'}" in written, "what is said of a laser alone"
+    assert "matched" in written[-1]
     (results,) = [block for block in blocks if "write_bag" in block]
     exec(results, names | {"estimates": [names["estimate"]]})
     assert {path.name for path in tmp_path.iterdir()} == {"pose.npz", "pose.bvh", "pose_bag"}
