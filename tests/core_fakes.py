@@ -122,6 +122,7 @@ class Tracker:
     reference = None
     offset = (0.0, 0.0, 0.0)
     refuse_at = None
+    interrupt_at = None
 
     def __init__(self, body, *, config):
         self.initial, self.config, self.frames = body, config, []
@@ -136,6 +137,8 @@ class Tracker:
     def step(self, frame):
         if self.refuse_at == len(self.frames):
             raise VoodooError("points: expected finite numbers, found NaN")
+        if self.interrupt_at == len(self.frames):
+            raise KeyboardInterrupt
         self.frames.append(frame)
         joints = self.estimate.joints
         if self.reference is not None:

@@ -163,6 +163,25 @@ def test_a_refused_frame_is_named_and_leaves_no_result(run):
     assert not Path("pose.csv").exists()
 
 
+def test_ctrl_c_leaves_the_frames_up_to_there_and_says_so(run):
+    run.tracker.interrupt_at = 4
+    result = run("track", "x", "--out", "pose.csv", "--out", "pose.npz", "--overlay", "look.mp4")
+    assert_one_line(result, 130, "interrupted", "4 frames", "12 frames", "pose.csv and pose.npz and look.mp4")
+    assert not result.stdout
+    for name in ("pose.csv", "pose.npz"):
+        assert len(Track.load(name)) == 4
+    assert cv2.VideoCapture("look.mp4").get(cv2.CAP_PROP_FRAME_COUNT) == 4
+
+
+def test_ctrl_c_before_the_first_frame_leaves_nothing(run):
+    run.tracker.interrupt_at = 0
+    assert run("track", "x", "--out", "pose.csv").exit_code == 130
+    assert run("demo", "--out", "demo").exit_code == 130
+    run.tracker.interrupt_at = 2
+    assert run("demo", "--out", "demo").exit_code == 130
+    assert not Path("pose.csv").exists() and not Path("demo/pose.csv").exists()
+
+
 def test_demo(run, monkeypatch):
     monkeypatch.setattr(track_module, "sample_path", lambda: Path("sample"))
     run.tracker.offset = (0.0, 0.03, 0.0)

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import typer
@@ -27,6 +27,18 @@ from voodoo.sensors.front_end import INPUTS, FrontEndSettings
 from voodoo.view import Viewer
 
 T = TypeVar("T")
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as of every program that SIGINT ends."""
+
+
+class Run(NamedTuple):
+    """What a run over a recording leaves: the result, the time of every frame [s], the pictures that were asked for, and
+    whether Ctrl-C ended it before the recording did."""
+
+    track: Track
+    seconds: list[float]
+    pictures: list[Picture]
+    interrupted: bool
 
 
 def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
@@ -90,34 +102,39 @@ def run(
     sheet: int = 0,
     settings: FrontEndSettings | None = None,
     viewer: Viewer | None = None,
-) -> tuple[Track, list[float], list[Picture]]:
-    """Track and draw: the result, the time of every frame [s] and `sheet` pictures spread over the recording."""
-    estimates, seconds, pictures = [], [], []
+) -> Run:
+    """Track and draw, with `sheet` pictures spread over the recording. Ctrl-C ends it with the frames up to there, if any."""
+    estimates, seconds, pictures, interrupted = [], [], [], False
     chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
     rate = source.info().rate_hz
     drawing = Overlay(source)
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
     with writer or nullcontext():
-        for step in progressing(track(source, tracker, settings=settings), source.name, len(source)):
-            estimates.append(step.estimate)
-            seconds.append(step.seconds)
-            if viewer is not None:
-                viewer.log(
-                    step.estimate,
-                    tracker.body,
-                    recorded=step.recorded,
-                    front_end=step.front_end,
-                    seconds=step.seconds,
-                )
-            if writer is not None or step.index in chosen:
-                picture = drawing.draw(
-                    step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end
-                )
-                if writer is not None:
-                    writer.write(picture)
-                if step.index in chosen:
-                    pictures.append(picture)
-    return Track.of(estimates, body=tracker.body), seconds, pictures
+        try:
+            for step in progressing(track(source, tracker, settings=settings), source.name, len(source)):
+                estimates.append(step.estimate)
+                seconds.append(step.seconds)
+                if viewer is not None:
+                    viewer.log(
+                        step.estimate,
+                        tracker.body,
+                        recorded=step.recorded,
+                        front_end=step.front_end,
+                        seconds=step.seconds,
+                    )
+                if writer is not None or step.index in chosen:
+                    picture = drawing.draw(
+                        step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end
+                    )
+                    if writer is not None:
+                        writer.write(picture)
+                    if step.index in chosen:
+                        pictures.append(picture)
+        except KeyboardInterrupt:
+            if not estimates:
+                raise
+            interrupted = True
+    return Run(Track.of(estimates, body=tracker.body), seconds, pictures, interrupted)
 
 
 def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:

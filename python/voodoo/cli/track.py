@@ -11,6 +11,7 @@ import typer
 
 import voodoo
 from voodoo.cli.common import (
+    INTERRUPTED,
     clear_errors,
     config_of,
     depth_filter_of,
@@ -98,7 +99,8 @@ def track_command(
 
     The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in metres for every joint and site, in the
     recording's root frame (base_link if it has one), and NAME_rad for every joint angle. The .npz adds the pose of
-    every limb.
+    every limb. Ctrl-C writes the frames up to there and ends with exit code 130; a frame that is refused ends without any
+    result.
 
     --init gives the pose in the first frame, by any subset of names that fixes it:
     [cyan]{"height_m": 1.76, "joints": {"l_shoulder": \\[3.1, -0.3, 1.4], "r_shoulder": \\[3.2, 0.1, 1.4], ...}}[/cyan]
@@ -142,11 +144,15 @@ def track_command(
         )
         with viewer_of(view, save, source.name) as viewer:
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter)
-            result, _, _ = run(source, tracker, overlay, settings=settings, viewer=viewer)
+            result, _, _, interrupted = run(source, tracker, overlay, settings=settings, viewer=viewer)
         for target in targets:
             export(result, target, body=tracker.body, root_frame=source.root_frame)
         written = [str(path) for path in (*targets, overlay, save) if path is not None]
-        typer.echo(f"{len(result)} frames, {states(result)}; wrote {' and '.join(written)}")
+        told = f"{len(result)} frames, {states(result)}; wrote {' and '.join(written)}"
+        if interrupted:
+            typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {told}", err=True)
+            raise typer.Exit(INTERRUPTED)
+        typer.echo(told)
 
 
 def demo_command(
@@ -162,7 +168,9 @@ def demo_command(
         source = opened(sample_path(), None, None)
         tracker = start_tracker(source)
         out.mkdir(parents=True, exist_ok=True)
-        result, seconds, sheet = run(source, tracker, out / "overlay.mp4", sheet=6)
+        result, seconds, sheet, interrupted = run(source, tracker, out / "overlay.mp4", sheet=6)
+        if interrupted:
+            raise typer.Exit(INTERRUPTED)
         result.save(out / "pose.csv")
         save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
         errors = compare(source, result)
