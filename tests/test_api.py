@@ -155,6 +155,21 @@ def test_arrays_that_cannot_be_meant_are_refused_by_name(arguments, words):
     assert all(word in str(caught.value) for word in words), caught.value
 
 
+def test_masked_arrays_are_refused_with_what_to_do():
+    """What is masked would count as measured; nothing masked today may be something tomorrow."""
+    camera = voodoo.Camera(4, 3, 100.0, 100.0, 1.5, 1.0)
+    frame = voodoo.Frame(stamp=0.0)
+    image = np.ma.masked_less(np.full((3, 4), 900, dtype=np.uint16), 1000)
+    points = np.ma.masked_array(np.zeros((5, 3)), mask=[[False] * 3] * 4 + [[True] * 3])
+    for masked in (image, np.ma.masked_array(image.data)):
+        with pytest.raises(MeasurementError, match=r"image: expected an array without a mask.*image\.filled\(0\)"):
+            frame.add_depth(masked, camera=camera)
+    with pytest.raises(MeasurementError, match=r"points: expected an array without a mask.*leave the masked rows out"):
+        frame.add_points(points)
+    frame.add_depth(image.filled(0), camera=camera)
+    frame.add_points(points.data[~np.ma.getmaskarray(points).any(axis=1)])
+
+
 def test_images_that_cannot_be_meant_are_refused_by_name():
     camera = voodoo.Camera(4, 3, 100.0, 100.0, 1.5, 1.0)
     frame = voodoo.Frame(stamp=0.0)

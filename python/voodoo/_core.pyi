@@ -235,7 +235,7 @@ class Frame:
         Far from the world's origin (map coordinates) float32 has no digits left for a body: give points in the sensor's frame.
 
         Args:
-            points: float32 or float64, finite.
+            points: float32 or float64, finite; no masked array.
             world_from_sensor: rigid (4, 4); identity by default.
             weight: weight of each point, above zero; a larger one costs no time.
             limb: the points are known to be on this limb.
@@ -258,7 +258,7 @@ class Frame:
         """Add an organised depth image: depth along the optical axis (z, not range).
 
         Args:
-            image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned.
+            image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned; no masked array.
             camera: its calibration, a voodoo.Camera of the same size.
             metres_per_unit: of the image. The default is that of uint16 in millimetres; an image in metres needs 1.0.
             world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.

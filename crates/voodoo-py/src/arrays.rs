@@ -40,6 +40,7 @@ impl PointArray {
         if array.ndim() != 2 || array.shape()[1] != 3 {
             return Err(wrong());
         }
+        unmasked(name, value, "leave the masked rows out: points.data[~numpy.ma.getmaskarray(points).any(axis=1)]")?;
         let contiguous = contiguous(value)?;
         if let Ok(array) = contiguous.cast::<PyArray2<f32>>() {
             Ok(Self::F32(array.clone().unbind()))
@@ -65,6 +66,15 @@ impl PointView<'_> {
             Self::F64(view) => PointSlice::F64(view.as_slice()?.as_chunks().0),
         })
     }
+}
+
+/// Refuses NumPy's masked arrays: below the mask their entries are numbers like any other and would count as measured.
+pub fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
+    if value.hasattr("mask")? {
+        let text = format!("{name}: expected an array without a mask, found a masked one; {instead}");
+        return Err(exception(value.py(), "MeasurementError", text));
+    }
+    Ok(())
 }
 
 /// The same array, C-contiguous and aligned.

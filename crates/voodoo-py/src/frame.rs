@@ -8,7 +8,7 @@ use voodoo_core::Body;
 use voodoo_core::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
 use voodoo_core::geometry::{Pose, Vec3};
 
-use crate::arrays::{PointArray, PointView, contiguous, pose, vector};
+use crate::arrays::{PointArray, PointView, contiguous, pose, unmasked, vector};
 use crate::errors::{IntoPy, exception};
 
 struct CloudData {
@@ -200,7 +200,7 @@ impl PyFrame {
     /// Far from the world's origin (map coordinates) float32 has no digits left for a body: give points in the sensor's frame.
     ///
     /// Args:
-    ///     points: float32 or float64, finite.
+    ///     points: float32 or float64, finite; no masked array.
     ///     world_from_sensor: rigid (4, 4); identity by default.
     ///     weight: weight of each point, above zero; a larger one costs no time.
     ///     limb: the points are known to be on this limb.
@@ -234,7 +234,7 @@ impl PyFrame {
     /// Add an organised depth image: depth along the optical axis (z, not range).
     ///
     /// Args:
-    ///     image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned.
+    ///     image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned; no masked array.
     ///     camera: its calibration, a voodoo.Camera of the same size.
     ///     metres_per_unit: of the image. The default is that of uint16 in millimetres; an image in metres needs 1.0.
     ///     world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
@@ -278,6 +278,7 @@ impl PyFrame {
             )
         };
         let array = contiguous(image).map_err(|_| wrong())?;
+        unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
         let (pixels, size) = if let Ok(array) = array.cast::<PyArray2<u16>>() {
             (DepthArray::U16(array.clone().unbind()), array.dims())
         } else if let Ok(array) = array.cast::<PyArray2<f32>>() {
