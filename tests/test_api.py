@@ -1,8 +1,10 @@
 import copy
+import pickle
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -265,6 +267,60 @@ def test_a_tracker_is_not_copied(tracker):
     for copied in (copy.copy, copy.deepcopy):
         with pytest.raises(TypeError, match="cannot"):
             copied(tracker)
+
+
+def pickled(thing):
+    return pickle.loads(pickle.dumps(thing))
+
+
+COPIES = pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickled])
+
+
+@COPIES
+def test_a_copy_of_a_body_has_the_same_bits(body, cloud, copied):
+    tracker = voodoo.Tracker(body)
+    tracker.reset(joints=standing_joints(voodoo.Body.human(height=1.83, model="papers")))
+    tracker.add_limb(
+        "stick",
+        parent="r_forearm",
+        shape=voodoo.TaperedEllipticCylinder(0.3, 0.02, 0.02, 0.01, 0.0),
+        joint=voodoo.Joint(name="grip", on_parent=voodoo.Place(position=(0.0, 0.01, 0.2), rotation=(0.3, -0.7, 1.1))),
+    )
+    known = tracker.body
+    again = copied(known)
+    assert type(again) is voodoo.Body and again == known and again.limbs == known.limbs
+    assert again.site_names == known.site_names and copied(known.limbs[1]) == known.limbs[1]
+    found = []
+    for each in (known, again):
+        tracker = voodoo.Tracker(each)
+        tracker.reset_pose(rest_pose(each))
+        found.append([tracker.step(frame_of(cloud + 0.01 * index, stamp=index)).limb_poses for index in range(3)])
+    np.testing.assert_array_equal(*found)
+
+
+@COPIES
+def test_a_copy_of_a_shape_has_the_same_bits(copied):
+    shape = voodoo.TaperedEllipticCylinder(0.1 + 0.2, 1 / 3, 0.0, 1e-3, 2e-5)
+    assert type(copied(shape)) is voodoo.TaperedEllipticCylinder and copied(shape) == shape
+
+
+@COPIES
+def test_a_copy_of_an_estimate_has_the_same_bits(tracker, cloud, copied):
+    unknown = voodoo.Tracker(tracker.body).estimate
+    reset = tracker.estimate
+    frame = frame_of(cloud, stamp=0.1)
+    frame.add_ray("l_wrist", origin=(0, 0, 0), direction=(1, 2, 3), source="ray")
+    for estimate in (unknown, reset, tracker.step(frame)):
+        again = copied(estimate)
+        assert type(again) is voodoo.Estimate and repr(again) == repr(estimate)
+        for name in (name for name in dir(estimate) if not name.startswith("_")):
+            was, now = (getattr(each, name) for each in (estimate, again))
+            if isinstance(was, Mapping):
+                assert list(was) == list(now), name
+                was, now = list(was.values()), list(now.values())
+            np.testing.assert_array_equal(was, now, err_msg=name)
+        with pytest.raises(ValueError, match="read-only"):
+            again.joint_positions[:] = 0.0
 
 
 def test_a_reset_reproduces_positions_and_sizes(body):

@@ -16,6 +16,7 @@ __all__ = [
     "Tracker",
     "View",
     "__version__",
+    "_estimate",
     "config_fields",
     "nearest_surface",
     "points_within",
@@ -135,6 +136,9 @@ def nearest_surface(
         MeasurementError: other shapes.
     """
 
+def _estimate(head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...]) -> Estimate:
+    """An estimate of what pickle and copy keep of it."""
+
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""
 
@@ -148,6 +152,7 @@ class TaperedEllipticCylinder:
 
     REGIONS: ClassVar[list[str]]
     def __new__(cls, length: float, a0: float, b0: float, a1: float, b1: float) -> TaperedEllipticCylinder: ...
+    def __getnewargs__(self) -> tuple[float, float, float, float, float]: ...
     @property
     def length(self) -> float:
         """Length [m]."""
@@ -198,6 +203,7 @@ class Body:
     """A body as the core holds it; use voodoo.Body."""
 
     def __new__(cls, name: str, limbs: Sequence[Any], sites: Sequence[Any]) -> Body: ...
+    def __getnewargs__(self) -> tuple[str, list[Any], list[Any]]: ...
     @staticmethod
     def human(stature: float, model: str) -> Body: ...
     def scaled(self, factor: float) -> Body: ...

@@ -195,6 +195,10 @@ class Body:
             lines.append(f"position = {_vector(position)}")
         return "\n".join(lines) + "\n"
 
+    def __reduce__(self) -> tuple[type[Body], tuple[_core.Body]]:
+        """Pickles and copies have the same bits."""
+        return type(self), (self._core,)
+
     def __eq__(self, other: object) -> bool:
         """Equal when every limb, joint and site is."""
         return isinstance(other, Body) and bool(self._core == other._core)

@@ -8,8 +8,17 @@ use voodoo_core::geometry::{Pose, Quat, Vec3};
 use crate::errors::{IntoPy, exception};
 use crate::shape::PyShape;
 
-/// Position and rotation vector (radians) of a joint's ellipse.
-type Frame = ([f64; 3], [f64; 3]);
+/// A rotation as Python says it.
+#[derive(FromPyObject, IntoPyObject)]
+pub enum Rotation {
+    /// Radians.
+    Vector([f64; 3]),
+    /// x, y, z, w; for copies, which have the same bits.
+    Quaternion([f64; 4]),
+}
+
+/// Position and rotation of a joint's ellipse.
+type Frame = ([f64; 3], Rotation);
 /// name, ellipse on the parent, ellipse on the limb, semi-axes, weight, limits, motion
 pub type JointParts = (String, Frame, Frame, [f64; 2], f64, Option<[[f64; 2]; 3]>, f64);
 /// name, parent, shape, joint, match_caps
@@ -22,11 +31,19 @@ type SiteParts = (String, String, [f64; 3]);
 pub struct PyBody(pub Body);
 
 fn pose((position, rotation): Frame) -> Pose {
-    Pose::from_parts(Vec3::from_array(position), Quat::from_scaled_axis(Vec3::from_array(rotation)))
+    let rotation = match rotation {
+        Rotation::Vector(vector) => Quat::from_scaled_axis(Vec3::from_array(vector)),
+        Rotation::Quaternion(quaternion) => Quat::from_array(quaternion),
+    };
+    Pose::from_parts(Vec3::from_array(position), rotation)
 }
 
-fn frame(pose: &Pose) -> Frame {
-    (pose.translation.to_array(), pose.rotation.to_scaled_axis().to_array())
+fn readable(pose: &Pose) -> Frame {
+    (pose.translation.to_array(), Rotation::Vector(pose.rotation.to_scaled_axis().to_array()))
+}
+
+fn exact(pose: &Pose) -> Frame {
+    (pose.translation.to_array(), Rotation::Quaternion(pose.rotation.to_array()))
 }
 
 pub fn joint((name, on_parent, on_limb, semi_axes, weight, limits, motion): JointParts) -> Joint {
@@ -103,8 +120,19 @@ impl PyBody {
         self.0.scaled(factor).map(Self).map_err(|error| error.into_py(py))
     }
 
-    /// The parts that `new` takes.
+    /// The parts that `new` takes, rotations as vectors.
     fn parts(&self) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
+        self.parts_with(readable)
+    }
+
+    /// For pickle and copy.
+    fn __getnewargs__(&self) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
+        self.parts_with(exact)
+    }
+}
+
+impl PyBody {
+    fn parts_with(&self, frame: fn(&Pose) -> Frame) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
         let limbs = self.0.limbs();
         let limb_parts = limbs
             .iter()

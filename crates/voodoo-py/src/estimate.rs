@@ -5,10 +5,12 @@ use std::sync::Arc;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
-use voodoo_core::estimate::{Estimate, LimbStatus, Status};
-use voodoo_core::{Body, geometry::Vec3};
+use voodoo_core::Body;
+use voodoo_core::estimate::{Estimate, LimbStatus, SourceReport, Status};
+use voodoo_core::geometry::{Pose, Quat, Vec3};
 
 use crate::arrays::{frozen, matrix};
+use crate::errors::exception;
 
 /// The names that the numbers of an estimate belong to; shared by all estimates of one body.
 pub struct Names {
@@ -63,6 +65,56 @@ fn limb_status_word(status: LimbStatus) -> &'static str {
         LimbStatus::Inferred => "inferred",
         LimbStatus::Lost => "lost",
     }
+}
+
+/// Stamp, status, mean squared distance, steps.
+type Head = (f64, String, f64, usize);
+/// Of limbs, sites, joints and sources.
+type AllNames = (Vec<String>, Vec<String>, Vec<Option<String>>, Vec<String>);
+/// Status and poses (position, quaternion) of limbs, sites, points and residuals of limbs, gaps of joints, reports of sources.
+type Found = (
+    Vec<String>,
+    Vec<([f64; 3], [f64; 4])>,
+    Vec<[f64; 3]>,
+    Vec<usize>,
+    Vec<f64>,
+    Vec<f64>,
+    Vec<(usize, usize, f64, f64)>,
+);
+
+/// An estimate of what pickle and copy keep of it.
+#[pyfunction]
+pub fn _estimate(py: Python<'_>, head: Head, names: AllNames, found: Found) -> PyResult<PyEstimate> {
+    let wrong = |word: &str| exception(py, "MeasurementError", format!("estimate: found the unknown status {word:?}"));
+    let (stamp, status, mean_squared_distance, steps) = head;
+    let (limbs, sites, joints, sources) = names;
+    let (limb_status, poses, places, limb_points, limb_residual, joint_gaps, reports) = found;
+    let known = [Status::Tracking, Status::Degraded, Status::Lost];
+    let limb_known = [LimbStatus::Measured, LimbStatus::Inferred, LimbStatus::Lost];
+    let limb_of = |word: &String| limb_known.into_iter().find(|status| limb_status_word(*status) == word);
+    let estimate = Estimate {
+        stamp,
+        status: known.into_iter().find(|known| status_word(*known) == status).ok_or_else(|| wrong(&status))?,
+        limb_status: limb_status
+            .iter()
+            .map(|word| limb_of(word).ok_or_else(|| wrong(word)))
+            .collect::<PyResult<_>>()?,
+        world_from_limb: poses
+            .into_iter()
+            .map(|(position, rotation)| Pose::from_parts(Vec3::from_array(position), Quat::from_array(rotation)))
+            .collect(),
+        sites: places.into_iter().map(Vec3::from_array).collect(),
+        mean_squared_distance,
+        steps,
+        limb_points,
+        limb_residual,
+        joint_gaps,
+        sources: reports
+            .into_iter()
+            .map(|(count, inliers, weight, residual)| SourceReport { count, inliers, weight, residual })
+            .collect(),
+    };
+    Ok(PyEstimate { estimate, names: Arc::new(Names { limbs, sites, joints }), sources })
 }
 
 #[pymethods]
@@ -186,6 +238,25 @@ impl PyEstimate {
             (name, (report.count, report.inliers, residual))
         });
         mapping(slf.py(), reports)
+    }
+
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Head, AllNames, Found))> {
+        let (found, names) = (&self.estimate, &*self.names);
+        let pose = |pose: &Pose| (pose.translation.to_array(), pose.rotation.to_array());
+        let source = |report: &SourceReport| (report.count, report.inliers, report.weight, report.residual);
+        let head = (found.stamp, self.status().to_owned(), found.mean_squared_distance, found.steps);
+        let all = (names.limbs.clone(), names.sites.clone(), names.joints.clone(), self.sources.clone());
+        let rest = (
+            found.limb_status.iter().map(|status| limb_status_word(*status).to_owned()).collect(),
+            found.world_from_limb.iter().map(pose).collect(),
+            found.sites.iter().map(Vec3::to_array).collect(),
+            found.limb_points.clone(),
+            found.limb_residual.clone(),
+            found.joint_gaps.clone(),
+            found.sources.iter().map(source).collect(),
+        );
+        Ok((py.import("voodoo._core")?.getattr("_estimate")?, (head, all, rest)))
     }
 
     pub fn __repr__(&self) -> String {

@@ -27,7 +27,7 @@ mod _core {
     #[pymodule_export]
     use super::config::config_fields;
     #[pymodule_export]
-    use super::estimate::PyEstimate;
+    use super::estimate::{_estimate, PyEstimate};
     #[pymodule_export]
     use super::frame::PyFrame;
     #[pymodule_export]

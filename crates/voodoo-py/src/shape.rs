@@ -126,6 +126,11 @@ impl PyShape {
         })
     }
 
+    /// For pickle and copy.
+    fn __getnewargs__(&self) -> (f64, f64, f64, f64, f64) {
+        (self.0.length(), self.0.a0(), self.0.b0(), self.0.a1(), self.0.b1())
+    }
+
     fn __repr__(&self) -> String {
         let s = &self.0;
         format!(
