@@ -47,6 +47,14 @@ def skin(image, camera=CAMERA):
             ConfigError,
             "config: expected a voodoo.Config, found dict",
         ),
+        (lambda: voodoo.Joint(name="grip", weight="x"), BodyError, "Joint: weight: input should be a valid number"),
+        (lambda: voodoo.Joint(weight=2.0), BodyError, "Joint: name: field required"),
+        (
+            lambda: voodoo.Joint(name="grip", on_parent={"position": (0.0, NAN, 0.0)}),
+            BodyError,
+            "Joint: on_parent.position.1: input should be a finite number, found nan",
+        ),
+        (lambda: voodoo.Place(rotation="x"), BodyError, "Place: rotation: input should be a valid tuple, found 'x'"),
         (lambda: voodoo.Body.from_toml(None), BodyError, "body: expected TOML text, found NoneType"),
         (
             lambda: voodoo.render_depth(voodoo.Body.human(height=1.7), [HERE], camera=CAMERA),

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -36,14 +36,33 @@ class _ShapeSpec(_Strict):
     b1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
-class Place(_Strict):
-    """Where a joint's ellipse is on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame."""
+class _Part(_Strict):
+    """What callers make themselves: what is wrong with it is a BodyError."""
+
+    if not TYPE_CHECKING:  # to type checkers the fields are the arguments
+
+        def __init__(self, **values: Any) -> None:  # noqa: ANN401 - checked here
+            try:
+                super().__init__(**values)
+            except ValidationError as error:
+                raise BodyError(f"{type(self).__name__}: {_problems(values, error)}") from None
+
+        # Not called for a part of a larger whole, whose error names the key from the top.
+        __init__.__pydantic_base_init__ = True
+
+
+class Place(_Part):
+    """Where a joint's ellipse is on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame.
+
+    Raises:
+        BodyError: not three finite numbers each.
+    """
 
     position: _Vector = _ZERO
     rotation: _Vector = _ZERO
 
 
-class Joint(_Strict):
+class Joint(_Part):
     """An elastic-band joint of a limb to its parent (K07 section 4).
 
     Attributes:
@@ -55,6 +74,9 @@ class Joint(_Strict):
         weight: strength relative to the other joints of a limb.
         limits: least and greatest value of each component of the joint's rotation vector [rad]; None: free.
         motion: standard deviation of the joint's unexpected turn in 1/30 s [rad].
+
+    Raises:
+        BodyError: an entry that is missing, unknown or no such number.
     """
 
     name: str
