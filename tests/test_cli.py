@@ -239,6 +239,35 @@ def test_track_yields_one_estimate_a_frame_with_its_time(run):
     assert all(step.seconds > 0.0 for step in steps)
 
 
+def test_numbers_for_the_loader(run):
+    assert run("track", "x", "--option", "rate=30", "--option", "tf_max_age=2").exit_code == 0
+    assert run.options == {"rate": 30.0, "tf_max_age": 2.0}
+    assert run("info", "x", "--option", "metres_per_unit=0.00025").exit_code == 0
+    assert run.options == {"metres_per_unit": 0.00025}
+    for words in ("rate", "rate=fast", "depth=1"):
+        assert_one_line(run("track", "x", "--option", words), 1, "NAME=NUMBER with one of rate, metres_per_unit", words)
+
+
+def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path):
+    """A Pose2Sim folder beside a bag; what nobody knows is left to RECORDING's loader to refuse."""
+    for name in ("bag", "people"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "people" / "Calib_x.toml").touch()
+    opened = []
+
+    def other(path, **options):
+        opened.append((path.name, options))
+        return FakeRecording(frames=12)
+
+    monkeypatch.setattr("voodoo.inputs.open_recording", other)
+    words = ("--with", "people", "--option", "rate=30", "--option", "tf_max_age=2")
+    assert run("track", "bag", "--loader", "ros2", *words).exit_code == 0
+    assert run.options == {"tf_max_age": 2.0}
+    assert opened == [("people", {"layout": "body25b", "rate": 30.0})]
+    assert run("track", "bag", "--loader", "ros2", *words[2:]).exit_code == 0
+    assert run.options == {"tf_max_age": 2.0, "rate": 30.0}
+
+
 def test_a_depth_range_is_two_distances(run):
     assert_one_line(run("track", "bag", "--depth-range", "far"), 1, "depth-range: expected NEAR,FAR", "'far'")
     assert_one_line(run("track", "bag", "--depth-range", "5,1"), 1, "0 <= nearest < farthest")

@@ -1,5 +1,7 @@
 """What cannot be meant is refused by name, with what was expected and what was found."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from voodoo.keypoints import KeypointSensor
 from voodoo.markers import read_trc
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.marker_files import MarkerMap
+from voodoo.recordings.pose2sim import Pose2SimRecording
 from voodoo.running import start_tracker
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.front_end import FrontEndSettings
@@ -87,6 +90,24 @@ def skin(image, camera=CAMERA):
             lambda: voodoo.Tracker(voodoo.Body.human()).reset(joints=[(0.0, 0.0, 0.0)]),
             BodyError,
             "joints: expected a mapping of names to positions, found list",
+        ),
+        *(
+            (
+                lambda option=option: open_recording(sample_path(), **option),
+                RecordingError,
+                f"{next(iter(option))}: expected {words}, found {next(iter(option.values()))!r}",
+            )
+            for option, words in (
+                ({"tf_max_age": "1"}, "seconds >= 0"),
+                ({"tf_max_age": None}, "seconds >= 0"),
+                ({"metres_per_unit": "0.001"}, "a length > 0"),
+                ({"metres_per_unit": NAN}, "a length > 0"),
+            )
+        ),
+        *(
+            (lambda rate=rate: Pose2SimRecording(Path("x"), rate=rate), RecordingError, f"x: rate: {words}{rate!r}")
+            for rate in ("30", 0.0, None)
+            for words in ("expected images per second > 0, found ",)
         ),
         (lambda: read_trc("nowhere.trc"), RecordingError, "nowhere.trc: expected a .trc file, found none"),
     ],

@@ -9,9 +9,9 @@ from typing import Any
 
 from voodoo.errors import VoodooError
 from voodoo.keypoints import layout_of
-from voodoo.recordings import Recording, open_recording
+from voodoo.recordings import LOADERS, Recording, open_recording
 from voodoo.recordings.joined import Joined, WithKeypoints
-from voodoo.recordings.loaders import guess_loader
+from voodoo.recordings.loaders import guess_loader, options_of
 from voodoo.recordings.marker_files import MarkerMap
 
 
@@ -40,6 +40,7 @@ def join(
     others: Sequence[Path] = (),
     offset: float = 0.0,
     markers: MarkerMap | None = None,
+    numbers: Mapping[str, float] | None = None,
 ) -> Recording:
     """The recording with all that is joined to it.
 
@@ -50,6 +51,7 @@ def join(
         others: further recordings of the scene, marker files among them.
         offset: [s] added to their stamps.
         markers: what the markers in marker files mean.
+        numbers: options of their loaders, for those that have them.
 
     Raises:
         VoodooError: what cannot be read or does not belong together.
@@ -60,11 +62,20 @@ def join(
     if keypoints:
         recording = WithKeypoints(recording, keypoints, layout=layout)
     if others:
-        recording = Joined(recording, [_open(path, recording, markers, layout) for path in others], offset=offset)
+        recording = Joined(
+            recording, [_open(path, recording, markers, layout, numbers) for path in others], offset=offset
+        )
     return recording
 
 
-def loader_options(path: Path, loader: str | None, *, markers: MarkerMap | None, layout: str) -> dict[str, Any]:
+def loader_options(
+    path: Path,
+    loader: str | None,
+    *,
+    markers: MarkerMap | None,
+    layout: str,
+    numbers: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
     """Of the options of `voodoo track` those that the loader of a recording takes.
 
     Raises:
@@ -74,11 +85,14 @@ def loader_options(path: Path, loader: str | None, *, markers: MarkerMap | None,
         return {}  # opening it says so
     name = loader or guess_loader(path)
     options: dict[str, dict[str, Any]] = {"markers": {"markers": markers}, "pose2sim": {"layout": layout}}
-    return options.get(name, {})
+    known = options_of(name) if name in LOADERS else ()
+    return options.get(name, {}) | {key: value for key, value in (numbers or {}).items() if key in known}
 
 
-def _open(path: Path, first: Recording, markers: MarkerMap | None, layout: str) -> Recording:
-    options = loader_options(path, None, markers=markers, layout=layout)
+def _open(
+    path: Path, first: Recording, markers: MarkerMap | None, layout: str, numbers: Mapping[str, float] | None
+) -> Recording:
+    options = loader_options(path, None, markers=markers, layout=layout, numbers=numbers)
     if path.exists() and guess_loader(path) in ("ros1", "ros2"):
         options["root_frame"] = first.root_frame
     return open_recording(path, **options)

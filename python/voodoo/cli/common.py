@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import voodoo
-from voodoo.cli.options import TOPICS
+from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.errors import VoodooError
 from voodoo.overlay import Overlay
 from voodoo.overlay_inputs import Picture
@@ -63,6 +63,24 @@ def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
     if len(names.get("camera_info", ())) > 1:
         raise VoodooError(f"topic: expected one camera_info, found {', '.join(names['camera_info'])}")
     return {f"{kind}_topic": found if len(found) > 1 else found[0] for kind, found in names.items()}
+
+
+def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
+    """The loader's options of "rate=30" each.
+
+    Raises:
+        VoodooError: another form or name.
+    """
+    numbers = {}
+    for word in words or ():
+        name, _, value = word.partition("=")
+        try:
+            numbers[NUMBERS[NUMBERS.index(name)]] = float(value)
+        except ValueError:
+            raise VoodooError(
+                f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}"
+            ) from None
+    return numbers
 
 
 def kinds_of(words: str | None) -> tuple[str, ...]:

@@ -9,12 +9,13 @@ import numpy as np
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, opened, states, topics_of
+from voodoo.cli.common import clear_errors, numbers_of, opened, states, topics_of
 from voodoo.cli.options import (
     BodyOption,
     FrameOption,
     HeightOption,
     InitOption,
+    LoaderNumberOption,
     LoaderOption,
     ModelOption,
     RecordingArgument,
@@ -65,6 +66,7 @@ def ik_command(
     topic: TopicOption = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
 ) -> None:
     """Find postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
@@ -82,7 +84,7 @@ def ik_command(
     with clear_errors():
         if body is not None and height is not None:
             raise typer.BadParameter("give --body or --height, not both")
-        source = opened(recording, loader, frame, **topics_of(topic))
+        source = opened(recording, loader, frame, **topics_of(topic), **numbers_of(option))
         written = out or [Path(f"{source.name}_ik.csv")]
         for file in written:
             check_target(file, inputs=(recording,) if targets is None else (recording, targets))

@@ -51,6 +51,18 @@ TopicOption = Annotated[
         help=f"Topic of a bag, where it has several of a kind: {', '.join(TOPICS)}; repeatable, depth cameras add up.",
     ),
 ]
+NUMBERS = ("rate", "metres_per_unit", "tf_max_age")
+"""Options of loaders that are numbers."""
+
+LoaderNumberOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--option",
+        metavar="NAME=NUMBER",
+        help="Of the loader: rate (Pose2Sim, 60 images/s), metres_per_unit (16-bit depth of bags, 0.001), "
+        "tf_max_age (bags, 0.5 s); repeatable.",
+    ),
+]
 UseOption = Annotated[
     str | None,
     typer.Option("--use", metavar="KIND,...", help=f"Inputs to use, by default all there are: {', '.join(INPUTS)}."),

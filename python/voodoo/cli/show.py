@@ -8,8 +8,16 @@ from typing import Annotated
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, opened, topics_of
-from voodoo.cli.options import FrameOption, HeightOption, LoaderOption, ModelOption, RecordingArgument, TopicOption
+from voodoo.cli.common import clear_errors, numbers_of, opened, topics_of
+from voodoo.cli.options import (
+    FrameOption,
+    HeightOption,
+    LoaderNumberOption,
+    LoaderOption,
+    ModelOption,
+    RecordingArgument,
+    TopicOption,
+)
 
 
 def info_command(
@@ -17,10 +25,11 @@ def info_command(
     topic: TopicOption = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
 ) -> None:
     """Say what is in a recording: sensors, topics, frames, rates, root frame and reference."""
     with clear_errors():
-        typer.echo(str(opened(recording, loader, frame, **topics_of(topic)).info()))
+        typer.echo(str(opened(recording, loader, frame, **topics_of(topic), **numbers_of(option)).info()))
 
 
 def config_command() -> None:

@@ -16,6 +16,7 @@ from voodoo.cli.common import (
     config_of,
     depth_filter_of,
     kinds_of,
+    numbers_of,
     opened,
     run,
     states,
@@ -28,6 +29,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    LoaderNumberOption,
     LoaderOption,
     ModelOption,
     RecordingArgument,
@@ -91,6 +93,7 @@ def track_command(
     topic: TopicOption = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
 ) -> None:
     """Track the body through a recording and write one row a frame.
 
@@ -121,14 +124,19 @@ def track_command(
         kinds = kinds_of(use)
         depth_filter = depth_filter_of(depth_range)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
-        options = loader_options(recording, loader, markers=markers, layout=layout) | topics_of(topic)
+        numbers, others = numbers_of(option), with_ or ()
+        options = topics_of(topic) | loader_options(recording, loader, markers=markers, layout=layout, numbers=numbers)
+        # A number that no other recording takes is this one's, whose loader may refuse it.
+        taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
+        options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
             opened(recording, loader, frame, **options),
             keypoints=keypoint_folders(keypoints or ()),
             layout=layout,
-            others=with_ or (),
+            others=others,
             offset=offset,
             markers=markers,
+            numbers=numbers,
         )
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:

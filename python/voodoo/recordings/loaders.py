@@ -57,7 +57,7 @@ def open_recording(path: str | Path, *, loader: str | None = None, **options: An
     if not path.exists():
         raise RecordingError(f"{path}: expected a recording, found no such file or folder")
     name = guess_loader(path) if loader is None else loader
-    known = list(inspect.signature(LOADERS[name].open).parameters)[1:]
+    known = options_of(name)
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise RecordingError(
@@ -69,6 +69,11 @@ def open_recording(path: str | Path, *, loader: str | None = None, **options: An
             f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {recording.loader!r}"
         )
     return recording
+
+
+def options_of(name: str) -> tuple[str, ...]:
+    """Names of the options that a loader takes."""
+    return tuple(inspect.signature(LOADERS[name].open).parameters)[1:]
 
 
 def guess_loader(path: Path) -> str:

@@ -18,6 +18,7 @@ from voodoo.recordings.recording import (
     SensorInfo,
     Start,
     mean_rate,
+    number_option,
     reference_words,
 )
 from voodoo.sensors.camera_files import read_camera_toml
@@ -49,7 +50,7 @@ class Pose2SimRecording(Recording):
     Args:
         path: the folder.
         layout: of the keypoints, see voodoo.keypoints.LAYOUTS.
-        rate: images per second.
+        rate: images per second; nothing in the folder tells it (`voodoo track --option rate=30`).
         cameras: names to use, as in the calibration file; None means all.
 
     Raises:
@@ -67,9 +68,8 @@ class Pose2SimRecording(Recording):
             layout_of(layout)
         except MeasurementError as error:
             raise RecordingError(f"{path}: {error}") from error
-        if not 0.0 < rate < 1e4:
-            raise RecordingError(f"{path}: rate: expected images per second > 0, found {rate!r}")
-        self.layout, self.rate = layout, rate
+        self.layout = layout
+        self.rate = number_option(path, "rate", rate, "images per second > 0", most=1e4)
         calibration = sorted(path.glob("Calib*.toml"))
         if len(calibration) != 1:
             raise RecordingError(f"{path}: expected one Calib*.toml, found {len(calibration)}")

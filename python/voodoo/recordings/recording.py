@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from voodoo.errors import RecordingError
 from voodoo.recordings.measurements import FloatArray, RecordedFrame
 
 
@@ -153,6 +155,21 @@ def reference_words(reference: Reference | None) -> str:
         return "none"
     kind = "exact" if reference.exact else "estimated by another tracker"
     return f"{len(reference.names)} joints, {len(reference.stamps)} stamps, {kind}"
+
+
+def number_option(path: Path, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:
+    """A number that a loader was given, above zero (or zero, where that may be) and not above `most`.
+
+    Raises:
+        RecordingError: it is not; names the option and what was expected.
+    """
+    try:
+        number = float(value) if not isinstance(value, str) else math.nan  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = math.nan
+    if not (0.0 < number <= most or (zero and number == 0.0)):
+        raise RecordingError(f"{path}: {name}: expected {expected}, found {value!r}")
+    return number
 
 
 def mean_rate(count: int, duration: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from voodoo.recordings.measurements import (
     PointCloud,
     RecordedFrame,
 )
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, reference_words
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, reference_words
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
     Message,
@@ -81,12 +82,9 @@ class RosRecording(Recording):
         """Survey topics and transforms; see the class."""
         if isinstance(use, str) or not use or not set(use) <= set(KINDS):
             raise RecordingError(f"use: expected a tuple of some of {', '.join(KINDS)}, found {use!r}")
-        if not metres_per_unit > 0.0 or not tf_max_age >= 0.0:
-            raise RecordingError(
-                f"expected metres_per_unit > 0 and tf_max_age >= 0, found {metres_per_unit!r} and {tf_max_age!r}"
-            )
         self.path = path
-        self._metres_per_unit = metres_per_unit
+        self._metres_per_unit = number_option(path, "metres_per_unit", metres_per_unit, "a length > 0", most=1e3)
+        max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._bag = Bag(path)
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices: dict[Kind, TopicChoice] = {
@@ -98,7 +96,7 @@ class RosRecording(Recording):
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
         sources = finder.find(use)
         self._unused = finder.unused
-        self._tree = TransformTree(path, max_age=tf_max_age)
+        self._tree = TransformTree(path, max_age=max_age)
         self.root_frame = self._read_transforms(root_frame, sources)
         self._driver = sources[0]
         self._sources = {s.topic: s for s in sources if self._connected(s, optional=color_topic is None)}

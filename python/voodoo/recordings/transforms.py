@@ -159,6 +159,6 @@ class TransformTree:
             raise RecordingError(
                 f"{self.source}: expected a transform between {a!r} and {b!r} within {self.max_age} s of stamp "
                 f"{stamp:.6f}, found the nearest usable one {abs(age):.3f} s {'before' if age > 0 else 'after'} it "
-                "(option tf_max_age)"
+                "(loader's option tf_max_age, --option tf_max_age=SECONDS)"
             )
         return edge.transforms[index]
