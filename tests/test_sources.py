@@ -9,13 +9,26 @@ import pytest
 
 import voodoo
 from voodoo.errors import MeasurementError
+from voodoo.keypoints import layout_of
 from voodoo.metrics import JOINTS
-from voodoo.recordings import ColorImage, DepthImage, LaserScan, RecordedFrame, open_recording, sample_path
+from voodoo.recordings import (
+    ColorImage,
+    DepthImage,
+    KeypointImage,
+    LaserScan,
+    PointCloud,
+    RecordedFrame,
+    open_recording,
+    sample_path,
+)
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+from voodoo.sensors.pixels import in_sensor
 from voodoo.sensors.skin import SkinSettings
 
 FRAMES = 40
+MOVED = np.eye(4)
+MOVED[1, 3] = 0.5
 
 
 def run(change=lambda index, items: items, use=("depth", "scan", "skin")):
@@ -194,6 +207,68 @@ def test_time_that_runs_backwards_is_refused_and_the_next_frame_accepted():
             front_end.step(again)
         assert np.array_equal(tracker.estimate.joint_positions, before.joint_positions)
     assert front_end.step(third).stamp == third.stamp
+
+
+def with_keypoints(recorded, joints):
+    """The frame with keypoints of these joints, as a network would find them in its colour picture."""
+    layout = layout_of("body25b")
+    added = []
+    for item in (item for item in recorded.measurements if isinstance(item, ColorImage)):
+        person = np.zeros((layout.count, 3))
+        for part in (part for part in layout.parts if len(part.shares) == 1):
+            pixel = item.camera.project(in_sensor(item.root_from_sensor, [joints[part.site]]))[0]
+            person[next(iter(part.shares))] = *pixel, 0.9
+        place = {"camera": item.camera, "root_from_sensor": item.root_from_sensor}
+        added.append(KeypointImage("network", item.stamp, people=(person,), layout="body25b", **place))
+    return RecordedFrame(recorded.stamp, (*added, *recorded.measurements))
+
+
+def aside(item):
+    """The same, but of a camera half a metre aside, with everything farther away."""
+    moved = replace(item, root_from_sensor=MOVED @ item.root_from_sensor)
+    return replace(moved, metres_per_unit=1.5 * item.metres_per_unit) if isinstance(item, DepthImage) else moved
+
+
+def test_a_refused_frame_leaves_no_trace_in_the_front_end():
+    """What is given after it, or again without what was wrong, is as if it came for the first time."""
+    recording = open_recording(sample_path())
+    frames = [recorded for recorded, _ in zip(paired(recording), range(25), strict=False)]
+    spoiled = PointCloud("cloud", frames[0].stamp, points=np.full((4, 3), np.nan), root_from_sensor=np.eye(4))
+    ends = []
+    for refused in (range(0), range(0, 25, 2)):
+        tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+        tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+        front_end = FrontEnd(tracker)
+        steps = []
+        for index, plain in enumerate(frames):
+            seen = with_keypoints(plain, tracker.estimate.joints)
+            if index in refused:
+                if index % 4:
+                    kept = KeypointImage if index % 8 == 2 else ()  # some pass the gates, some do not
+                    items = [item if isinstance(item, kept) else aside(item) for item in seen.measurements]
+                else:  # the picture is that of the frame before, so its camera seems to be frozen
+                    last = frames[max(index - 1, 0)].measurements
+                    items = [item for item in last if isinstance(item, ColorImage)]
+                    items += [item for item in seen.measurements if isinstance(item, DepthImage)]
+                before = front_end.frozen, dict(front_end.reports), list(front_end.rays)
+                with pytest.raises(MeasurementError, match="finite"):
+                    front_end.step(RecordedFrame(plain.stamp, (*items, spoiled)))
+                assert (front_end.frozen, front_end.reports, front_end.rays) == before
+            estimate = front_end.step(seen if index % 2 else plain)
+            blobs = [
+                (blob.label, blob.count, blob.stamp, blob.velocity.tolist(), blob.far, blob.doubt)
+                for skin in front_end.skin.values()
+                for blob in skin.blobs.items
+            ]
+            scenes = [scene._farthest.sum() for scene in front_end._scenes.values()]
+            steps.append(
+                repr((estimate.sources, front_end.frozen, front_end.reports, front_end._gate._last, blobs, scenes))
+            )
+        ends.append((steps, tracker.estimate.joint_positions.tolist()))
+    for index, (was, now) in enumerate(zip(ends[0][0], ends[1][0], strict=True)):
+        assert was == now, index
+    assert ends[0][1] == ends[1][1]
+    assert "'l_hand'" in ends[0][0][-1] and "('l_wrist', 'network')" in ends[0][0][-1]
 
 
 def work(estimate):

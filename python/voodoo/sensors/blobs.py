@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -103,6 +103,13 @@ class Blobs:
         self.items: list[Blob] = []
         self._missed: dict[str, float] = {}
         self._stamp = -math.inf
+
+    def __copy__(self) -> Blobs:
+        """The same, with blobs of its own."""
+        twin = Blobs()
+        twin.items = [replace(blob, far=dict(blob.far), doubt=dict(blob.doubt)) for blob in self.items]
+        twin._missed, twin._stamp = dict(self._missed), self._stamp
+        return twin
 
     def follow(self, sights: Sequence[Sight], stamp: float) -> list[Blob]:
         """The blob of each sight of a picture, new ones included; those that were not seen for long are dropped."""

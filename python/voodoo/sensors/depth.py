@@ -157,6 +157,12 @@ class StillDepth:
         self._pose: FloatArray | None = None
         self._last: deque[npt.NDArray[np.float32]] = deque(maxlen=_STAYS)
 
+    def __copy__(self) -> StillDepth:
+        """The same; images are never changed in place."""
+        twin = StillDepth()
+        twin._farthest, twin._pose, twin._last = self._farthest, self._pose, self._last.copy()
+        return twin
+
     def see(
         self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray
     ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]] | None:
@@ -168,9 +174,9 @@ class StillDepth:
         """
         moved = self._pose is None or (np.abs(self._pose - world_from_sensor) > _STANDS).any()
         if self._farthest is None or moved or self._farthest.shape != z.shape:
-            self._farthest, self._pose = z.copy(), world_from_sensor
+            self._farthest, self._pose = z, world_from_sensor
             self._last.clear()
-        np.maximum(self._farthest, z, out=self._farthest)
+        self._farthest = np.maximum(self._farthest, z)
         still = None
         if len(self._last) == _STAYS:
             # At the edges of things every camera sees now the one, now the other.

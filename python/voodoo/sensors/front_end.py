@@ -4,6 +4,7 @@ from standard deviations."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -140,10 +141,17 @@ class FrontEnd:
         """Make the frame, step the tracker, and learn from the estimate.
 
         Raises:
-            MeasurementError: a measurement that cannot be used; the tracker is unchanged.
+            MeasurementError: a measurement that cannot be used.
             RecordingError: a picture that cannot be decoded.
+
+        After either, tracker and front end are as they were.
         """
-        estimate = self.tracker.step(self.frame(recorded))
+        before = self._memory()
+        try:
+            estimate = self.tracker.step(self.frame(recorded))
+        except BaseException:
+            vars(self).update(before)
+            raise
         self._predictor.update(recorded.stamp, estimate.joints)
         self._motion.update(recorded.stamp, estimate.world_from_limb)
         for item in recorded.measurements:
@@ -154,6 +162,18 @@ class FrontEnd:
                 )
         self._steps += 1
         return estimate
+
+    def _memory(self) -> dict[str, Any]:
+        """All that `frame` changes, as it is."""
+        return {
+            "frozen": self.frozen,
+            "rays": self.rays,
+            "reports": dict(self.reports),
+            "skin": {sensor: copy(skin) for sensor, skin in self.skin.items()},
+            "_contents": dict(self._contents),
+            "_scenes": {sensor: copy(scene) for sensor, scene in self._scenes.items()},
+            "_gate": copy(self._gate),
+        }
 
     def frame(self, recorded: RecordedFrame) -> voodoo.Frame:
         """The tracker's frame, without stepping."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,10 @@ class SiteGate:
                 f"gate: expected 0 < radius <= widest and growth >= 0, found radius {self.radius!r}, growth "
                 f"{self.growth!r}, widest {self.widest!r}"
             )
+
+    def __copy__(self) -> SiteGate:
+        """The same, with a memory of its own."""
+        return replace(self, _last=dict(self._last))
 
     def limit(self, site: str, source: str, stamp: float) -> float:
         """Radius [m] of a site's gate at `stamp` [s]."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -125,6 +126,13 @@ class SkinTracker:
         self._before: Mask | None = None
         self._static: npt.NDArray[np.float32] | None = None
         self._learnt = 0
+
+    def __copy__(self) -> SkinTracker:
+        """As it is, for what `observe` changes; what `learn` changes is shared."""
+        twin = SkinTracker.__new__(SkinTracker)
+        vars(twin).update(vars(self))
+        twin.blobs = copy(self.blobs)
+        return twin
 
     @property
     def settled(self) -> bool:
