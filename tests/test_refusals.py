@@ -72,6 +72,25 @@ def skin(image, camera=CAMERA):
             "camera: expected a Camera, the calibration of the image, found",
         ),
         (lambda: sensor(world_from_sensor=np.eye(3)), MeasurementError, "expected a finite (4, 4) array, found"),
+        (lambda: sensor(min_confidence=NAN), MeasurementError, "min_confidence: expected a finite number, found nan"),
+        (
+            lambda: sensor(min_confidence="0.3"),
+            MeasurementError,
+            "min_confidence: expected a finite number, found '0.3'",
+        ),
+        (
+            lambda: FrontEndSettings(min_confidence=NAN),
+            MeasurementError,
+            "min_confidence: expected a finite number, found nan",
+        ),
+        *(
+            (
+                lambda pose=pose: voodoo.ik.Silhouette(np.ones((24, 32)), camera=CAMERA, world_from_camera=pose),
+                MeasurementError,
+                f"world_from_camera: expected a rigid 4x4 transform, found {pose!r}",
+            )
+            for pose in (np.diag([2.0, 2.0, 2.0, 1.0]), np.diag([1.0, 1.0, -1.0, 1.0]), np.diag([1.0, 1.0, 1.0, 2.0]))
+        ),
         (lambda: sensor(sites=("l_wirst",)), MeasurementError, "sites: expected some of l_shoulder"),
         (
             lambda: sensor().observe("seen", stamp=0.0, predicted={}),

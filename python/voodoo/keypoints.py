@@ -97,9 +97,10 @@ def site_pixels(
         confidences.
 
     Raises:
-        MeasurementError: unknown layout or wrong shape.
+        MeasurementError: unknown layout, wrong shape or no finite least confidence.
     """
     table = layout_of(layout)
+    check_confidence(min_confidence)
     try:
         rows = np.asarray(keypoints, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -138,7 +139,7 @@ class KeypointSensor:
         sites: use only these; None means all the layout has.
 
     Raises:
-        MeasurementError: an unknown layout or site, no calibration, or no rigid pose.
+        MeasurementError: an unknown layout or site, no calibration, no rigid pose, or no finite least confidence.
     """
 
     layout: str
@@ -158,6 +159,7 @@ class KeypointSensor:
             raise MeasurementError(f"sites: expected some of {', '.join(known)}, found {', '.join(unknown)}")
         checked_camera(self.camera)
         rigid(self.world_from_sensor)
+        check_confidence(self.min_confidence)
 
     def add(
         self,
@@ -269,6 +271,17 @@ class KeypointSensor:
             return None
         cosine = float(direction @ pose[:3, 2])
         return np.asarray(pose[:3, 3] + direction * (z / cosine + _behind_surface(item.site)))
+
+
+def check_confidence(least: object) -> None:
+    """Refuse a least confidence that is no finite number.
+
+    Raises:
+        MeasurementError: it is none.
+    """
+    # Nothing is less than NaN: with it every keypoint would be believed.
+    if not isinstance(least, (int, float, np.floating)) or not math.isfinite(least):
+        raise MeasurementError(f"min_confidence: expected a finite number, found {least!r}")
 
 
 def _behind_surface(site: str) -> float:

@@ -71,11 +71,11 @@ class Silhouette:
         # A picture without the person says nothing; it takes no part.
         self.empty = not person.any()
         pose = numbers("world_from_camera", world_from_camera)
-        if pose.shape != (4, 4) or not np.isfinite(pose).all():
+        if not _is_rigid(pose):
             raise MeasurementError(f"world_from_camera: expected a rigid 4x4 transform, found {world_from_camera!r}")
         seen = None if depth is None else _depths(depth, camera, person)
         intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
-        # The core checks that the pose is rigid, so the inverse is the transposed one.
+        # It is rigid, so the inverse rotation is the transposed one.
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
@@ -90,6 +90,15 @@ class Silhouette:
         """Size, and whether there is anyone in it."""
         height, width = self.distance.shape
         return f"Silhouette({width}x{height}, {'empty' if self.empty else 'a person'})"
+
+
+def _is_rigid(pose: npt.NDArray[np.float64]) -> bool:
+    """As the core decides it; there it would be the inverse that is named."""
+    if pose.shape != (4, 4) or not np.isfinite(pose).all():
+        return False
+    turn = pose[:3, :3]
+    square = np.abs(turn.T @ turn - np.eye(3)).max() < 1e-4
+    return bool(square and np.linalg.det(turn) > 0.0 and (pose[3] == (0.0, 0.0, 0.0, 1.0)).all())
 
 
 def seen_views(images: Sequence[Silhouette]) -> list[_core.View]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 import voodoo
 from voodoo.errors import MeasurementError
-from voodoo.keypoints import KeypointReport, KeypointSensor, layout_of, nearest_person
+from voodoo.keypoints import KeypointReport, KeypointSensor, check_confidence, layout_of, nearest_person
 from voodoo.recordings import (
     ColorImage,
     DepthImage,
@@ -70,7 +70,7 @@ class FrontEndSettings:
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
 
     Raises:
-        MeasurementError: an unknown kind.
+        MeasurementError: an unknown kind, or no finite least confidence.
     """
 
     use: tuple[str, ...] = INPUTS
@@ -91,7 +91,8 @@ class FrontEndSettings:
     ground_z: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the kinds."""
+        """Check the kinds, and what would silently let everything in."""
+        check_confidence(self.min_confidence)
         unknown = sorted(set(self.use) - set(INPUTS))
         if unknown or not self.use:
             raise MeasurementError(f"use: expected some of {', '.join(INPUTS)}, found {', '.join(unknown) or 'none'}")
