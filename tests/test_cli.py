@@ -152,6 +152,22 @@ def test_usage_errors_end_with_2(run):
     assert "not both" in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("track", "x", "--body", "b.toml", "--model", "papers"), "give --body or --model, not both"),
+        (("ik", "x", "--body", "b.toml", "--model", "full"), "give --body or --model, not both"),
+        (("body", "b.toml", "--model", "papers"), "give FILE or --model, not both"),
+        (("body", "b.toml", "--height", "1.7"), "give FILE or --height, not both"),
+        (("track", "x", "--view", "--save", "s.rrd"), "give --view or --save, not both"),
+        (("track", "x", "--offset", "0.5"), "--offset is for the stamps of --with"),
+    ],
+)
+def test_what_would_be_ignored_is_refused(run, arguments, words):
+    result = run(*arguments)
+    assert result.exit_code == 2 and words in result.stderr, result.stderr
+
+
 def test_bad_result_name_is_refused_before_the_work(run):
     assert_one_line(run("track", "x", "--out", "pose.txt", "--overlay", "look"), 1, ".csv, .npz, .bvh")
     assert not Path("look").exists()

@@ -83,6 +83,17 @@ def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
     return numbers
 
 
+def refuse_both(name: str, value: object, **others: object) -> None:
+    """Refuse options that would not be read beside another one; None: not given.
+
+    Raises:
+        typer.BadParameter: one of them is given.
+    """
+    for other, given in others.items():
+        if value is not None and given is not None:
+            raise typer.BadParameter(f"give {name} or {other}, not both")
+
+
 def kinds_of(words: str | None) -> tuple[str, ...]:
     """The kinds of inputs in "depth,scan"; all of them for None.
 

@@ -25,7 +25,7 @@ def eval_command(
     only: Annotated[
         list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
     ] = None,
-    model: ModelOption = "full",
+    model: ModelOption = None,
     use: UseOption = None,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
     ablation: Annotated[
@@ -55,13 +55,14 @@ def eval_command(
     from voodoo.report import markdown, write_reports
 
     with clear_errors():
+        human = model or "full"
         config_of(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
         if ablation:
             chosen = config_of(config)
-            runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, jobs=jobs)
+            runs = ablate(paths, config=chosen, loader=loader, model=human, use=kinds, jobs=jobs)
             ablations = list(progressing(runs, "ablating", len(variants(chosen))))
             typer.echo(table(ablations))
             if out is not None:
@@ -70,7 +71,7 @@ def eval_command(
             if failed:
                 raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
             return
-        done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, jobs=jobs)
+        done = evaluate_all(paths, config_file=config, loader=loader, model=human, use=kinds, jobs=jobs)
         ordered = sorted(progressing(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
         typer.echo(markdown(scores))

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, numbers_of, opened, states, topics_of
+from voodoo.cli.common import clear_errors, numbers_of, opened, refuse_both, states, topics_of
 from voodoo.cli.options import (
     BodyOption,
     FrameOption,
@@ -55,7 +55,7 @@ def ik_command(
     init: InitOption = None,
     body: BodyOption = None,
     height: HeightOption = None,
-    model: ModelOption = "full",
+    model: ModelOption = None,
     out: Annotated[
         list[Path] | None,
         typer.Option(
@@ -82,8 +82,7 @@ def ik_command(
     from voodoo.ik_recording import Positions, follow
 
     with clear_errors():
-        if body is not None and height is not None:
-            raise typer.BadParameter("give --body or --height, not both")
+        refuse_both("--body", body, **{"--height": height, "--model": model})
         source = opened(recording, loader, frame, **topics_of(topic), **numbers_of(option))
         written = out or [Path(f"{source.name}_ik.csv")]
         for file in written:
@@ -94,7 +93,7 @@ def ik_command(
             init=None if init is None else Init.load(init),
             body=None if body is None else voodoo.Body.load(body),
             height=height,
-            model=model,
+            model=model or "full",
         )
         known = None if sites is None else tuple(name.strip() for name in sites.split(","))
         how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}

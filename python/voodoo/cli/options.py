@@ -36,8 +36,8 @@ InitOption = Annotated[
     typer.Option("--init", metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
 ]
 ModelOption = Annotated[
-    HumanModel,
-    typer.Option("--model", help="The default human: of eighteen limbs (full), or of the papers' ten."),
+    HumanModel | None,
+    typer.Option("--model", help="The default human: of eighteen limbs (full, the default), or of the papers' ten."),
 ]
 FrameOption = Annotated[
     str | None,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import voodoo
-from voodoo.cli.common import clear_errors, numbers_of, opened, topics_of
+from voodoo.cli.common import clear_errors, numbers_of, opened, refuse_both, topics_of
 from voodoo.cli.options import (
     FrameOption,
     HeightOption,
@@ -45,14 +45,13 @@ def config_command() -> None:
 def body_command(
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A body file to check and print.")] = None,
     height: HeightOption = None,
-    model: ModelOption = "full",
+    model: ModelOption = None,
 ) -> None:
     """Print a body as TOML: the default human of a stature, or a file after checking it."""
     with clear_errors():
-        if file is not None and height is not None:
-            raise typer.BadParameter("give FILE or --height, not both")
+        refuse_both("FILE", file, **{"--height": height, "--model": model})
         if file is not None:
             body = voodoo.Body.load(file)
         else:
-            body = voodoo.Body.human(1.75 if height is None else height, model=model)
+            body = voodoo.Body.human(1.75 if height is None else height, model=model or "full")
         typer.echo(body.to_toml(), nl=False)

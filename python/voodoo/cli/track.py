@@ -18,6 +18,7 @@ from voodoo.cli.common import (
     kinds_of,
     numbers_of,
     opened,
+    refuse_both,
     run,
     states,
     topics_of,
@@ -53,7 +54,7 @@ def track_command(
     init: InitOption = None,
     body: BodyOption = None,
     height: HeightOption = None,
-    model: ModelOption = "full",
+    model: ModelOption = None,
     config: ConfigOption = None,
     out: Annotated[
         list[Path] | None,
@@ -117,10 +118,10 @@ def track_command(
     voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
     with clear_errors():
-        if body is not None and height is not None:
-            raise typer.BadParameter("give --body or --height, not both")
-        if view and save is not None:
-            raise typer.BadParameter("give --view or --save, not both")
+        refuse_both("--body", body, **{"--height": height, "--model": model})
+        refuse_both("--view", view or None, **{"--save": save})
+        if offset and not with_:
+            raise typer.BadParameter("--offset is for the stamps of --with, give both")
         kinds = kinds_of(use)
         depth_filter = depth_filter_of(depth_range)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
@@ -146,7 +147,7 @@ def track_command(
             init=None if init is None else Init.load(init),
             body=None if body is None else voodoo.Body.load(body),
             height=height,
-            model=model,
+            model=model or "full",
             config=config_of(config),
             markers=markers,
         )
