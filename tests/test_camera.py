@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from voodoo.camera import Camera
 from voodoo.errors import CameraError, VoodooError
+from voodoo.sensors.pixels import normalized
 
 PINHOLE = Camera(width=8, height=6, fx=10.0, fy=12.0, cx=3.5, cy=2.5)
 LENSES = {
@@ -44,6 +45,14 @@ def test_rays_undo_project_to_every_pixel(model):
     points = np.dstack([rays, np.ones((48, 64))]).reshape(-1, 3) * 1.7
     u, v = np.meshgrid(np.arange(64.0), np.arange(48.0))
     np.testing.assert_allclose(camera.project(points), np.stack([u, v], -1).reshape(-1, 2), atol=2e-3)
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_single_pixels_and_all_of_them_are_inverted_alike(model):
+    camera = lens(model, LENSES[model])
+    pixels = np.stack(np.meshgrid(np.arange(64.0), np.arange(48.0)), axis=-1).reshape(-1, 2)
+    alone = np.concatenate([normalized(camera, part) for part in np.array_split(pixels, 100)])
+    np.testing.assert_array_equal(alone.astype(np.float32), camera.rays().reshape(-1, 2))
 
 
 def test_equidistant_follows_its_definition():

@@ -182,6 +182,24 @@ class Camera:
             pixels, _ = cv2.projectPoints(points, zero, zero, self.matrix, self._coefficients())
         return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
 
+    def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Normalized coordinates x/z, y/z (N, 2) of pixels (N, 2) at any subpixel position, lens distortion removed.
+
+        NaN where the lens model cannot be inverted, see `rays`. The shape is not checked, see voodoo.sensors.pixels.normalized.
+        """
+        if not self.distorted or not len(pixels):
+            return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
+        # The default of five fixed-point iterations leaves whole pixels of error on wide lenses.
+        until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
+        undistort = cv2.fisheye.undistortPoints if self.model == "equidistant" else cv2.undistortPoints
+        source = np.ascontiguousarray(pixels[:, None, :])
+        found = undistort(source, self.matrix, self._coefficients(), criteria=until)
+        xy = np.array(found, dtype=np.float64).reshape(-1, 2)
+        with np.errstate(all="ignore"):
+            error = np.abs(self._distorted(xy) - pixels).max(axis=1)
+        xy[~(error < _ROUND_TRIP_PX)] = np.nan
+        return xy
+
     def _coefficients(self) -> npt.NDArray[np.float64]:
         return np.array(self.distortion or (0.0,) * 4)
 
@@ -190,21 +208,7 @@ class Camera:
 def _rays(camera: Camera) -> npt.NDArray[np.float32]:
     u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
     pixels = np.stack([u, v], axis=-1).reshape(-1, 2)
-    if not camera.distorted:
-        xy = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-    else:
-        # The default of five fixed-point iterations leaves whole pixels of error on wide lenses.
-        until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
-        source = pixels[:, None, :]
-        if camera.model == "equidistant":
-            found = cv2.fisheye.undistortPoints(source, camera.matrix, camera._coefficients(), criteria=until)
-        else:
-            found = cv2.undistortPoints(source, camera.matrix, camera._coefficients(), criteria=until)
-        xy = np.array(found, dtype=np.float64).reshape(-1, 2)
-        with np.errstate(all="ignore"):
-            error = np.abs(camera._distorted(xy) - pixels).max(axis=1)
-        xy[~(error < _ROUND_TRIP_PX)] = np.nan
-    rays = xy.reshape(camera.height, camera.width, 2).astype(np.float32)
+    rays = camera.undistorted(pixels).reshape(camera.height, camera.width, 2).astype(np.float32)
     rays.setflags(write=False)
     return rays
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -12,8 +11,6 @@ from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
-
-_ROUND_TRIP_PX = 0.1
 
 
 def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:
@@ -32,18 +29,7 @@ def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:
     pixels = np.asarray(pixels, dtype=np.float64)
     if pixels.ndim != 2 or pixels.shape[1] != 2:
         raise MeasurementError(f"pixels: expected shape (N, 2), found {pixels.shape}")
-    if not camera.distorted or not len(pixels):
-        return np.asarray((pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy))
-    until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
-    coefficients = np.array(camera.distortion or (0.0,) * 4)
-    source = np.ascontiguousarray(pixels[:, None, :])
-    undistort = cv2.fisheye.undistortPoints if camera.model == "equidistant" else cv2.undistortPoints
-    found = undistort(source, camera.matrix, coefficients, criteria=until)
-    xy = np.array(found, dtype=np.float64).reshape(-1, 2)
-    with np.errstate(all="ignore"):
-        error = np.abs(camera.project(np.column_stack([xy, np.ones(len(xy))])) - pixels).max(axis=1)
-    xy[~(error < _ROUND_TRIP_PX)] = np.nan
-    return xy
+    return camera.undistorted(pixels)
 
 
 def world_rays(
