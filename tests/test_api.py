@@ -361,6 +361,18 @@ def test_the_body_changes_between_frames(tracker, cloud):
             change()
 
 
+def test_points_that_are_not_finite_are_named_by_their_row(tracker):
+    points = np.array([[0.0, 0.0, 0.0], [1.0, np.nan, 2.0]])
+    words = r"points: expected finite metres, found \[1.0, NaN, 2.0\] in row 1$"
+    for call in (
+        tracker.distance,
+        tracker.limb_distances,
+        voodoo.TaperedEllipticCylinder(1, 1, 1, 1, 1).closest_points,
+    ):
+        with pytest.raises(MeasurementError, match=words):
+            call(points)
+
+
 def test_distance_is_signed(tracker, cloud):
     assert np.abs(tracker.distance(cloud)).mean() < 0.01
     torso = tracker.estimate.world_from_limb["torso"]

@@ -108,7 +108,7 @@ impl PyShape {
             (batch, bad)
         });
         if let Some(row) = bad {
-            let found = format!("points: expected finite metres, found {:?} in row {row}", slice.get(row));
+            let found = format!("points: expected finite metres, found {:?} in row {row}", slice.get(row).to_array());
             return Err(crate::errors::exception(py, "MeasurementError", found));
         }
         let interleave = |points: &Points| -> PyResult<Py<PyAny>> {

@@ -176,7 +176,7 @@ impl Body {
                 return Err(BodyError::Value {
                     key: format!("{key}.position"),
                     expected: "finite metres",
-                    found: format!("{:?}", site.position),
+                    found: format!("{:?}", site.position.to_array()),
                 });
             }
         }

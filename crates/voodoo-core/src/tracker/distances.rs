@@ -16,7 +16,11 @@ impl Tracker {
         for index in 0..points.len() {
             let point = points.get(index);
             if !point.is_finite() {
-                return Err(TrackError::measurement("points", "finite metres", format!("{point:?} in row {index}")));
+                return Err(TrackError::measurement(
+                    "points",
+                    "finite metres",
+                    format!("{:?} in row {index}", point.to_array()),
+                ));
             }
             queries.push((point - self.origin).to_array().map(|value| value as f32));
         }
