@@ -20,8 +20,9 @@ const SAMPLE: usize = 400;
 /// What leans and what stands, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct Lean {
-    /// The two arms and the two legs among the chains; none of a body that has not just these.
-    chains: Option<[[usize; 2]; 2]>,
+    /// The two legs among the chains, none of a body on one or four, and the two arms: without them nothing leans.
+    legs: Option<[usize; 2]>,
+    arms: Option<[usize; 2]>,
     /// The limbs from the root to the arms.
     trunk: Vec<usize>,
     points: Points,
@@ -56,9 +57,9 @@ impl Lean {
                 _ => None,
             }
         };
-        self.chains = pair(false).zip(pair(true)).map(|(arms, legs)| [arms, legs]);
+        (self.legs, self.arms) = (pair(true), pair(false));
         self.trunk.clear();
-        for arm in self.chains.iter().flat_map(|[arms, _]| arms) {
+        for arm in self.arms.iter().flatten() {
             let mut limb = chains[*arm].upper;
             while let Some((parent, _)) = &body.limbs()[limb].parent {
                 limb = *parent;
@@ -100,12 +101,14 @@ impl Tracker {
     /// Stances of the body with its feet at `ends` (of the chains, world), into `lean`; the one that costs least, none when there
     /// is no such thing. A body that sinks pushes both legs out of place, and each alone is held by the other and by the trunk.
     pub(super) fn lean(&self, ends: &[Option<Vec3>], views: Views, lean: &mut Lean) -> Option<Stance> {
-        let [arms, [one, two]] = lean.chains?;
+        let [one, two] = lean.legs?;
         let (one_end, two_end) = (ends[one]?, ends[two]?);
         let legs = [(&self.chains[one], one_end - self.origin), (&self.chains[two], two_end - self.origin)];
-        let [first, second] = arms.map(|arm| self.chains[arm].root(&self.body, &self.poses));
-        let axis = (second - first).try_normalize()?;
-        let shoulders = 0.5 * (first + second);
+        let roots = lean.arms.map(|arms| arms.map(|arm| self.chains[arm].root(&self.body, &self.poses)));
+        let (shoulders, axis) = roots.map_or((Vec3::ZERO, Vec3::ZERO), |[first, second]| {
+            (0.5 * (first + second), (second - first).normalize_or_zero())
+        });
+        let leans = if axis == Vec3::ZERO { &[] } else { LEANS.as_slice() };
         lean.take(&self.candidates);
         let Lean { trunk, points, weight, staying, leaning, tried, distances, trial, upright, leant, .. } = lean;
         let mut explain = |limb: usize, poses: &[Pose], least: &mut [f32]| {
@@ -121,10 +124,10 @@ impl Tracker {
             explain(limb, &self.poses, staying);
         }
         let (mut least, mut stance) = (f64::INFINITY, None);
-        for angle in [0.0].into_iter().chain(LEANS) {
+        for angle in [&0.0].into_iter().chain(leans) {
             trial.clone_from(&self.poses);
             leaning.clone_from(staying);
-            let turn = Quat::from_axis_angle(axis, angle);
+            let turn = Quat::from_axis_angle(axis, *angle);
             let mut cost = 0.0;
             for limb in trunk.iter().copied() {
                 let pose = &self.poses[limb];
