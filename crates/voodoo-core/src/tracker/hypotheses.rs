@@ -264,7 +264,8 @@ impl Tracker {
             }
         }
         work.others = others;
-        // What the last frame asked for comes first: two frames that ask for a change shall ask for the same one.
+        // What the last frame asked for comes before what is new: two frames that ask for a change shall ask for the same one.
+        // Only a lean comes earlier: while the trunk is wrong, both legs ask for what does not last.
         let mut wanted = std::mem::take(&mut work.wanted[index]);
         wanted.iter_mut().for_each(|pose| *pose = shifted(pose, self.origin));
         let stance = if self.chains[index].leg { self.lean(&work.ends, views, &mut work.lean) } else { None };
