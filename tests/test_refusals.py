@@ -71,7 +71,14 @@ def skin(image, camera=CAMERA):
             MeasurementError,
             "camera: expected a Camera, the calibration of the image, found",
         ),
-        (lambda: sensor(world_from_sensor=np.eye(3)), MeasurementError, "expected a finite (4, 4) array, found"),
+        *(
+            (
+                lambda pose=pose: sensor(world_from_sensor=pose),
+                MeasurementError,
+                f"world_from_sensor: expected a rigid 4x4 transform, found {pose!r}",
+            )
+            for pose in (np.eye(3), np.full((4, 4), NAN), np.diag([1.0, 1.0, 1.0, 2.0]), "here")
+        ),
         (lambda: sensor(min_confidence=NAN), MeasurementError, "min_confidence: expected a finite number, found nan"),
         (
             lambda: sensor(min_confidence="0.3"),

@@ -60,6 +60,8 @@ def test_bad_pairs_are_refused():
     left_of_it[0, 3] *= -1
     with pytest.raises(MeasurementError, match="to the right"):
         StereoPair(LEFT, RIGHT, left_of_it)
+    with pytest.raises(MeasurementError, match="left_from_right: expected a rigid 4x4 transform"):
+        StereoPair(LEFT, RIGHT, 2.0 * LEFT_FROM_RIGHT)
     with pytest.raises(MeasurementError, match="one size"):
         StereoPair(LEFT, Camera(160, 120, 150.0, 150.0, 80.0, 60.0), LEFT_FROM_RIGHT)
     with pytest.raises(MeasurementError, match="left: expected uint8"):

@@ -254,7 +254,7 @@ def checked_joints(
     return checked
 
 
-def listed_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.float64]]:
+def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.float64]]:
     """Poses (4, 4) by name in the order of the body's limbs; the core checks that they are rigid.
 
     Raises:

@@ -18,9 +18,10 @@ from voodoo._core import Frame
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError, RecordingError, reading
 from voodoo.keypoint_layouts import LAYOUTS, Layout
+from voodoo.poses import rigid
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import checked_camera, in_sensor, ray_distance, rigid, world_rays
+from voodoo.sensors.pixels import checked_camera, in_sensor, ray_distance, world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]

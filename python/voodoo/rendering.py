@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo import _core
-from voodoo.body import Body, listed_poses
+from voodoo.body import Body, ordered_poses
 from voodoo.camera import Camera
 
 
@@ -55,7 +55,7 @@ def render_depth(
     """
     depth, limb = _core.render_depth(
         body.core,
-        listed_poses(body, world_from_limb),
+        ordered_poses(body, world_from_limb),
         width=camera.width,
         height=camera.height,
         intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),

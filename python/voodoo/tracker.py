@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from voodoo import _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
-from voodoo.body import Body, Joint, checked_joints, listed_poses
+from voodoo.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.config import Config
 from voodoo.errors import BodyError, ConfigError
 
@@ -74,7 +74,7 @@ class Tracker:
             BodyError: a limb is missing or unknown.
             MeasurementError: a matrix is not rigid; it names the limb.
         """
-        return self._core._reset_pose(listed_poses(self.body, world_from_limb))
+        return self._core._reset_pose(ordered_poses(self.body, world_from_limb))
 
     def step(self, frame: Frame) -> Estimate:
         """The pose at the frame's time. Releases the GIL; a refused frame leaves the tracker as it was.

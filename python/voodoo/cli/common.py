@@ -71,15 +71,16 @@ def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
     Raises:
         VoodooError: another form or name.
     """
-    numbers = {}
+    numbers: dict[str, float] = {}
     for word in words or ():
         name, _, value = word.partition("=")
         try:
-            numbers[NUMBERS[NUMBERS.index(name)]] = float(value)
+            number = float(value) if name in NUMBERS else None
         except ValueError:
-            raise VoodooError(
-                f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}"
-            ) from None
+            number = None
+        if number is None:
+            raise VoodooError(f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}")
+        numbers[name] = number
     return numbers
 
 

@@ -13,6 +13,7 @@ from voodoo import _core
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
 from voodoo.ik.values import numbers
+from voodoo.poses import rigid
 
 _UNDISTORTED = 0.5
 _MIDDLE = 0.3
@@ -70,9 +71,7 @@ class Silhouette:
         self.thickness.setflags(write=False)
         # A picture without the person says nothing; it takes no part.
         self.empty = not person.any()
-        pose = numbers("world_from_camera", world_from_camera)
-        if not _is_rigid(pose):
-            raise MeasurementError(f"world_from_camera: expected a rigid 4x4 transform, found {world_from_camera!r}")
+        pose = rigid(world_from_camera, name="world_from_camera")
         seen = None if depth is None else _depths(depth, camera, person)
         intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
         # It is rigid, so the inverse rotation is the transposed one.
@@ -90,15 +89,6 @@ class Silhouette:
         """Size, and whether there is anyone in it."""
         height, width = self.distance.shape
         return f"Silhouette({width}x{height}, {'empty' if self.empty else 'a person'})"
-
-
-def _is_rigid(pose: npt.NDArray[np.float64]) -> bool:
-    """As the core decides it; there it would be the inverse that is named."""
-    if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        return False
-    turn = pose[:3, :3]
-    square = np.abs(turn.T @ turn - np.eye(3)).max() < 1e-4
-    return bool(square and np.linalg.det(turn) > 0.0 and (pose[3] == (0.0, 0.0, 0.0, 1.0)).all())
 
 
 def seen_views(images: Sequence[Silhouette]) -> list[_core.View]:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
+from voodoo.poses import rigid
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -55,32 +56,6 @@ def checked_camera(camera: object) -> Camera:
     if not isinstance(camera, Camera):
         raise MeasurementError(f"camera: expected a Camera, the calibration of the image, found {camera!r}")
     return camera
-
-
-def rigid(world_from_sensor: npt.ArrayLike) -> FloatArray:
-    """A (4, 4) array, checked.
-
-    Raises:
-        MeasurementError: another shape, not finite, or no rigid transform.
-    """
-    pose = np.asarray(world_from_sensor, dtype=np.float64)
-    if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        raise MeasurementError(f"world_from_sensor: expected a finite (4, 4) array, found shape {pose.shape}")
-    x, y, z = pose[:3, :3].tolist()
-    # Nine numbers are faster without arrays.
-    unit, square = [_dot(axis, axis) for axis in (x, y, z)], [_dot(x, y), _dot(y, z), _dot(z, x)]
-    across = [y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0]]
-    if (
-        any(abs(value - 1.0) > 1e-4 for value in unit)
-        or any(abs(value) > 1e-4 for value in square)
-        or _dot(x, across) < 0
-    ):
-        raise MeasurementError(f"world_from_sensor: expected a rotation in its upper left 3x3, found {[x, y, z]}")
-    return pose
-
-
-def _dot(a: list[float], b: list[float]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def in_sensor(world_from_sensor: FloatArray, points: npt.ArrayLike) -> FloatArray:

@@ -30,11 +30,12 @@ import numpy.typing as npt
 from voodoo._core import Estimate
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
+from voodoo.poses import rigid
 from voodoo.sensors.blobs import Blob, Blobs, Sight
 from voodoo.sensors.depth import BodyView
 from voodoo.sensors.hands import BARE, elsewhere, hand_ends, of_pieces, reach, to_palm
 from voodoo.sensors.model import PixelNoise
-from voodoo.sensors.pixels import FloatArray, checked_camera, in_sensor, lengths, ray_distance, rigid, world_rays
+from voodoo.sensors.pixels import FloatArray, checked_camera, in_sensor, lengths, ray_distance, world_rays
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin_colour import Colours, SkinColour
 from voodoo.sensors.skin_regions import FACE_M, PALM_M, Candidate, candidates, joined

@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
+from voodoo.poses import rigid
 from voodoo.sensors.model import RangeNoise, stereo_noise
-from voodoo.sensors.pixels import FloatArray, rigid
+from voodoo.sensors.pixels import FloatArray
 
 _FRACTIONS = 16  # StereoSGBM gives sixteenths of a pixel
 
@@ -63,7 +64,7 @@ class StereoPair:
         max_difference: int = 1,
     ) -> None:
         """Rectify once; see the class."""
-        pose = rigid(left_from_right)
+        pose = rigid(left_from_right, name="left_from_right")
         if (left.width, left.height) != (right.width, right.height):
             raise MeasurementError(
                 f"stereo: expected cameras of one size, found {left.width}x{left.height} px and "
@@ -151,5 +152,5 @@ class StereoPair:
         with np.errstate(divide="ignore"):
             z = np.float32(self.camera.fx * self.baseline) / disparity
         z[~((disparity > 0.0) & (z >= self._nearest) & (z <= self._farthest))] = 0.0
-        pose = np.eye(4) if world_from_left is None else rigid(world_from_left)
+        pose = np.eye(4) if world_from_left is None else rigid(world_from_left, name="world_from_left")
         return StereoDepth(z.astype(np.float32), self.camera, pose @ self._left_from_rectified, self.noise)
