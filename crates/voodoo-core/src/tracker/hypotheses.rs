@@ -44,7 +44,7 @@ const SWIVELS_AT_REST: usize = 12;
 /// A rough hypothesis explains points up to this distance, metres: they are drawn in when it is refined.
 const ROUGHLY: f64 = 0.08;
 /// Points looked at when hypotheses are compared, at most.
-const SAMPLE: usize = 400;
+pub(super) const SAMPLE: usize = 400;
 
 /// What a hypothesis rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -217,12 +217,7 @@ impl Tracker {
                      best: &mut Vec<f32>,
                      distances: &mut Vec<f32>| {
             best.clone_from(&others);
-            for limb in chain.limbs() {
-                self.body.limbs()[limb].shape.approximate_distances(&poses[limb], near, distances);
-                for (best, distance) in best.iter_mut().zip(distances.iter()) {
-                    *best = best.min(distance.abs());
-                }
-            }
+            chain.limbs().for_each(|limb| self.explain(limb, poses, near, best, distances));
             let points = rough_cost(best, weights);
             if points >= least {
                 return points;
@@ -370,10 +365,22 @@ impl Tracker {
         others.clear();
         others.resize(points.len(), f32::INFINITY);
         for limb in (0..self.poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
-            self.body.limbs()[limb].shape.approximate_distances(&self.poses[limb], points, distances);
-            for (least, distance) in others.iter_mut().zip(distances.iter()) {
-                *least = least.min(distance.abs());
-            }
+            self.explain(limb, &self.poses, points, others, distances);
+        }
+    }
+
+    /// Lowers the least distances of points to the limbs of a hypothesis by those to one more limb.
+    pub(super) fn explain(
+        &self,
+        limb: usize,
+        poses: &[Pose],
+        points: &Points,
+        least: &mut [f32],
+        distances: &mut Vec<f32>,
+    ) {
+        self.body.limbs()[limb].shape.approximate_distances(&poses[limb], points, distances);
+        for (least, distance) in least.iter_mut().zip(distances.iter()) {
+            *least = least.min(distance.abs());
         }
     }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::Tracker;
-use super::hypotheses::{SWIVELS, rough_cost};
+use super::hypotheses::{SAMPLE, SWIVELS, rough_cost};
 use super::places::thin;
 use crate::body::Body;
 use crate::candidates::Candidates;
@@ -14,8 +14,6 @@ use crate::view::Views;
 
 /// Leans that are tried after none, radians.
 const LEANS: [f64; 4] = [-0.2, 0.2, -0.4, 0.4];
-/// Points looked at when they are compared, at most.
-const SAMPLE: usize = 400;
 
 /// What leans and what stands, and working memory.
 #[derive(Debug, Default)]
@@ -111,12 +109,8 @@ impl Tracker {
         let leans = if axis == Vec3::ZERO { &[] } else { LEANS.as_slice() };
         lean.take(&self.candidates);
         let Lean { trunk, points, weight, staying, leaning, tried, distances, trial, upright, leant, .. } = lean;
-        let mut explain = |limb: usize, poses: &[Pose], least: &mut [f32]| {
-            self.body.limbs()[limb].shape.approximate_distances(&poses[limb], points, distances);
-            for (least, distance) in least.iter_mut().zip(distances.iter()) {
-                *least = least.min(distance.abs());
-            }
-        };
+        let mut explain =
+            |limb: usize, poses: &[Pose], least: &mut [f32]| self.explain(limb, poses, points, least, distances);
         let seen = |limb: usize, poses: &[Pose]| look(views, &self.body.limbs()[limb], &poses[limb]).cost();
         staying.resize(points.len(), f32::INFINITY);
         let stands = |limb: usize| legs.iter().any(|(leg, _)| leg.limbs().any(|own| own == limb));
