@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use voodoo_core::body::HumanModel;
 use voodoo_core::config::SolverKind;
-use voodoo_core::frame::{Cloud, DepthImage, Frame};
-use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{Cloud, DepthImage, Frame};
 use voodoo_core::{Body, Config, Tracker};
 
 #[path = "../crates/voodoo-core/tests/scene/mod.rs"]

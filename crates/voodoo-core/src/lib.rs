@@ -7,45 +7,26 @@
 //! Modules depend downwards only: `tracker` > `solver`, `associate`, `relate` > `correspondence`, `candidates` > `frame` >
 //! `body` > `shape`, `rigid` > `geometry`.
 
-pub mod associate;
-pub mod background;
-pub mod beside;
-mod blobs;
+pub mod association;
 pub mod body;
-mod calibrate;
-pub mod candidates;
-pub mod chain;
-mod clusters;
 pub mod config;
-pub mod correspondence;
 pub mod error;
-pub mod estimate;
-pub mod evidence;
-mod facing;
-pub mod frame;
-pub mod geometry;
+pub mod hypotheses;
 pub mod ik;
-mod nearest;
-pub mod normal;
-pub mod outline;
-pub mod predict;
-pub mod proof;
-pub mod recover;
-mod relate;
-pub mod render;
-pub mod rigid;
-pub mod roundness;
+pub mod math;
+pub mod observation;
+pub mod relocalize;
 pub mod shape;
-mod simd;
+pub mod sizes;
 pub mod solver;
 pub mod terms;
 pub mod tracker;
-pub mod view;
+pub mod visibility;
 
 pub use body::Body;
 pub use config::Config;
 pub use error::{BodyError, ConfigError, TrackError};
-pub use estimate::{Estimate, Status};
-pub use frame::Frame;
+pub use observation::frame::Frame;
 pub use shape::TaperedEllipticCylinder;
 pub use tracker::Tracker;
+pub use tracker::estimate::{Estimate, Status};

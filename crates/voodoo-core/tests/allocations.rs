@@ -7,10 +7,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use voodoo_core::body::HumanModel;
-use voodoo_core::frame::{Frame, PositionRelation, RayRelation};
-use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::ik::{Aim, Criterion, Goal, Model, Options, Rest, Root, Solver, View, bones, trunk};
-use voodoo_core::render::{Rendering, Viewpoint};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{Frame, PositionRelation, RayRelation};
+use voodoo_core::visibility::render::{Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Tracker};
 
 struct Counting;

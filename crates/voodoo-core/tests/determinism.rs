@@ -5,7 +5,7 @@ mod scene;
 
 use voodoo_core::body::HumanModel;
 use voodoo_core::config::Overlap;
-use voodoo_core::frame::Frame;
+use voodoo_core::observation::frame::Frame;
 use voodoo_core::{Body, Config, Tracker};
 
 fn run(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> Vec<Vec<u64>> {

@@ -5,13 +5,13 @@ use nalgebra::Matrix6;
 use proptest::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
-use voodoo_core::chain::exp;
-use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::body::kinematics::exp;
 use voodoo_core::ik::{
     Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, Trunk, View, bones, level_rows,
     log, project, trunk,
 };
-use voodoo_core::normal::{LimbBlock, line};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::terms::normal_equations::{LimbBlock, line};
 
 fn human() -> Body {
     Body::human(1.75, HumanModel::Full).unwrap()

@@ -4,10 +4,10 @@
 use proptest::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
-use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::ik::{
     Aim, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, View, bones, level_cost, level_rows, trunk,
 };
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 
 const LONG: Options = Options { steps: 400, tolerance: 1e-12, still: 1e-9, gain: 1.0, caution: 0.3, largest_turn: 0.5 };
 

@@ -4,11 +4,11 @@
 mod scene;
 
 use proptest::prelude::*;
+use voodoo_core::body::kinematics::{hinge_axis, joint_turn, place};
 use voodoo_core::body::{HumanModel, Joint};
-use voodoo_core::chain::{hinge_axis, joint_turn, place};
 use voodoo_core::config::SolverKind;
-use voodoo_core::frame::{Cloud, Frame, PositionRelation, RayRelation, Scope};
-use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{Cloud, Frame, PositionRelation, RayRelation, Scope};
 use voodoo_core::{Body, Config, Status, TaperedEllipticCylinder, Tracker};
 
 fn human() -> Body {

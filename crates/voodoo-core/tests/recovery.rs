@@ -4,8 +4,8 @@
 mod scene;
 
 use voodoo_core::body::HumanModel;
-use voodoo_core::frame::Frame;
-use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::frame::Frame;
 use voodoo_core::{Body, Config, Estimate, Status, Tracker};
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };

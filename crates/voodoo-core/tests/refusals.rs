@@ -5,10 +5,10 @@ mod scene;
 
 use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
 use voodoo_core::config::{RawValue, Value};
-use voodoo_core::frame::{
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{
     Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };
-use voodoo_core::geometry::{Pose, Quat, Vec3};
 use voodoo_core::{Body, BodyError, Config, ConfigError, TaperedEllipticCylinder, TrackError, Tracker};
 
 fn started() -> (Tracker, Vec<[f64; 3]>) {

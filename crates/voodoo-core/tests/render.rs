@@ -7,9 +7,9 @@ mod shape_support;
 use shape_support::{Random, hostile, inside, limb_like, random_shape};
 use voodoo_core::Body;
 use voodoo_core::body::{HumanModel, Joint, Limb};
-use voodoo_core::geometry::{Pose, Vec3};
-use voodoo_core::render::{NO_LIMB, Rendering, Viewpoint};
+use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::shape::TaperedEllipticCylinder;
+use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
 
 fn camera(width: usize, height: usize, focal: f64) -> Viewpoint<'static> {
     Viewpoint {

@@ -4,7 +4,7 @@
 mod shape_support;
 
 use shape_support::{Random, brute_force, hostile, limb_like, random_shape, shape};
-use voodoo_core::geometry::{Points, Pose, Vec3};
+use voodoo_core::math::{Points, Pose, Vec3};
 use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};
 
 const TOLERANCE: f64 = 1e-6;

@@ -4,7 +4,7 @@
 mod shape_support;
 
 use shape_support::{Random, brute_force, hostile, inside, limb_like, random_shape, shape, surface_point};
-use voodoo_core::geometry::{Pose, Vec3};
+use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::shape::{Region, TaperedEllipticCylinder};
 
 /// The first stretch of a dense march that goes from outside to inside.

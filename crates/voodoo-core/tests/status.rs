@@ -6,15 +6,15 @@ mod scene;
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 use voodoo_core::Body;
-use voodoo_core::background::Backgrounds;
 use voodoo_core::body::HumanModel;
-use voodoo_core::frame::{DepthImage, DepthPixels, Frame};
-use voodoo_core::geometry::{Pose, Quat, Vec3};
-use voodoo_core::proof::{Proof, prove};
-use voodoo_core::recover::TwoBone;
-use voodoo_core::render::{Rendering, Viewpoint};
-use voodoo_core::roundness::roundness;
-use voodoo_core::view::{Views, find_cut_out};
+use voodoo_core::body::two_bone::TwoBone;
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::background::Backgrounds;
+use voodoo_core::observation::depth_view::{DepthViews, find_segmented};
+use voodoo_core::observation::frame::{DepthImage, DepthPixels, Frame};
+use voodoo_core::visibility::limb_support::{LimbSupport, measure_support};
+use voodoo_core::visibility::render::{Rendering, Viewpoint};
+use voodoo_core::visibility::roundness::roundness;
 
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
@@ -54,7 +54,7 @@ fn cameras() -> [Pose; 2] {
 }
 
 /// Runs `ask` with the views of these images.
-fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(Views) -> T) -> T {
+fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(DepthViews) -> T) -> T {
     let images: Vec<DepthImage> = shots
         .iter()
         .map(|(pixels, world_from_sensor)| DepthImage {
@@ -70,14 +70,14 @@ fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(Views) -> T) -> T 
         })
         .collect();
     let frame = Frame { images: &images, ..Frame::empty(0.0) };
-    let mut cut_out = Vec::new();
-    find_cut_out(&frame, &mut cut_out);
-    ask(Views { frame: &frame, backgrounds: &Backgrounds::default(), cut_out: &cut_out, origin: Vec3::ZERO })
+    let mut segmented = Vec::new();
+    find_segmented(&frame, &mut segmented);
+    ask(DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &segmented, origin: Vec3::ZERO })
 }
 
-fn proofs(body: &Body, poses: &[Pose], shots: &[(Vec<u16>, Pose)]) -> Vec<Proof> {
+fn proofs(body: &Body, poses: &[Pose], shots: &[(Vec<u16>, Pose)]) -> Vec<LimbSupport> {
     let mut found = Vec::new();
-    with_views(shots, |views| prove(views, body, poses, &TwoBone::of(body), &mut Vec::new(), &mut found));
+    with_views(shots, |views| measure_support(views, body, poses, &TwoBone::of(body), &mut Vec::new(), &mut found));
     found
 }
 
@@ -120,7 +120,7 @@ fn what_one_camera_cannot_prove_another_can() {
     let poses = (0..6).map(|swivel| {
         let mut poses = scene::standing(&body);
         let aside = arm.root(&body, &poses).y;
-        arm.point_at(&body, &mut poses, Vec3::new(2.4 + 0.25, -0.5 * aside, 1.0), f64::from(swivel) * FRAC_PI_3);
+        arm.reach(&body, &mut poses, Vec3::new(2.4 + 0.25, -0.5 * aside, 1.0), f64::from(swivel) * FRAC_PI_3);
         poses
     });
     let shots = |poses: &[Pose]| [front, back].map(|camera| (shoot(&body, poses, camera), camera));
@@ -130,7 +130,7 @@ fn what_one_camera_cannot_prove_another_can() {
     assert!(alone.known && alone.own[1] < 0.05, "{alone:?}");
     assert!(both.own[1] > 0.5 && both.past[1] < 0.05, "{both:?}");
     // No image, no word.
-    assert_eq!(proofs(&body, &poses, &[])[arm.lower], Proof::default());
+    assert_eq!(proofs(&body, &poses, &[])[arm.lower], LimbSupport::default());
 }
 
 #[test]

@@ -4,17 +4,17 @@
 use nalgebra::Vector6;
 use proptest::prelude::*;
 use voodoo_core::Body;
+use voodoo_core::association::correspondence::{Correspondences, EdgePair, LimbMatches, SitePair};
 use voodoo_core::body::HumanModel;
-use voodoo_core::chain::exp;
-use voodoo_core::correspondence::{Correspondences, EdgePair, LimbMatches, SitePair};
-use voodoo_core::geometry::{Mat3, Pose, Vec3};
-use voodoo_core::normal::Normal;
-use voodoo_core::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
+use voodoo_core::body::kinematics::exp;
+use voodoo_core::math::{Mat3, Pose, Vec3};
+use voodoo_core::terms::normal_equations::NormalEquations;
+use voodoo_core::terms::{Contour, Limits, Penetration, Prior, Sites, Surface, Term};
 
 /// Compares the analytic gradient with central differences of the cost; `evaluate` fills the system at given poses.
-fn check(body: &Body, poses: &[Pose], evaluate: &dyn Fn(&[Pose], &mut Normal)) -> Result<(), TestCaseError> {
+fn check(body: &Body, poses: &[Pose], evaluate: &dyn Fn(&[Pose], &mut NormalEquations)) -> Result<(), TestCaseError> {
     let cost = |poses: &[Pose]| {
-        let mut normal = Normal::default();
+        let mut normal = NormalEquations::default();
         normal.clear(poses.len());
         evaluate(poses, &mut normal);
         normal
@@ -118,7 +118,7 @@ proptest! {
                 let x = poses[limb] * feet[limb];
                 EdgePair { limb, x, normal, distance: normal.dot(targets[limb] - x) }
             }).collect();
-            Outline { edges: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
+            Contour { edges: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
         })?;
     }
 
@@ -132,7 +132,7 @@ proptest! {
         poses[forearm] = poses[thorax] * Pose::new(Vec3::new(0.05, 0.12, 0.1), Vec3::new(folded, 0.4, 0.0));
         let term = Penetration { sigma: 1.0 };
         check(&body, &poses, &|poses, normal| term.add(&body, poses, normal))?;
-        let mut normal = Normal::default();
+        let mut normal = NormalEquations::default();
         normal.clear(poses.len());
         term.add(&body, &poses, &mut normal);
         prop_assert!(normal.limbs[forearm].g.norm() > 1e-3, "the overlap is not felt");

@@ -5,9 +5,9 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use proptest::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
-use voodoo_core::geometry::{Mat3, Pose, Vec3};
-use voodoo_core::normal::{LimbBlock, Normal};
+use voodoo_core::math::{Mat3, Pose, Vec3};
 use voodoo_core::solver::TreeSolver;
+use voodoo_core::terms::normal_equations::{LimbBlock, NormalEquations};
 
 /// A system with the human's tree: `A^T A` of random rows that each touch one limb or a limb and its parent.
 fn random_system(body: &Body, values: &[f64]) -> TreeSolver {
@@ -84,7 +84,7 @@ fn bands_carry_a_pull_through_the_body() {
     let mut poses = start.clone();
     let mut tree = TreeSolver::default();
     for _ in 0..30 {
-        let mut normal = Normal::default();
+        let mut normal = NormalEquations::default();
         normal.clear(poses.len());
         // Everything holds its place a little, the hand is drawn to its target.
         for (limb, (pose, rest)) in poses.iter().zip(&start).enumerate() {

@@ -4,8 +4,8 @@ use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, Py
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::body::Limb;
-use voodoo_core::frame::PointSlice;
-use voodoo_core::geometry::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::observation::frame::PointSlice;
 
 use crate::errors::{exception, wrong_argument};
 

@@ -4,7 +4,7 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use voodoo_core::beside::{Measured, Splats, Window};
+use voodoo_core::observation::registration::{Measured, ProjectedPoints, Window};
 
 use crate::errors::{IntoPy, exception};
 
@@ -66,8 +66,8 @@ pub fn splat<'py>(
     columns(py, "points", &points, 3)?;
     let (places, points) = (pixels.as_slice()?.as_chunks().0, points.as_slice()?.as_chunks().0);
     let marks = marks.as_ref().map(|marks| marks.as_slice()).transpose()?;
-    let found = py.detach(|| Splats::new(places, points, marks, [height, width]));
-    let Splats { seen, marked, inside, rows, columns, nearest } = found.map_err(|error| error.into_py(py))?;
+    let found = py.detach(|| ProjectedPoints::new(places, points, marks, [height, width]));
+    let ProjectedPoints { seen, marked, inside, rows, columns, nearest } = found.map_err(|error| error.into_py(py))?;
     let marked = match marks {
         Some(_) => Some(PyArray1::from_vec(py, marked).reshape([height, width])?),
         None => None,
@@ -97,7 +97,7 @@ pub fn nearest_surface<'py>(
     let still = still.as_ref().map(|marks| marks.as_slice()).transpose()?;
     let among = among.as_ref().map(|marks| marks.as_slice()).transpose()?;
     let measured = Measured { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
-    measured.surface(pixel, radius, among).map_err(|error| error.into_py(py))
+    measured.nearest_surface(pixel, radius, among).map_err(|error| error.into_py(py))
 }
 
 fn columns(py: Python<'_>, name: &str, array: &PyReadonlyArray2<'_, f64>, count: usize) -> PyResult<()> {

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::body::{HumanModel, Joint, Limb, Site};
-use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::math::{Pose, Quat, Vec3};
 
 use crate::errors::{IntoPy, exception};
 use crate::shape::PyShape;

@@ -6,8 +6,8 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
 use voodoo_core::Body;
-use voodoo_core::estimate::{Estimate, LimbStatus, SourceReport, Status};
-use voodoo_core::geometry::{Pose, Quat, Vec3};
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
 
 use crate::arrays::{frozen, matrix};
 use crate::errors::exception;

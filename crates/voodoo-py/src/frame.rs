@@ -5,8 +5,8 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use voodoo_core::Body;
-use voodoo_core::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
-use voodoo_core::geometry::{Pose, Vec3};
+use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
 
 use crate::arrays::{PointArray, PointView, contiguous, pose, unmasked, vector};
 use crate::errors::{IntoPy, exception};

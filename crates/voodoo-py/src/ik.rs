@@ -4,10 +4,10 @@ use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, Py
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
-use voodoo_core::geometry::{Pose, Vec3};
 use voodoo_core::ik::{
     self, Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Segment, Solver, Trunk,
 };
+use voodoo_core::math::{Pose, Vec3};
 
 use crate::arrays::{frozen, limb_poses, matrix, pose};
 use crate::body::PyBody;

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::render::{Rendering, Viewpoint};
+use voodoo_core::visibility::render::{Rendering, Viewpoint};
 
 use crate::arrays::{contiguous, limb_poses, pose};
 use crate::body::PyBody;

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::geometry::{Points, Pose};
+use voodoo_core::math::{Points, Pose};
 use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arrays::{PointArray, vector};

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::geometry::Vec3;
+use voodoo_core::math::Vec3;
 use voodoo_core::{Frame, Tracker};
 
 use crate::arrays::{PointArray, limb_poses, vector};

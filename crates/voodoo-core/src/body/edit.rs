@@ -2,7 +2,7 @@
 
 use super::{Body, Joint, Limb, Site};
 use crate::error::BodyError;
-use crate::geometry::{Pose, Vec3};
+use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Limbs that are of one length: the two of a pair, or one of the trunk.

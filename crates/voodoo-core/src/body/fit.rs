@@ -1,10 +1,9 @@
 //! Pose and sizes of a body from named positions in the world.
 
 use super::{Body, Joint, JointKind};
-use crate::chain::joint_turn;
+use crate::body::kinematics::joint_turn;
 use crate::error::TrackError;
-use crate::geometry::{Mat3, Pose, Quat, Vec3};
-use crate::rigid::Moments;
+use crate::math::{Mat3, Moments, Pose, Quat, Vec3};
 
 /// A hinge bent by less than this does not tell its axis; radians.
 const BENT: f64 = 0.3;

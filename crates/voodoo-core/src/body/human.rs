@@ -2,7 +2,7 @@
 
 use super::{Body, Joint, Limb, Site};
 use crate::error::BodyError;
-use crate::geometry::{Mat3, Pose, Quat, Vec3};
+use crate::math::{Mat3, Pose, Quat, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
 /// How finely the human is divided.

@@ -1,6 +1,6 @@
 //! Elastic-band joints (K07 section 4).
 
-use crate::geometry::{Pose, Vec3};
+use crate::math::{Pose, Vec3};
 
 /// A joint between a limb and its parent: one ellipse fixed to both of them.
 ///

@@ -4,13 +4,15 @@ mod edit;
 mod fit;
 mod human;
 mod joint;
+pub mod kinematics;
+pub mod two_bone;
 
 pub use edit::Pair;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 
 use crate::error::BodyError;
-use crate::geometry::{Pose, Vec3};
+use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
 /// One rigid part of a body. Its frame has z along the axis of the shape, from the proximal end to the distal one.

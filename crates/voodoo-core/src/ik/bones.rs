@@ -4,7 +4,7 @@ use super::image::Segment;
 use super::model::Model;
 use super::trunk::{Carrier, Trunk};
 use crate::body::Body;
-use crate::geometry::Vec3;
+use crate::math::Vec3;
 
 /// One segment from the joint of every limb to each joint of its children in the chain, or to the end of a last limb: its
 /// farthest site, else its distal end. A root limb without a joint has none. Radius: the smaller semi-axes

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::model::{Kinematics, Model};
-use crate::geometry::Vec3;
+use crate::math::Vec3;
 
 /// Where a point shall be.
 #[derive(Clone, Copy, Debug, PartialEq)]

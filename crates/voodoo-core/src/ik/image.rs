@@ -3,7 +3,7 @@
 use super::model::{Kinematics, Model};
 use super::trunk::{Carrier, Trunk};
 use super::view::{NEAREST, View};
-use crate::geometry::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
 pub const SAMPLES: usize = 8;
@@ -21,7 +21,7 @@ pub struct Segment {
 
 /// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less
 /// what the border is uncertain by or, where the silhouette is about as thin as the limb, half the silhouette's width less half
-/// of that. Views with depths add how far the bone's flesh lies before what they see, see [`View::depth`].
+/// of that. DepthViews with depths add how far the bone's flesh lies before what they see, see [`View::depth`].
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.

@@ -1,6 +1,6 @@
 //! Row vectors: damped pseudo-inverse and null spaces, without heap after the first use.
 
-use crate::solver::solve_in_place;
+use crate::math::solve_in_place;
 
 /// A row that keeps less than this share of the longest one depends on those before it.
 const RANK: f64 = 1e-9;

@@ -1,9 +1,9 @@
 //! A body, or a part of one, as a chain with exact joints; its unknowns are the vector of joint angles.
 
+use crate::body::kinematics::hinge_axis;
 use crate::body::{Body, JointKind};
-use crate::chain::hinge_axis;
 use crate::error::BodyError;
-use crate::geometry::{Mat3, Pose, Vec3};
+use crate::math::{Mat3, Pose, Vec3};
 
 use super::twist::turn;
 
@@ -193,8 +193,7 @@ impl Model {
                 Turn::Rigid => joint * part.joint_from_limb,
                 Turn::Hinge(axis) => {
                     let (sine, cosine) = (0.5 * value[0]).sin_cos();
-                    let rotation =
-                        crate::geometry::Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
+                    let rotation = crate::math::Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
                     let omega = joint.rotation * axis;
                     columns.push(Column { omega, v: joint.translation.cross(omega) });
                     Pose::from_parts(joint.translation, joint.rotation * rotation) * part.joint_from_limb
@@ -241,7 +240,7 @@ impl Model {
 }
 
 /// Rotation of a ball joint; pushes its three columns, `J_left(v) e_i` about the joint's centre.
-fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> crate::geometry::Quat {
+fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> crate::math::Quat {
     let (rotation, b, c) = turn(v);
     let axes = Mat3::from_quat(joint.rotation);
     for e in Vec3::AXES {

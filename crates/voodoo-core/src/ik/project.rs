@@ -4,9 +4,9 @@ use super::goal::{Aim, Goal};
 use super::model::{Model, Turn};
 use super::solver::{Options, Solver};
 use super::twist::rotation_vector;
+use crate::body::kinematics::joint_turn;
 use crate::body::{Body, Joint};
-use crate::chain::joint_turn;
-use crate::geometry::{Pose, Vec3};
+use crate::math::{Pose, Vec3};
 
 /// Lever of a limb's turns about its axis against its position, metres.
 const GIRTH: f64 = 0.05;

@@ -2,7 +2,7 @@
 //! behind it, and a leg in the other one, too.
 
 use super::model::Kinematics;
-use crate::geometry::{Pose, Vec3};
+use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
 /// A bone keeps this share of its radius off the trunk: flesh gives way, and the model's limbs are stiffer than a back.

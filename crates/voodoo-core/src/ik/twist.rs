@@ -1,9 +1,8 @@
-//! The logarithm of rigid motions (R07 eq. 6-9); its inverse is [`crate::chain::exp`].
+//! The logarithm of rigid motions (R07 eq. 6-9); its inverse is [`crate::body::kinematics::exp`].
 
 use nalgebra::Vector6;
 
-use crate::geometry::{Pose, Quat, Vec3};
-use crate::terms::ShortestAxis;
+use crate::math::{Pose, Quat, ShortestAxis, Vec3};
 
 /// The twist `(omega, v)`, `omega` at most pi long, with `exp(log(T)) = T` (R07 eq. 8, 9).
 ///

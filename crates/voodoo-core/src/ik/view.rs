@@ -1,6 +1,6 @@
 //! One picture of the image criterion: how far a point lies outside of its silhouette, or before what it sees.
 
-use crate::geometry::{Pose, Vec3};
+use crate::math::{Pose, Vec3};
 
 /// Points nearer to the camera plane than this, or behind it, are not seen; metres.
 pub(super) const NEAREST: f64 = 0.05;

@@ -1,8 +1,7 @@
 //! A cheap distance, for choosing the limb of a point.
 
 use super::TaperedEllipticCylinder;
-use crate::geometry::{Mat3, Points, Pose, Vec3};
-use crate::simd::widest;
+use crate::math::{Mat3, Points, Pose, Vec3, widest};
 
 impl TaperedEllipticCylinder {
     /// An approximate signed distance from `q` to the closed surface, limb frame, metres, negative inside.

@@ -3,9 +3,9 @@
 use super::kernel::{BLOCK, Block, Constants, SHORT, Surface, closest};
 use super::lanes::LANES;
 use super::{SurfacePoint, TaperedEllipticCylinder};
-use crate::geometry::{Points, Pose, Vec3};
 #[cfg(target_arch = "x86_64")]
-use crate::simd::has_avx512;
+use crate::math::has_avx512;
+use crate::math::{Points, Pose, Vec3};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted to find the right basin.

@@ -1,7 +1,7 @@
 //! Axis-aligned boxes.
 
 use super::TaperedEllipticCylinder;
-use crate::geometry::{Aabb, Pose, Vec3};
+use crate::math::{Aabb, Pose, Vec3};
 
 impl TaperedEllipticCylinder {
     /// The tight axis-aligned box in the limb frame, metres.

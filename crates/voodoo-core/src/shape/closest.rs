@@ -2,7 +2,7 @@
 
 use super::ruling::{Angle, Foot};
 use super::{RIM_NORMAL_DISTANCE, Region, SurfacePoint, TaperedEllipticCylinder};
-use crate::geometry::Vec3;
+use crate::math::Vec3;
 
 /// Number of intervals of the scan over the quadrant.
 const SCAN: usize = 16;

@@ -2,7 +2,7 @@
 
 use super::closest::DISTINCT;
 use super::{RIM_NORMAL_DISTANCE, Region, TaperedEllipticCylinder};
-use crate::geometry::{Mat3, Pose, Vec3};
+use crate::math::{Mat3, Pose, Vec3};
 
 /// Points of a whole block, and of the short ones at the end. The loop over a block has no branch and no bounds check, so it
 /// becomes SIMD of the target's width.
@@ -254,7 +254,7 @@ pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &
         let ey = select(cap, 0.0, ey * sy);
         let ez = select(distal, -top, select(proximal, -z, ez));
 
-        // Normal: P_θ × P_t on the side, the direction to the query on a rim.
+        // NormalEquations: P_θ × P_t on the side, the direction to the query on a rim.
         let rim = (t <= 0.0) | (t >= 1.0);
         let nx = select(rim, -ex * sign, b * c * k.length * sx);
         let ny = select(rim, -ey * sign, a * s * k.length * sy);

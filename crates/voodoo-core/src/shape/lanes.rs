@@ -4,8 +4,7 @@
 
 use super::ruling::{Angle, Foot};
 use super::{SurfacePoint, TaperedEllipticCylinder};
-use crate::geometry::Vec3;
-use crate::simd::widest;
+use crate::math::{Vec3, widest};
 
 /// Queries that are worked on together.
 pub(super) const LANES: usize = 8;

@@ -23,7 +23,7 @@ mod lanes;
 mod ray;
 mod ruling;
 
-use crate::geometry::Vec3;
+use crate::math::Vec3;
 use thiserror::Error;
 
 pub use batch::SurfaceBatch;
@@ -115,7 +115,7 @@ pub struct SurfacePoint {
 /// A semi-axis may be zero at one end (needle tip, wedge), not at both. The type is small and is copied.
 ///
 /// ```
-/// use voodoo_core::geometry::Vec3;
+/// use voodoo_core::math::Vec3;
 /// use voodoo_core::shape::{Region, TaperedEllipticCylinder};
 ///
 /// let forearm = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.025)?;

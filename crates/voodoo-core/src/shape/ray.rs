@@ -2,7 +2,7 @@
 
 use super::ruling::Angle;
 use super::{Region, TaperedEllipticCylinder};
-use crate::geometry::Vec3;
+use crate::math::Vec3;
 
 /// Where a ray enters the solid, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The straight lines of the side: for one angle θ the distance from a point is a point-to-segment distance.
 
 use super::TaperedEllipticCylinder;
-use crate::geometry::Vec3;
+use crate::math::Vec3;
 
 /// An angle in the first quadrant as its cosine and sine; no query needs trigonometric functions.
 #[derive(Clone, Copy, Debug)]

@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::cholesky::solve_in_place;
 use crate::body::Body;
-use crate::chain::{Chain, exp, joint_axes, joint_turn, place, screw};
-use crate::geometry::{Pose, Quat, Vec3};
-use crate::normal::Normal;
+use crate::body::kinematics::{Chain, exp, joint_axes, joint_turn, place, screw};
+use crate::math::solve_in_place;
+use crate::math::{Pose, Quat, Vec3};
+use crate::terms::normal_equations::NormalEquations;
 
 /// Largest turn of a joint in one step, radians.
 const LARGEST_TURN: f64 = 0.5;
@@ -23,7 +23,7 @@ pub struct ChainSolver {
 
 impl ChainSolver {
     /// One damped step from the normal equations at `poses`; the joints come out exactly closed.
-    pub fn step(&mut self, body: &Body, normal: &Normal, damping: f64, poses: &mut [Pose]) {
+    pub fn step(&mut self, body: &Body, normal: &NormalEquations, damping: f64, poses: &mut [Pose]) {
         self.chain.layout(body);
         self.assemble(body, normal, poses, damping);
         if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {
@@ -31,7 +31,7 @@ impl ChainSolver {
         }
     }
 
-    pub(super) fn assemble(&mut self, body: &Body, normal: &Normal, poses: &[Pose], damping: f64) {
+    pub(super) fn assemble(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], damping: f64) {
         let Self { chain, screws, composite, h, step } = self;
         let n = chain.freedoms;
         screws.clear();
@@ -113,7 +113,7 @@ impl ChainSolver {
             if let Some((parent, joint)) = &limbs[index].parent {
                 let turn = joint_turn(joint, &poses[*parent], &poses[index]);
                 let more = match chain.count[index] {
-                    1 => crate::chain::hinge_axis(joint) * part(chain.start[index]),
+                    1 => crate::body::kinematics::hinge_axis(joint) * part(chain.start[index]),
                     _ => turns(index),
                 };
                 // The slot keeps the joint's new turn until the forward pass places the limb.

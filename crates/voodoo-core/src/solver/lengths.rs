@@ -3,10 +3,10 @@
 use nalgebra::Vector6;
 
 use super::ChainSolver;
-use super::cholesky::{factor, solve_in_place, substitute};
 use crate::body::{Body, Pair};
-use crate::geometry::{Pose, Vec3};
-use crate::normal::Normal;
+use crate::math::{Pose, Vec3};
+use crate::math::{factor, solve_in_place, substitute};
+use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory.
 #[derive(Debug, Default)]
@@ -25,7 +25,7 @@ impl ChainSolver {
     pub fn lengths(
         &mut self,
         body: &Body,
-        normal: &Normal,
+        normal: &NormalEquations,
         poses: &[Pose],
         pairs: &[Pair],
         [inertia, pull]: [f64; 2],

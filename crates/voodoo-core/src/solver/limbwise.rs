@@ -1,10 +1,9 @@
 //! The published solver: weighted absolute orientation, each limb alone (K06 IV-B.7, K07 3.2).
 
-use super::{Gate, Guide, Problem, Solver};
+use super::{Gate, Problem, Solver, WarmStart};
+use crate::association::correspondence::LimbMatches;
 use crate::config::Config;
-use crate::correspondence::LimbMatches;
-use crate::geometry::{Mat3, Pose, Vec3};
-use crate::rigid::Moments;
+use crate::math::{Mat3, Moments, Pose, Vec3};
 
 /// Lever of the wish not to turn where the pairs fix no rotation, metres: the girth of a limb.
 const STAY: f64 = 0.05;
@@ -12,7 +11,7 @@ const STAY: f64 = 0.05;
 /// Each limb moves to the optimum of its own pairs; information crosses one joint a step through the bands.
 #[derive(Debug, Default)]
 pub struct Limbwise {
-    guide: Guide,
+    guide: WarmStart,
 }
 
 /// Rounds in which the chain follows the sites.

@@ -1,24 +1,22 @@
 //! Step 7: the pose that fits the correspondences. The solver is the one replaceable part of the step.
 
 mod chain;
-mod cholesky;
-mod guide;
 mod lengths;
 mod limbwise;
 mod tree;
+mod warm_start;
 mod whole_body;
 
 pub use chain::ChainSolver;
-pub(crate) use cholesky::solve_in_place;
-pub use guide::Guide;
 pub use limbwise::Limbwise;
 pub use tree::TreeSolver;
+pub use warm_start::WarmStart;
 pub use whole_body::WholeBody;
 
+use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Pair};
 use crate::config::{Config, SolverKind};
-use crate::correspondence::Correspondences;
-use crate::geometry::Pose;
+use crate::math::Pose;
 
 /// What a solver works on: one ICP step of one frame.
 #[derive(Debug)]

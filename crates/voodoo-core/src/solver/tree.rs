@@ -3,10 +3,10 @@
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
 
+use crate::body::kinematics::exp;
 use crate::body::{Body, Joint, JointKind};
-use crate::chain::exp;
-use crate::geometry::{Pose, Vec3};
-use crate::normal::{LimbBlock, Normal, line};
+use crate::math::{Pose, Vec3};
+use crate::terms::normal_equations::{LimbBlock, NormalEquations, line};
 
 /// Largest turn of a limb in one step, radians.
 const LARGEST_TURN: f64 = 0.5;
@@ -28,7 +28,7 @@ pub struct TreeSolver {
 
 impl TreeSolver {
     /// One damped step from the normal equations at `poses`; `band_sigma` is a band's standard deviation, metres.
-    pub fn step(&mut self, body: &Body, normal: &Normal, damping: f64, band_sigma: f64, poses: &mut [Pose]) {
+    pub fn step(&mut self, body: &Body, normal: &NormalEquations, damping: f64, band_sigma: f64, poses: &mut [Pose]) {
         self.assemble(body, normal, damping, 1.0 / (band_sigma * band_sigma), poses);
         if !self.solve() {
             return;
@@ -42,7 +42,7 @@ impl TreeSolver {
         }
     }
 
-    fn assemble(&mut self, body: &Body, normal: &Normal, damping: f64, strength: f64, poses: &[Pose]) {
+    fn assemble(&mut self, body: &Body, normal: &NormalEquations, damping: f64, strength: f64, poses: &[Pose]) {
         self.parent.clear();
         self.parent.extend(body.limbs().iter().map(|limb| limb.parent.as_ref().map_or(0, |(parent, _)| *parent)));
         self.own.clone_from(&normal.limbs);
@@ -76,7 +76,7 @@ impl TreeSolver {
     }
 
     /// What the terms say about the joint's relative turn `omega_child - omega_parent`.
-    fn add_turn(&mut self, [child, parent]: [usize; 2], normal: &Normal) {
+    fn add_turn(&mut self, [child, parent]: [usize; 2], normal: &NormalEquations) {
         let joint = &normal.joints[child];
         for i in 0..3 {
             self.own[child].g[i] += joint.g[i];

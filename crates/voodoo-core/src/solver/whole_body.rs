@@ -1,12 +1,12 @@
 //! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Guide, Problem, Solver, TreeSolver};
+use super::{ChainSolver, Gate, Problem, Solver, TreeSolver, WarmStart};
 use crate::body::Pair;
 use crate::config::Config;
-use crate::geometry::Pose;
-use crate::normal::Normal;
-use crate::terms::{Limits, Outline, Penetration, Prior, Sites, Surface, Term};
+use crate::math::Pose;
+use crate::terms::normal_equations::NormalEquations;
+use crate::terms::{Contour, Limits, Penetration, Prior, Sites, Surface, Term};
 
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
@@ -41,12 +41,12 @@ fn narrowed(start: f64, end: f64, step: usize) -> f64 {
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
 pub struct WholeBody {
-    normal: Normal,
+    normal: NormalEquations,
     chain: ChainSolver,
     /// Moves the limbs instead of the chain, if there.
     tree: Option<TreeSolver>,
     lengths: Lengths,
-    guide: Guide,
+    guide: WarmStart,
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
@@ -136,7 +136,7 @@ impl WholeBody {
         let terms: [&dyn Term; 4] = [
             &Surface { correspondences, information, slide: config.slide, scale },
             &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased },
-            &Outline { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
+            &Contour { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
             &Prior { predicted, root, joints: &self.joint_sigmas, calm },
         ];
         for term in terms {

@@ -1,10 +1,9 @@
 //! Joint limits, one-sided and soft: each component of the joint's rotation vector stays in its range.
 
 use super::Term;
-use super::prior::ShortestAxis;
 use crate::body::Body;
-use crate::geometry::{Pose, Vec3};
-use crate::normal::Normal;
+use crate::math::{Pose, ShortestAxis, Vec3};
+use crate::terms::normal_equations::NormalEquations;
 
 /// All joints that have limits.
 #[derive(Debug)]
@@ -14,7 +13,7 @@ pub struct Limits {
 }
 
 impl Term for Limits {
-    fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         let weight = 1.0 / (self.sigma * self.sigma);
         for (index, limb) in body.limbs().iter().enumerate() {
             let Some((parent, joint)) = &limb.parent else { continue };

@@ -3,9 +3,9 @@
 
 use super::Term;
 use crate::body::Body;
-use crate::geometry::{Pose, Vec3};
-use crate::normal::Normal;
+use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
+use crate::terms::normal_equations::NormalEquations;
 
 /// Where on a limb's axis it is felt, as shares of the length.
 const FELT: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
@@ -21,7 +21,7 @@ pub struct Penetration {
 }
 
 impl Term for Penetration {
-    fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         let limbs = body.limbs();
         for first in 1..limbs.len() {
             for second in 0..first {
@@ -38,7 +38,7 @@ impl Term for Penetration {
 
 impl Penetration {
     /// Points of `limb` against the surface of `other`.
-    fn add_points(&self, body: &Body, poses: &[Pose], [limb, other]: [usize; 2], normal: &mut Normal) {
+    fn add_points(&self, body: &Body, poses: &[Pose], [limb, other]: [usize; 2], normal: &mut NormalEquations) {
         let (shape, surface) = (&body.limbs()[limb].shape, &body.limbs()[other].shape);
         let weight = 1.0 / (self.sigma * self.sigma);
         let start = poses[other].inverse_transform_point(poses[limb].translation);
@@ -55,7 +55,7 @@ impl Penetration {
                 continue;
             }
             // The distance grows as the point moves along the normal, and as the surface moves against it.
-            let row = crate::normal::line(poses[other] * local, poses[other].rotation * found.normal);
+            let row = crate::terms::normal_equations::line(poses[other] * local, poses[other].rotation * found.normal);
             normal.cost += weight * overlap * overlap;
             // The mixed block of the two twists is left out: the system is one of single limbs and joints.
             normal.limbs[limb].add_row(weight, &-row, overlap);

@@ -7,8 +7,8 @@
 use super::Term;
 use super::surface::geman_mcclure;
 use crate::body::Body;
-use crate::geometry::{Pose, Quat, Vec3};
-use crate::normal::Normal;
+use crate::math::{Pose, ShortestAxis, Vec3};
+use crate::terms::normal_equations::NormalEquations;
 
 /// Width of the inner well in standard deviations of the outer one.
 const WELL: f64 = 0.6;
@@ -36,7 +36,7 @@ fn hold(calm: f64, r: f64, sigma: f64) -> (f64, f64) {
 }
 
 impl Term for Prior<'_> {
-    fn add(&self, body: &Body, poses: &[Pose], normal: &mut Normal) {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         // Root: rotation and position apart, so that the lever to the working origin does not matter.
         let r = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
         let d = poses[0].translation - self.predicted[0].translation;
@@ -47,7 +47,7 @@ impl Term for Prior<'_> {
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
             block.h[(i, i)] += turn;
             block.g[i] += turn * r[i];
-            block.add_row(shift, &crate::normal::line(poses[0].translation, axis), d[i]);
+            block.add_row(shift, &crate::terms::normal_equations::line(poses[0].translation, axis), d[i]);
         }
         for (index, limb) in body.limbs().iter().enumerate() {
             let Some((parent, _)) = &limb.parent else { continue };
@@ -59,20 +59,5 @@ impl Term for Prior<'_> {
             normal.joints[index].add_turn(weight, r);
             normal.cost += cost;
         }
-    }
-}
-
-/// Rotation vector of the shorter way round.
-pub(crate) trait ShortestAxis {
-    /// At most pi long.
-    fn to_scaled_axis_shortest(self) -> Vec3;
-}
-
-impl ShortestAxis for Quat {
-    fn to_scaled_axis_shortest(self) -> Vec3 {
-        let q = if self.w < 0.0 { -self } else { self };
-        let v = Vec3::new(q.x, q.y, q.z);
-        let sine = v.length();
-        if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
     }
 }

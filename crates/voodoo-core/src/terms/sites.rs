@@ -1,10 +1,10 @@
 //! Named sites with positions and rays (method section 1): `(x - p)^T W (x - p)` under a robust kernel.
 
 use super::{Term, surface::geman_mcclure};
+use crate::association::correspondence::Correspondences;
 use crate::body::Body;
-use crate::correspondence::Correspondences;
-use crate::geometry::Pose;
-use crate::normal::Normal;
+use crate::math::Pose;
+use crate::terms::normal_equations::NormalEquations;
 
 /// All site pairs; `scale` is the kernel's, metres.
 #[derive(Debug)]
@@ -20,7 +20,7 @@ pub struct Sites<'a> {
 }
 
 impl Term for Sites<'_> {
-    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut Normal) {
+    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.correspondences.sites.iter().filter(|pair| self.biased || pair.bias <= 0.0) {
             let r = pair.x - pair.p;
             let (rho, kernel) = geman_mcclure(r.length(), self.scale);

@@ -1,11 +1,10 @@
 //! Measured surface points: robust point-to-plane with a little point-to-point (method section 1).
 
 use super::Term;
+use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::body::Body;
-use crate::correspondence::{Correspondences, LimbMatches};
-use crate::geometry::{Mat3, Pose};
-use crate::normal::{LimbBlock, Normal};
-use crate::simd::widest;
+use crate::math::{Mat3, Pose, widest};
+use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 
 /// `W = w (n n^T + slide (I - n n^T))` under the Geman-McClure kernel of the signed distance.
 #[derive(Debug)]
@@ -28,7 +27,7 @@ pub fn geman_mcclure(r: f64, scale: f64) -> (f64, f64) {
 }
 
 impl Term for Surface<'_> {
-    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut Normal) {
+    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for (matches, block) in self.correspondences.limbs.iter().zip(&mut normal.limbs) {
             let sums = widest(
                 #[inline(always)]

@@ -1,11 +1,11 @@
 //! Filling the estimate from the tracker's state, without allocating once it is warm.
 
 use super::Tracker;
-use crate::candidates::shifted;
-use crate::estimate::SourceReport;
+use crate::math::shifted;
+use crate::tracker::estimate::SourceReport;
 
 impl Tracker {
-    pub(super) fn report(&mut self, stamp: f64, steps: usize) {
+    pub(crate) fn report(&mut self, stamp: f64, steps: usize) {
         let Self { body, poses, origin, correspondences, candidates, estimate, .. } = self;
         estimate.stamp = stamp;
         estimate.steps = steps;

@@ -9,9 +9,9 @@
 use std::f64::consts::{PI, TAU};
 
 use voodoo_core::config::RawValue;
-use voodoo_core::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
-use voodoo_core::geometry::{Pose, Quat, Vec3};
-use voodoo_core::render::{NO_LIMB, Rendering, Viewpoint};
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
+use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Estimate};
 
 /// SplitMix64: small, and the same for ever.
@@ -27,7 +27,7 @@ impl Noise {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Normal with standard deviation 1 (Irwin-Hall).
+    /// NormalEquations with standard deviation 1 (Irwin-Hall).
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
@@ -111,7 +111,7 @@ pub struct DepthCamera {
 
 impl DepthCamera {
     pub fn world_from_sensor() -> Pose {
-        let rotation = Quat::from_mat3(&voodoo_core::geometry::Mat3::from_cols(-Vec3::Y, -Vec3::Z, Vec3::X));
+        let rotation = Quat::from_mat3(&voodoo_core::math::Mat3::from_cols(-Vec3::Y, -Vec3::Z, Vec3::X));
         Pose::from_parts(Vec3::Z, rotation)
     }
 

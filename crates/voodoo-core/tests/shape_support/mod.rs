@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use voodoo_core::geometry::{Pose, Vec3};
+use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::shape::TaperedEllipticCylinder;
 
 /// Splitmix64: random numbers that are the same everywhere.

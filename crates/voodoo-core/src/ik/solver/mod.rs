@@ -11,7 +11,7 @@ use super::goal::{Goal, level_cost, level_ranges};
 use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{Kinematics, Model};
-use crate::geometry::Pose;
+use crate::math::Pose;
 
 pub use rest::Rest;
 

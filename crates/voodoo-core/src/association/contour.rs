@@ -1,0 +1,220 @@
+//! The outline of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
+
+use crate::association::correspondence::EdgePair;
+use crate::body::{Body, Limb};
+use crate::math::{Points, Pose, Vec3};
+use crate::observation::depth_view::{Pixel, View};
+
+/// Places along a limb that are looked at; the ends belong to the neighbours as well.
+pub const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+/// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
+const DEPTH_REACH: f64 = 0.12;
+/// A limb seen more nearly end on than this (sine) shows no outline.
+const ASLANT: f64 = 0.5;
+/// How far beyond the limb's rim its edge is looked for, metres.
+const EDGE_REACH: f64 = 0.08;
+/// The same beyond a free limb's tip.
+const TIP_REACH: f64 = 0.20;
+/// An edge with another limb this near may be that limb's, metres: it tells nothing of girths.
+const APART: f32 = 0.03;
+/// Edges are approached in strides of about this length, metres, of so many half pixels at most.
+const STRIDE: f64 = 0.008;
+const MOST_STEPS: f64 = 4.0;
+
+/// One place on the rim of a limb and the edge seen there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Direction in which the edge was looked for, limb frame, length one: across the limb at right angles to the line of
+    /// sight, or along its axis.
+    pub side: Vec3,
+    /// Distance of the model's rim in that direction from the axis, or from the proximal end, metres.
+    pub rim: f64,
+    /// The rim's point nearest to the edge, limb frame.
+    pub foot: Vec3,
+    /// Distance of the seen edge, likewise, metres.
+    pub seen: f64,
+    /// The last place seen on the body, working frame.
+    pub place: Vec3,
+}
+
+/// Looks for the edges on both sides of a limb, and at its tip when it ends free.
+pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
+    let shape = &limb.shape;
+    let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
+    let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
+        let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
+        let search = ContourSearch { start, along, rim, thickness, reach };
+        if let Some((seen, place)) = search.edge(view) {
+            found(Edge { side, rim, foot, seen, place: view.working_from_camera * place });
+        }
+    };
+    for t in STATIONS {
+        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
+        let axis = Vec3::new(0.0, 0.0, t * shape.length());
+        let centre = camera_from_limb * axis;
+        let sight = camera_from_limb.inverse_transform_vector(-centre);
+        let Some(ahead) = sight.with_z(0.0).try_normalize() else { continue };
+        // Seen nearly end on, a limb has no sides.
+        if sight.with_z(0.0).length() < ASLANT * sight.length() {
+            continue;
+        }
+        let thickness = length(a * ahead.x, b * ahead.y);
+        for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
+            let rim = length(a * side.x, b * side.y);
+            let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
+            look(axis, side, rim, thickness, foot, EDGE_REACH);
+        }
+    }
+    let tip = Vec3::new(0.0, 0.0, shape.length());
+    let sight = camera_from_limb.inverse_transform_vector(-(camera_from_limb * tip)).normalize_or(Vec3::X);
+    let across = sight.with_z(0.0).length();
+    if limb.match_caps[1] && across > ASLANT {
+        // Seen aslant, the cap's rim stands out beyond its middle.
+        let ahead = sight.with_z(0.0) / across;
+        let radius = (shape.a1() * ahead.x).hypot(shape.b1() * ahead.y);
+        let foot = tip - ahead * (radius * sight.z.signum());
+        let rim = shape.length() + radius * sight.z.abs() / across;
+        look(Vec3::ZERO, Vec3::Z, rim, shape.a1().max(shape.b1()), foot, TIP_REACH);
+    }
+}
+
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
+/// A way across an image: from a point along a direction (camera frame), metres.
+struct ContourSearch {
+    start: Vec3,
+    along: Vec3,
+    rim: f64,
+    thickness: f64,
+    reach: f64,
+}
+
+impl ContourSearch {
+    /// How far from the start the body ends, and the last place seen on it; `None` when another thing stands before it, when
+    /// the image does not tell, or when no edge comes within reach.
+    fn edge(&self, view: &View) -> Option<(f64, Vec3)> {
+        let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
+        let step = 0.5 * self.start.z.max(0.1) / focal;
+        let deep = self.thickness + DEPTH_REACH;
+        let mut last: Option<(Vec3, f64)> = None;
+        let mut r = 0.0;
+        // Long strides as far as the first look past the body, then back, and on in small steps.
+        let mut stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
+        let mut from = 0.0;
+        while r <= self.rim + self.reach {
+            let place = self.start + self.along * r;
+            match view.at(place) {
+                Pixel::Unknown => return None,
+                Pixel::Foreground(z) if z < place.z - deep => return None,
+                Pixel::Foreground(z) if z <= place.z + deep => {
+                    last = Some((place, z));
+                    from = r;
+                }
+                Pixel::Foreground(_) | Pixel::Background(_) => {
+                    let (last, z) = last?;
+                    if stride <= step || r - from <= step {
+                        // The edge lies between the two last looks.
+                        return Some((r - 0.25 * step, last * (z / last.z)));
+                    }
+                    (r, stride) = (from, step);
+                }
+            }
+            // What lies well inside the limb is no edge: one look on the way out will do.
+            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + stride };
+        }
+        None
+    }
+}
+
+/// The edges of all limbs in all depth images of a frame, and working memory.
+#[derive(Debug, Default)]
+pub struct Contour {
+    edges: Vec<Found>,
+    places: Points,
+    distance: Vec<f32>,
+    least: Vec<f32>,
+    closest: Vec<usize>,
+    strangers: Vec<f32>,
+}
+
+/// The edge of a limb, and where it stands in the working frame.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    limb: usize,
+    edge: Edge,
+    target: Vec3,
+    /// Distance of the edge to the nearest other limb, metres.
+    stranger: f32,
+}
+
+impl Contour {
+    /// Forgets all edges.
+    pub fn clear(&mut self) {
+        self.edges.clear();
+    }
+
+    /// Looks for the edges at `poses`.
+    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>) {
+        self.edges.clear();
+        self.places.clear();
+        for view in views {
+            for (limb, (part, pose)) in body.limbs().iter().zip(poses).enumerate() {
+                edges(&view, part, pose, |edge| {
+                    self.places.push(edge.place.to_array().map(|value| value as f32));
+                    let target = *pose * (edge.foot + edge.side * (edge.seen - edge.rim));
+                    self.edges.push(Found { limb, edge, target, stranger: f32::INFINITY });
+                });
+            }
+        }
+        self.find_closest(body, poses);
+        let mut closest = self.closest.iter();
+        let mut strangers = self.strangers.iter();
+        self.edges.retain_mut(|found| {
+            let closest = closest.next();
+            found.stranger = strangers.next().copied().unwrap_or(f32::INFINITY);
+            // Beyond the rim, the edge may be another limb's.
+            found.edge.seen <= found.edge.rim || closest == Some(&found.limb)
+        });
+    }
+
+    /// The limb that is nearest to each place, and how near the nearest is that is not the edge's own.
+    fn find_closest(&mut self, body: &Body, poses: &[Pose]) {
+        let count = self.places.len();
+        self.least.clear();
+        self.least.resize(count, f32::INFINITY);
+        self.closest.clear();
+        self.closest.resize(count, 0);
+        self.strangers.clear();
+        self.strangers.resize(count, f32::INFINITY);
+        for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
+            limb.shape.approximate_distances(pose, &self.places, &mut self.distance);
+            for ((least, closest), distance) in self.least.iter_mut().zip(&mut self.closest).zip(&self.distance) {
+                if distance < least {
+                    (*least, *closest) = (*distance, index);
+                }
+            }
+            for ((found, stranger), distance) in self.edges.iter().zip(&mut self.strangers).zip(&self.distance) {
+                if found.limb != index {
+                    *stranger = stranger.min(*distance);
+                }
+            }
+        }
+    }
+
+    /// The edges on the sides of a limb that were found apart from other limbs.
+    pub fn sides(&self, limb: usize) -> impl Iterator<Item = Edge> {
+        let own = move |found: &&Found| found.limb == limb && found.stranger >= APART && found.edge.side != Vec3::Z;
+        self.edges.iter().filter(own).map(|found| found.edge)
+    }
+
+    /// The rims at `poses` and the edges that were found, as pairs.
+    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<EdgePair>) {
+        pairs.clear();
+        pairs.extend(self.edges.iter().map(|Found { limb, edge, target, .. }| {
+            let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
+            EdgePair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
+        }));
+    }
+}

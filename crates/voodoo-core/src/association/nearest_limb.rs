@@ -1,0 +1,332 @@
+//! Step 2's question, for many points at once: which limb is nearest, of those whose enlarged boxes hold a point.
+//!
+//! The bounds of a cluster of points give every limb a distance that none of them can come nearer. Only limbs that can still be
+//! the nearest of one of them are looked at point by point.
+
+use crate::body::{Body, Limb};
+use crate::math::{Pose, Vec3, widest};
+use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
+
+/// The limb of a point that lies in no box.
+pub const NONE: u32 = u32::MAX;
+/// Squared distance of a point that lies outside a limb's box.
+const OUTSIDE: f32 = f32::INFINITY;
+/// Limbs whose bounds are computed side by side: one SIMD register.
+const LANES: usize = 8;
+/// What single precision may err in the place of a box, metres, and as a share of the coordinates it was computed from; bounds
+/// are that much wider.
+const ROUNDING: (f32, f32) = (1e-4, 1e-6);
+
+type Lanes = [f32; LANES];
+type Squares = [f32; CLUSTER];
+
+/// The limbs in their poses, and working memory.
+#[derive(Debug, Default)]
+pub struct Nearest {
+    limbs: Vec<LimbBox>,
+    groups: Vec<Group>,
+    least: Vec<Lanes>,
+    /// The limb that was nearest to a point of each cluster the last time: probably it is again.
+    expected: Vec<u32>,
+}
+
+impl Nearest {
+    /// The nearest limb of every point, or [`NONE`], into `nearest`; the limbs' boxes are enlarged by `margin`.
+    ///
+    /// `inside` gets for every point and limb whether the limb's box holds it, if it has room for that; otherwise it is empty.
+    pub fn find(
+        &mut self,
+        body: &Body,
+        poses: &[Pose],
+        margin: f64,
+        clusters: &Clusters,
+        nearest: &mut [u32],
+        inside: &mut [bool],
+    ) {
+        self.limbs.clear();
+        self.limbs.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
+        self.groups.clear();
+        self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
+        self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
+        self.expected.resize(clusters.iter().len(), 0);
+        widest(
+            #[inline(always)]
+            || {
+                for (index, cluster) in clusters.iter().enumerate() {
+                    let found = self.find_cluster(index, &cluster, inside);
+                    for (which, limb) in cluster.which.iter().zip(found) {
+                        nearest[*which as usize] = limb;
+                    }
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn find_cluster(&mut self, index: usize, cluster: &Cluster, inside: &mut [bool]) -> [u32; CLUSTER] {
+        let Self { limbs, groups, least, expected } = self;
+        for (least, group) in least.iter_mut().zip(groups) {
+            *least = group.least_squares(cluster.bounds);
+        }
+        let mut best = Best { limb: [NONE; CLUSTER], square: [OUTSIDE; CLUSTER] };
+        // What the expected limb leaves decides which others are worth a look. After a reset there may be fewer limbs.
+        let first = (expected[index] as usize).min(limbs.len() - 1);
+        best.offer(first as u32, &limbs[first].squares(cluster));
+        if inside.is_empty() {
+            for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
+                let mut wanted = within(least, best.worst());
+                wanted &= !(1_u32.checked_shl((first as u32).wrapping_sub(start)).unwrap_or(0));
+                while wanted != 0 {
+                    let limb = start + wanted.trailing_zeros();
+                    best.offer(limb, &limbs[limb as usize].squares(cluster));
+                    wanted &= wanted - 1;
+                }
+            }
+        } else {
+            for (limb, shape) in limbs.iter().enumerate() {
+                let squares = shape.squares(cluster);
+                best.offer(limb as u32, &squares);
+                for (which, square) in cluster.which.iter().zip(squares) {
+                    inside[*which as usize * limbs.len() + limb] = square < OUTSIDE;
+                }
+            }
+        }
+        if best.limb[CLUSTER / 2] != NONE {
+            expected[index] = best.limb[CLUSTER / 2];
+        }
+        best.limb
+    }
+}
+
+/// Which values are at most `worst`, one bit each; [`OUTSIDE`] never is.
+#[inline(always)]
+fn within(values: &Lanes, worst: f32) -> u32 {
+    let mut bits = 0;
+    for lane in 0..LANES {
+        bits |= u32::from(values[lane] <= worst) << lane;
+    }
+    bits
+}
+
+/// The nearest limb of every point so far; of two that are as near, the first.
+struct Best {
+    limb: [u32; CLUSTER],
+    square: Squares,
+}
+
+impl Best {
+    #[inline(always)]
+    fn offer(&mut self, limb: u32, square: &Squares) {
+        for i in 0..CLUSTER {
+            let as_near = (square[i] == self.square[i]) & (square[i] < OUTSIDE) & (limb < self.limb[i]);
+            let nearer = (square[i] < self.square[i]) | as_near;
+            self.limb[i] = if nearer { limb } else { self.limb[i] };
+            self.square[i] = if nearer { square[i] } else { self.square[i] };
+        }
+    }
+
+    /// The greatest of the squared distances, if finite.
+    #[inline(always)]
+    fn worst(&self) -> f32 {
+        let mut worst = [0.0; LANES];
+        for lanes in self.square.as_chunks::<LANES>().0 {
+            for lane in 0..LANES {
+                worst[lane] = if lanes[lane] > worst[lane] { lanes[lane] } else { worst[lane] };
+            }
+        }
+        worst.into_iter().fold(0.0, f32::max).min(f32::MAX)
+    }
+}
+
+/// What several limbs' distances to a box of points are computed from, side by side.
+#[derive(Debug)]
+struct Group {
+    /// Columns of the rotations, and the shifts, from the working frame to the limbs'.
+    axes: [[Lanes; 3]; 3],
+    shift: [Lanes; 3],
+    low: [Lanes; 3],
+    high: [Lanes; 3],
+    length: Lanes,
+    radius: Lanes,
+    flatness: Lanes,
+}
+
+impl Group {
+    fn new(limbs: &[LimbBox]) -> Self {
+        let lanes = |value: &dyn Fn(&LimbBox) -> f32, none: f32| {
+            std::array::from_fn(|lane| limbs.get(lane).map_or(none, value))
+        };
+        Self {
+            axes: [0, 1, 2].map(|from| [0, 1, 2].map(|to| lanes(&|limb| limb.axes[from][to], 0.0))),
+            shift: [0, 1, 2].map(|axis| lanes(&|limb| limb.shift[axis], 0.0)),
+            // Where there is no limb, nothing is reached.
+            low: [0, 1, 2].map(|axis| lanes(&|limb| limb.low[axis], f32::INFINITY)),
+            high: [0, 1, 2].map(|axis| lanes(&|limb| limb.high[axis], f32::NEG_INFINITY)),
+            length: lanes(&|limb| limb.length, 0.0),
+            radius: lanes(&|limb| limb.radius, 0.0),
+            flatness: lanes(&|limb| limb.flatness, 0.0),
+        }
+    }
+
+    /// Squares that [`LimbBox::squares`] does not fall below for any point inside the bounds, [`OUTSIDE`] when no such point
+    /// lies in the limb's box.
+    #[inline(always)]
+    fn least_squares(&self, bounds: &Bounds) -> Lanes {
+        let (c, h) = (bounds.centre, bounds.half);
+        let slack = ROUNDING.0 + ROUNDING.1 * [c, h].as_flattened().iter().map(|value| value.abs()).sum::<f32>();
+        let at_least = |value: f32, least: f32| if value > least { value } else { least };
+        let mut found = [OUTSIDE; LANES];
+        for l in 0..LANES {
+            let m = |from: usize, to: usize| self.axes[from][to][l];
+            let place = |i: usize| m(0, i) * c[0] + m(1, i) * c[1] + m(2, i) * c[2] + self.shift[i][l];
+            let reach = |i: usize| m(0, i).abs() * h[0] + m(1, i).abs() * h[1] + m(2, i).abs() * h[2] + slack;
+            let (place, reach) = ([place(0), place(1), place(2)], [reach(0), reach(1), reach(2)]);
+            let meets = |i: usize| (place[i] + reach[i] >= self.low[i][l]) & (place[i] - reach[i] <= self.high[i][l]);
+            let off = |i: usize| at_least(place[i].abs() - reach[i], 0.0);
+            // Beside a slice, (rho - 1) / |grad rho| is at least (rho - 1) times the lesser semi-axis, and rho at least the
+            // distance from the axis over the greater one.
+            let side = at_least((off(0) * off(0) + off(1) * off(1)).sqrt() - self.radius[l], 0.0) * self.flatness[l];
+            let beyond = at_least(at_least(-place[2], place[2] - self.length[l]) - reach[2], 0.0);
+            let square = side * side + beyond * beyond;
+            found[l] = if meets(0) & meets(1) & meets(2) { square } else { OUTSIDE };
+        }
+        found
+    }
+}
+
+/// Box test and rough distance of a tapered elliptic cylinder, in single precision for several points at once.
+#[derive(Debug)]
+struct LimbBox {
+    /// Columns of the rotation, and the shift, from the working frame to the limb's.
+    axes: [[f32; 3]; 3],
+    shift: [f32; 3],
+    /// The enlarged box in the limb's frame.
+    low: [f32; 3],
+    high: [f32; 3],
+    length: f32,
+    /// Semi-axes at the proximal end and their growth along the axis.
+    a: [f32; 2],
+    b: [f32; 2],
+    /// The greatest semi-axis, and the least ratio of the lesser to the greater one of a slice.
+    radius: f32,
+    flatness: f32,
+}
+
+impl LimbBox {
+    fn new(limb: &Limb, working_from_limb: &Pose, margin: f64) -> Self {
+        let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
+        let limb_from_working = working_from_limb.inverse();
+        let shape = &limb.shape;
+        let bounds = shape.local_aabb();
+        let ends = [(shape.a0(), shape.b0()), (shape.a1(), shape.b1())];
+        let ratio = |(a, b): (f64, f64)| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
+        Self {
+            axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_f32(limb_from_working.rotation * axis)),
+            shift: to_f32(limb_from_working.translation),
+            low: to_f32(bounds.mins - Vec3::splat(margin)),
+            high: to_f32(bounds.maxs + Vec3::splat(margin)),
+            length: shape.length() as f32,
+            a: [shape.a0() as f32, ((shape.a1() - shape.a0()) / shape.length()) as f32],
+            b: [shape.b0() as f32, ((shape.b1() - shape.b0()) / shape.length()) as f32],
+            radius: ends.iter().fold(0.0, |most: f64, (a, b)| most.max(*a).max(*b)) as f32,
+            flatness: ends.map(ratio).into_iter().fold(1.0, f64::min) as f32,
+        }
+    }
+
+    /// Squared distances of points, [`OUTSIDE`] for those outside the box.
+    #[inline(always)]
+    fn squares(&self, points: &Cluster) -> Squares {
+        let mut squares = [OUTSIDE; CLUSTER];
+        for i in 0..CLUSTER {
+            let local = self.local(points.x[i], points.y[i], points.z[i]);
+            let square = self.square(local);
+            squares[i] = if self.holds(local) { square } else { OUTSIDE };
+        }
+        squares
+    }
+
+    /// A point in the limb's frame.
+    #[inline(always)]
+    fn local(&self, x: f32, y: f32, z: f32) -> [f32; 3] {
+        let local = |i: usize| self.axes[0][i] * x + self.axes[1][i] * y + self.axes[2][i] * z + self.shift[i];
+        [local(0), local(1), local(2)]
+    }
+
+    /// Whether a point in the limb's frame lies in the enlarged box.
+    #[inline(always)]
+    fn holds(&self, local: [f32; 3]) -> bool {
+        let inside = |axis: usize| (local[axis] >= self.low[axis]) & (local[axis] <= self.high[axis]);
+        inside(0) & inside(1) & inside(2)
+    }
+
+    /// Square of about `(rho - 1) / |grad rho|` beside the limb, with `rho^2 = (x/a)^2 + (y/b)^2`, and of the distance beyond
+    /// its ends.
+    #[inline(always)]
+    fn square(&self, local: [f32; 3]) -> f32 {
+        let along = if local[2] > 0.0 { local[2] } else { 0.0 };
+        let along = if along < self.length { along } else { self.length };
+        let at_least = |value: f32, least: f32| if value > least { value } else { least };
+        let a = at_least(self.a[0] + self.a[1] * along, 1e-4);
+        let b = at_least(self.b[0] + self.b[1] * along, 1e-4);
+        let over = 1.0 / (a * b);
+        let (over_a, over_b) = (b * over, a * over);
+        let (u, v) = (local[0] * over_a, local[1] * over_b);
+        let rho_square = u * u + v * v;
+        // grad rho = (u/a, v/b) / rho, so (rho - 1) / |grad rho| = (rho^2 - rho) / |(u/a, v/b)|.
+        let (gx, gy) = (u * over_a, v * over_b);
+        let rise = rho_square - rho_square.sqrt();
+        let side_square = rise * rise / at_least(gx * gx + gy * gy, 1e-18);
+        let beyond = local[2] - along;
+        side_square + beyond * beyond
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::math::Points;
+
+    /// Points around a body, near and far from it.
+    fn around(seed: usize) -> Points {
+        let mut points = Points::default();
+        for n in 0..4000_usize {
+            let part = |step: usize| ((n + seed) * step % 997) as f32 / 997.0 - 0.5;
+            points.push([0.01 * (n % 97) as f32 - 0.5, 0.5 * part(71), 2.4 * part(1)]);
+        }
+        points
+    }
+
+    #[test]
+    fn what_is_passed_over_is_not_the_nearest() -> Result<(), Box<dyn std::error::Error>> {
+        let body = Body::human(1.75, HumanModel::Full)?;
+        let (mut search, mut clusters) = (Nearest::default(), Clusters::default());
+        for (seed, margin) in [(0, 0.0), (1, 0.12), (2, 0.3)] {
+            let poses = body.rest_pose(Pose::new(Vec3::ZERO, Vec3::new(0.1, 0.2, 0.3) * seed as f64));
+            let points = around(seed);
+            clusters.arrange(&points);
+            let (mut quick, mut thorough) = (vec![NONE; points.len()], vec![NONE; points.len()]);
+            search.find(&body, &poses, margin, &clusters, &mut quick, &mut []);
+            let mut inside = vec![false; points.len() * poses.len()];
+            search.find(&body, &poses, margin, &clusters, &mut thorough, &mut inside);
+            assert_eq!(quick, thorough);
+            let mut found = 0;
+            for (index, nearest) in quick.iter().enumerate() {
+                let squares = search.limbs.iter().map(|limb| {
+                    let local = limb.local(points.x[index], points.y[index], points.z[index]);
+                    if limb.holds(local) { limb.square(local) } else { OUTSIDE }
+                });
+                let squares: Vec<f32> = squares.collect();
+                let least = squares.iter().copied().fold(OUTSIDE, f32::min);
+                let first = squares.iter().position(|square| *square == least && least < OUTSIDE);
+                assert_eq!(first.map_or(NONE, |limb| limb as u32), *nearest);
+                found += usize::from(first.is_some());
+                for (limb, square) in squares.iter().enumerate() {
+                    assert_eq!(inside[index * poses.len() + limb], *square < OUTSIDE);
+                }
+            }
+            assert!(found > 400, "{found}");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,128 @@
+//! A camera sees only what faces it: points inside a limb that were matched to its far side belong to its near side.
+//!
+//! The closest point of the surface is on the far side as soon as a limb is its radius too near to the camera. Matched there, the
+//! points would hold the limb where it is. They are matched to the point that the camera sees before it in the same slice
+//! instead, and draw the limb back to them. At the outline the two coincide: nothing jumps. Points behind a limb keep their
+//! closest point: they may belong to what lies behind it.
+
+use std::ops::Range;
+
+use crate::association::correspondence::LimbMatches;
+use crate::math::{Pose, Vec3, widest};
+use crate::observation::candidates::Candidates;
+use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
+
+/// Turns the matches of depth pixels inside a limb that face away from their camera to the near side.
+pub fn match_visible_side(
+    shape: &TaperedEllipticCylinder,
+    pose: &Pose,
+    candidates: &Candidates,
+    max_distance: f64,
+    matches: &mut LimbMatches,
+) {
+    let mut start = 0;
+    for (end, camera) in &candidates.cameras {
+        // The candidates of a limb ascend.
+        let stop = start + matches.candidate[start..].partition_point(|candidate| candidate < end);
+        for first in (start..stop).step_by(LANES) {
+            let last = stop.min(first + LANES);
+            let away = widest(
+                #[inline(always)]
+                || facing_away(matches, first..last, camera.as_vec3().to_array()),
+            );
+            if away.iter().fold(0, |any, away| any | u8::from(*away)) == 0 {
+                continue;
+            }
+            for index in (first..last).filter(|index| away[index - first]) {
+                turn_match(shape, pose, *camera, max_distance, matches, index);
+            }
+        }
+        start = stop;
+    }
+}
+
+/// Matches looked at together.
+const LANES: usize = 32;
+
+/// Which matches, of points inside, are on the side that faces away from a camera.
+#[inline(always)]
+fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) -> [bool; LANES] {
+    let LimbMatches { measured, weight, surface, .. } = matches;
+    let mut away = [false; LANES];
+    let (px, py, pz) = (&measured.x[range.clone()], &measured.y[range.clone()], &measured.z[range.clone()]);
+    let normals = &surface.normals;
+    let (nx, ny, nz) = (&normals.x[range.clone()], &normals.y[range.clone()], &normals.z[range.clone()]);
+    let (distance, region) = (&surface.signed_distance[range.clone()], &surface.region[range.clone()]);
+    let weight = &weight[range.clone()];
+    for i in 0..range.len() {
+        let along = nx[i] * (px[i] - x) + ny[i] * (py[i] - y) + nz[i] * (pz[i] - z);
+        away[i] = (along > 0.0) & (distance[i] < 0.0) & (region[i] == Region::Side as u8) & (weight[i] > 0.0);
+    }
+    away
+}
+
+/// Turns one match to the near side.
+fn turn_match(
+    shape: &TaperedEllipticCylinder,
+    pose: &Pose,
+    camera: Vec3,
+    max_distance: f64,
+    matches: &mut LimbMatches,
+    index: usize,
+) {
+    let LimbMatches { measured, weight, surface, .. } = matches;
+    let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
+    let view = pose.rotation.inverse() * (measured.get(index) - camera);
+    let (place, normal) = near_side(shape, pose.inverse_transform_point(surface.points.get(index)), view);
+    let (place, normal) = (*pose * place, pose.rotation * normal);
+    let distance = normal.dot(measured.get(index) - place);
+    surface.points.set(index, to_f32(place));
+    surface.normals.set(index, to_f32(normal));
+    surface.signed_distance[index] = distance as f32;
+    if distance.abs() > max_distance {
+        weight[index] = 0.0;
+    }
+}
+
+/// The other end of the chord through a slice, from a point on the side along the line of sight (limb frame), and the normal
+/// there: in units of the semi-axes the slice is a circle, and the chord's ends mirror each other.
+fn near_side(shape: &TaperedEllipticCylinder, point: Vec3, view: Vec3) -> (Vec3, Vec3) {
+    let rates = [(shape.a1() - shape.a0()) / shape.length(), (shape.b1() - shape.b0()) / shape.length()];
+    let (a, b) = (shape.a0() + rates[0] * point.z, shape.b0() + rates[1] * point.z);
+    let (a, b) = (a.max(MIN_SIZE), b.max(MIN_SIZE));
+    let (x, y) = (point.x / a, point.y / b);
+    let (u, v) = (view.x / a, view.y / b);
+    let square = (u * u + v * v).max(f64::MIN_POSITIVE);
+    let along = 2.0 * (x * u + y * v) / square;
+    let (x, y) = (x - along * u, y - along * v);
+    // Gradient of (X / a)^2 + (Y / b)^2.
+    let normal = Vec3::new(x / a, y / b, -(x * x * rates[0] / a + y * y * rates[1] / b));
+    (Vec3::new(x * a, y * b, point.z), normal.normalize_or(Vec3::Z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_near_side_lies_on_the_surface_before_the_far_one() {
+        let shape = TaperedEllipticCylinder::new(0.4, 0.10, 0.05, 0.06, 0.04).unwrap();
+        for k in 0..60 {
+            let angle = f64::from(k) * 0.1;
+            for view in [Vec3::new(0.3, 1.0, 0.2), Vec3::new(-1.0, 0.4, -0.5)] {
+                let t = f64::from(k) / 60.0;
+                let (a, b) = (0.10 - 0.04 * t, 0.05 - 0.01 * t);
+                let far = Vec3::new(a * angle.cos(), b * angle.sin(), 0.4 * t);
+                let (near, normal) = near_side(&shape, far, view);
+                let exact = shape.closest_point(near);
+                assert!(exact.signed_distance.abs() < 1e-12);
+                assert!(exact.normal.distance(normal) < 1e-6 || t < 1e-9, "{normal} is not {}", exact.normal);
+                // On the line of sight, as seen along the axis.
+                let chord = near - far;
+                assert!((chord.x * view.y - chord.y * view.x).abs() < 1e-12);
+                let (back, _) = near_side(&shape, near, view);
+                assert!(back.distance(far) < 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! The kinematic chain of a body: exact joints, unknowns are the root's twist and the joint angles (R07 section 2.2).
+
+use nalgebra::Vector6;
+
+use crate::body::{Body, Joint, JointKind};
+use crate::math::{Pose, Quat, Vec3};
+
+/// Where the unknowns of each limb's joint stand in the vector of all unknowns; the root has six.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Chain {
+    /// First unknown of each limb.
+    pub start: Vec<usize>,
+    /// Number of unknowns of each limb: 6 for the root, 1 for a hinge, else 3.
+    pub count: Vec<usize>,
+    /// Parent of each limb; the root is its own.
+    pub parent: Vec<usize>,
+    /// Number of all unknowns.
+    pub freedoms: usize,
+}
+
+impl Chain {
+    /// Lays out the unknowns of `body`.
+    pub fn layout(&mut self, body: &Body) {
+        self.start.clear();
+        self.count.clear();
+        self.parent.clear();
+        self.freedoms = 0;
+        for limb in body.limbs() {
+            let (parent, count) = match &limb.parent {
+                None => (0, 6),
+                Some((parent, joint)) => (*parent, if joint.kind() == JointKind::Hinge { 1 } else { 3 }),
+            };
+            self.start.push(self.freedoms);
+            self.count.push(count);
+            self.parent.push(parent);
+            self.freedoms += count;
+        }
+    }
+}
+
+/// Axis of a hinge in its joint frame.
+pub fn hinge_axis(joint: &Joint) -> Vec3 {
+    if joint.semi_axes[0] > 0.0 { Vec3::X } else { Vec3::Y }
+}
+
+/// Axes of a joint's freedoms in the world (`exp` of their combination turns the child), and how many they are.
+pub fn joint_axes(joint: &Joint, world_from_parent: &Pose) -> ([Vec3; 3], usize) {
+    let rotation = world_from_parent.rotation * joint.parent_from_joint.rotation;
+    match joint.kind() {
+        JointKind::Hinge => ([rotation * hinge_axis(joint), Vec3::ZERO, Vec3::ZERO], 1),
+        _ => ([rotation * Vec3::X, rotation * Vec3::Y, rotation * Vec3::Z], 3),
+    }
+}
+
+/// The spatial twist of a turn about `axis` through `centre` (a screw without pitch, R07 eq. 14).
+pub fn screw(axis: Vec3, centre: Vec3) -> Vector6<f64> {
+    let v = centre.cross(axis);
+    Vector6::new(axis.x, axis.y, axis.z, v.x, v.y, v.z)
+}
+
+/// Turn of a joint: joint frame on the parent from joint frame on the limb; for a hinge only the part about its axis.
+pub fn joint_turn(joint: &Joint, world_from_parent: &Pose, world_from_limb: &Pose) -> Quat {
+    let turn = (world_from_parent.rotation * joint.parent_from_joint.rotation).inverse()
+        * (world_from_limb.rotation * joint.limb_from_joint.rotation);
+    match joint.kind() {
+        JointKind::Hinge => {
+            let axis = hinge_axis(joint);
+            let along = Vec3::new(turn.x, turn.y, turn.z).dot(axis);
+            let twist = Quat::from_xyzw(axis.x * along, axis.y * along, axis.z * along, turn.w);
+            if twist.length() > 1e-9 { twist.normalize() } else { Quat::IDENTITY }
+        }
+        _ => turn,
+    }
+}
+
+/// Pose of a limb from its parent's and the joint's turn; the joint is closed.
+pub fn place(joint: &Joint, world_from_parent: &Pose, turn: Quat) -> Pose {
+    *world_from_parent * joint.parent_from_joint * Pose::from_rotation(turn) * joint.limb_from_joint.inverse()
+}
+
+/// `exp` of a spatial twist `(omega, v)` (R07 eq. 4, 5) in its pose form.
+pub fn exp(twist: &Vector6<f64>) -> Pose {
+    let omega = Vec3::new(twist[0], twist[1], twist[2]);
+    let v = Vec3::new(twist[3], twist[4], twist[5]);
+    let angle = omega.length();
+    let rotation = Quat::from_scaled_axis(omega);
+    // Left Jacobian: I + b [w] + c [w]^2 with b = (1 - cos)/t^2, c = (t - sin)/t^3.
+    let (b, c) = if angle < 1e-4 {
+        (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0)
+    } else {
+        ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / (angle * angle * angle))
+    };
+    let first = omega.cross(v);
+    Pose::from_parts(v + b * first + c * omega.cross(first), rotation)
+}

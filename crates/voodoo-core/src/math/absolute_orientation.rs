@@ -1,0 +1,150 @@
+//! Weighted absolute orientation from accumulated moments (Horn 1987; K06 eq. 1, K07 eq. 1-5).
+
+use nalgebra::{Matrix4, SymmetricEigen};
+
+use crate::math::{Mat3, Pose, Quat, Vec3};
+
+/// Weighted moments of point pairs `(x, p)`: everything absolute orientation needs. A multiplicity is one multiplication.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moments {
+    /// Sum of the weights.
+    pub weight: f64,
+    /// Weighted sum of the model points.
+    pub x: Vec3,
+    /// Weighted sum of the measured points.
+    pub p: Vec3,
+    /// Weighted sum of `p x^T`.
+    pub px: Mat3,
+}
+
+impl Default for Moments {
+    /// No pairs. (The default of a glam matrix is the identity, so this cannot be derived.)
+    fn default() -> Self {
+        Self { weight: 0.0, x: Vec3::ZERO, p: Vec3::ZERO, px: Mat3::ZERO }
+    }
+}
+
+impl Moments {
+    /// Adds one pair.
+    pub fn add(&mut self, weight: f64, x: Vec3, p: Vec3) {
+        self.weight += weight;
+        self.x += weight * x;
+        self.p += weight * p;
+        self.px += Mat3::from_cols((weight * x.x) * p, (weight * x.y) * p, (weight * x.z) * p);
+    }
+
+    /// Adds other moments `multiplicity` times (K07 4.3: one multiplication, whatever the number of pairs).
+    pub fn merge(&mut self, other: &Self, multiplicity: f64) {
+        self.weight += multiplicity * other.weight;
+        self.x += multiplicity * other.x;
+        self.p += multiplicity * other.p;
+        self.px += other.px * multiplicity;
+    }
+
+    /// The rigid motion `p_from_x` with the least weighted sum of squared distances, `None` without weight.
+    ///
+    /// `stay` (metres) is the lever of a faint wish not to turn: pairs that fix no rotation (one point, points on a line)
+    /// turn the free directions not at all, and the others by less than `1e-6` of their due when the points spread farther
+    /// than `stay`.
+    pub fn absolute_orientation(&self, stay: f64) -> Option<Pose> {
+        if self.weight.is_nan() || self.weight <= 0.0 {
+            return None;
+        }
+        let (mean_x, mean_p) = (self.x / self.weight, self.p / self.weight);
+        // Cross-covariance sum w (x - mx)(p - mp)^T, transposed to S[row x][column p] as Horn writes it.
+        let centred = self.px - Mat3::from_cols(mean_x.x * self.p, mean_x.y * self.p, mean_x.z * self.p);
+        let stay = 1e-6 * self.weight * stay * stay;
+        let s = |x: usize, p: usize| centred.col(x)[p] + if x == p { stay } else { 0.0 };
+        // Horn's symmetric matrix N; the eigenvector of its largest eigenvalue is the quaternion (w, x, y, z).
+        let n = Matrix4::new(
+            s(0, 0) + s(1, 1) + s(2, 2),
+            s(1, 2) - s(2, 1),
+            s(2, 0) - s(0, 2),
+            s(0, 1) - s(1, 0),
+            s(1, 2) - s(2, 1),
+            s(0, 0) - s(1, 1) - s(2, 2),
+            s(0, 1) + s(1, 0),
+            s(2, 0) + s(0, 2),
+            s(2, 0) - s(0, 2),
+            s(0, 1) + s(1, 0),
+            s(1, 1) - s(0, 0) - s(2, 2),
+            s(1, 2) + s(2, 1),
+            s(0, 1) - s(1, 0),
+            s(2, 0) + s(0, 2),
+            s(1, 2) + s(2, 1),
+            s(2, 2) - s(0, 0) - s(1, 1),
+        );
+        let eigen = SymmetricEigen::new(n);
+        let q = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+        let rotation = Quat::from_xyzw(q[1], q[2], q[3], q[0]).normalize();
+        let pose = Pose::from_parts(mean_p - rotation * mean_x, rotation);
+        pose.is_finite().then_some(pose)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn vector(range: f64) -> impl Strategy<Value = Vec3> {
+        [-range..range, -range..range, -range..range].prop_map(Vec3::from_array)
+    }
+
+    proptest! {
+        #[test]
+        fn recovers_a_motion(axis in vector(3.0), shift in vector(5.0), points in proptest::collection::vec(vector(1.0), 4..20)) {
+            let truth = Pose::new(shift, axis);
+            let mut moments = Moments::default();
+            for (index, point) in points.iter().enumerate() {
+                moments.add(1.0 + index as f64, *point, truth * *point);
+            }
+            let found = moments.absolute_orientation(0.0).unwrap();
+            for point in points {
+                prop_assert!((found * point - truth * point).length() < 1e-6);
+            }
+        }
+
+        #[test]
+        fn one_point_only_shifts(x in vector(1.0), p in vector(1.0)) {
+            let mut moments = Moments::default();
+            moments.add(3.0, x, p);
+            let found = moments.absolute_orientation(0.1).unwrap();
+            prop_assert!(found.rotation.angle_between(Quat::IDENTITY) < 1e-6);
+            prop_assert!((found * x - p).length() < 1e-9);
+        }
+
+        #[test]
+        fn a_line_is_turned_the_shortest_way(direction in vector(1.0), axis in vector(1.0)) {
+            prop_assume!(direction.length() > 0.1 && axis.length() > 0.1);
+            let direction = direction.normalize();
+            // A turn about an axis square to the line is the shortest that maps it.
+            let square = direction.any_orthonormal_vector();
+            let turn = Quat::from_axis_angle(square, axis.length().min(1.2));
+            let mut moments = Moments::default();
+            for t in [-1.0, 0.2, 1.0] {
+                moments.add(1.0, direction * t, turn * (direction * t));
+            }
+            let found = moments.absolute_orientation(0.1).unwrap();
+            prop_assert!(found.rotation.angle_between(turn) < 1e-4);
+        }
+    }
+
+    #[test]
+    fn multiplicity_is_repetition() {
+        let mut once = Moments::default();
+        once.add(1.0, Vec3::X, Vec3::Y);
+        once.add(2.0, Vec3::Z, Vec3::ONE);
+        let (mut merged, mut repeated) = (Moments::default(), Moments::default());
+        merged.merge(&once, 7.0);
+        for _ in 0..7 {
+            repeated.merge(&once, 1.0);
+        }
+        assert!((merged.weight - repeated.weight).abs() < 1e-12 && (merged.x - repeated.x).length() < 1e-12);
+    }
+
+    #[test]
+    fn nothing_gives_nothing() {
+        assert_eq!(Moments::default().absolute_orientation(0.1), None);
+    }
+}

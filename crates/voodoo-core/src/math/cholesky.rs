@@ -1,0 +1,95 @@
+//! Dense Cholesky of a small symmetric system, in place and without heap.
+
+use super::simd::widest;
+
+/// Solves `h x = b` for the symmetric `h` (row-major, lower triangle given); `b` becomes `x`. False, and `b` undefined, when
+/// `h` is not positive definite.
+///
+/// `h = L^T L`, from the last unknown to the first: in a tree whose parents come first nothing fills in (Featherstone, "Rigid
+/// Body Dynamics Algorithms", 2008, section 6.5), so that rows of unknowns on other branches stay zero and are passed over.
+pub fn solve_in_place(h: &mut [f64], b: &mut [f64], n: usize) -> bool {
+    factor(h, n) && substitute(h, b, n)
+}
+
+/// The first half of [`solve_in_place`], for several right-hand sides: `h` becomes `L`.
+pub fn factor(h: &mut [f64], n: usize) -> bool {
+    widest(
+        #[inline(always)]
+        || factor_lanes(h, n),
+    )
+}
+
+/// The second half, once for every right-hand side: `l` is what [`factor`] left.
+pub fn substitute(l: &[f64], b: &mut [f64], n: usize) -> bool {
+    widest(
+        #[inline(always)]
+        || substitute_lanes(l, b, n),
+    )
+}
+
+#[inline(always)]
+fn factor_lanes(h: &mut [f64], n: usize) -> bool {
+    for k in (0..n).rev() {
+        let (before, rest) = h.split_at_mut(k * n);
+        let row = &mut rest[..=k];
+        let square = row[k];
+        if square.is_nan() || square <= 0.0 {
+            return false;
+        }
+        let root = square.sqrt();
+        row[k] = root;
+        let row = &mut row[..k];
+        row.iter_mut().for_each(|value| *value /= root);
+        for i in 0..k {
+            let factor = row[i];
+            if factor != 0.0 {
+                for (value, other) in before[i * n..=i * n + i].iter_mut().zip(&*row) {
+                    *value -= factor * other;
+                }
+            }
+        }
+    }
+    true
+}
+
+#[inline(always)]
+fn substitute_lanes(h: &[f64], b: &mut [f64], n: usize) -> bool {
+    for k in (0..n).rev() {
+        let value = b[k] / h[k * n + k];
+        b[k] = value;
+        for (b, factor) in b[..k].iter_mut().zip(&h[k * n..]) {
+            *b -= factor * value;
+        }
+    }
+    for k in 0..n {
+        let (known, rest) = b.split_at_mut(k);
+        let dot: f64 = known.iter().zip(&h[k * n..]).map(|(b, factor)| b * factor).sum();
+        rest[0] = (rest[0] - dot) / h[k * n + k];
+    }
+    b[..n].iter().all(|value| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solves_what_it_should_and_refuses_the_rest() {
+        let n = 7;
+        let l: Vec<f64> =
+            (0..n * n).map(|k| (k * k % 11) as f64 - 4.0 + 8.0 * f64::from(u8::from(k % (n + 1) == 0))).collect();
+        let mut h = vec![0.0; n * n];
+        for (i, j, k) in (0..n * n * n).map(|index| (index / n / n, index / n % n, index % n)) {
+            h[i * n + j] += l[i * n + k] * l[j * n + k];
+        }
+        let x: Vec<f64> = (0..n).map(|k| k as f64 - 2.5).collect();
+        let mut b: Vec<f64> = (0..n).map(|i| (0..n).map(|j| h[i * n + j] * x[j]).sum()).collect();
+        let mut copy = h.clone();
+        assert!(solve_in_place(&mut copy, &mut b, n));
+        for (found, expected) in b.iter().zip(&x) {
+            assert!((found - expected).abs() < 1e-8, "{b:?}");
+        }
+        h[3 * n + 3] = -1.0;
+        assert!(!solve_in_place(&mut h, &mut b, n));
+    }
+}

@@ -1,0 +1,11 @@
+//! Points, rotations and poses, and the little linear algebra that single-purpose code needs.
+
+mod absolute_orientation;
+mod cholesky;
+mod geometry;
+mod simd;
+
+pub use absolute_orientation::Moments;
+pub use cholesky::{factor, solve_in_place, substitute};
+pub use geometry::*;
+pub(crate) use simd::{has_avx512, widest};

@@ -1,0 +1,225 @@
+//! The still scene behind the body, learnt from the depth images of a camera that does not move.
+
+use std::ops::Range;
+
+use crate::math::{Pose, widest};
+use crate::observation::frame::{DepthImage, DepthPixels, Frame};
+
+/// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth.
+const MARGIN: (f32, f32) = (0.04, 0.012);
+/// A deeper return by more than this replaces what was learnt (something stood before it), metres.
+const DEEPER: f32 = 0.15;
+/// Two sides of a gap that differ by less belong to one surface, metres.
+const SAME: f32 = 0.30;
+/// Share of a new return in what was learnt.
+const LEARNING: f32 = 0.1;
+/// One row of this many is learnt in a frame.
+const ROW_STEP: usize = 8;
+
+/// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
+#[derive(Clone, Debug, Default)]
+pub struct Background {
+    world_from_sensor: Option<Pose>,
+    width: usize,
+    depth: Vec<f32>,
+    row: usize,
+}
+
+/// The backgrounds of all depth images, in the order of the frame.
+#[derive(Clone, Debug, Default)]
+pub struct Backgrounds {
+    images: Vec<Background>,
+}
+
+impl Background {
+    /// Learnt depth, row by row; empty when nothing was learnt.
+    pub fn depth(&self) -> &[f32] {
+        &self.depth
+    }
+
+    /// Whether a return at `z` metres in pixel `index` belongs to the background.
+    #[inline(always)]
+    pub fn holds(depth: f32, z: f32) -> bool {
+        depth > 0.0 && z > depth - MARGIN.0 - MARGIN.1 * depth
+    }
+
+    fn fits(&self, image: &DepthImage) -> bool {
+        self.world_from_sensor == Some(image.world_from_sensor)
+            && self.width == image.width
+            && self.depth.len() == image.pixels.len()
+    }
+
+    /// Learns from neighbouring pixels, without a branch.
+    fn learn(&mut self, image: &DepthImage, pixels: Range<usize>) {
+        let scale = image.metres_per_unit as f32;
+        let depth = &mut self.depth[pixels.clone()];
+        widest(
+            #[inline(always)]
+            || match image.pixels {
+                DepthPixels::U16(all) => {
+                    depth
+                        .iter_mut()
+                        .zip(&all[pixels])
+                        .for_each(|(depth, z)| *depth = learnt(*depth, f32::from(*z) * scale));
+                }
+                DepthPixels::F32(all) => {
+                    depth.iter_mut().zip(&all[pixels]).for_each(|(depth, z)| *depth = learnt(*depth, *z * scale));
+                }
+            },
+        );
+    }
+}
+
+/// What is known of a pixel after a return at `z`.
+#[inline(always)]
+fn learnt(depth: f32, z: f32) -> f32 {
+    let change = z - depth;
+    let near = if change.abs() < DEEPER { depth + LEARNING * change } else { depth };
+    let new = if (depth == 0.0) | (z > depth + DEEPER) { z } else { near };
+    if (z > 0.0) & (z < f32::INFINITY) { new } else { depth }
+}
+
+impl Backgrounds {
+    /// The background of this image, if its camera has not moved.
+    pub fn of(&self, image: &DepthImage) -> Option<&Background> {
+        self.images.iter().find(|background| background.fits(image))
+    }
+
+    /// Whether no depth image was ever seen.
+    pub fn is_empty(&self) -> bool {
+        self.images.is_empty()
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.images.clear();
+    }
+
+    /// Starts from a frame whose body pose is known: `forget_body` sets those of all depths to 0 that may be the body's, the
+    /// others are scene.
+    pub fn start(&mut self, frame: &Frame, mut forget_body: impl FnMut(&DepthImage, &mut [f32])) {
+        self.images.clear();
+        for image in frame.images {
+            let depths = (0..image.pixels.len()).map(|index| image.pixels.get(index) * image.metres_per_unit as f32);
+            let mut depth: Vec<f32> = depths.map(|z| if z > 0.0 && z.is_finite() { z } else { 0.0 }).collect();
+            forget_body(image, &mut depth);
+            self.images.push(Background {
+                world_from_sensor: Some(image.world_from_sensor),
+                width: image.width,
+                depth,
+                row: 0,
+            });
+        }
+    }
+
+    /// Guesses what lies where the body has hidden the scene since the start: what lies beside it in the same row, linearly
+    /// between its two sides, and the deeper one where they are far apart.
+    pub fn fill(&mut self) {
+        for background in &mut self.images {
+            for row in background.depth.chunks_mut(background.width.max(1)) {
+                fill_row(row);
+            }
+        }
+    }
+
+    /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. A camera that moved
+    /// starts anew with nothing known; one that is silent in this frame is remembered.
+    pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> (Range<usize>, Range<usize>)) {
+        for image in frame.images {
+            let known = self.images.iter().position(|background| background.fits(image));
+            let index = known.unwrap_or_else(|| self.start_anew(image, frame));
+            let background = &mut self.images[index];
+            let (columns, rows) = window(image);
+            background.row = (background.row + 1) % ROW_STEP;
+            for row in (background.row..image.height).step_by(ROW_STEP) {
+                let (start, end) = (row * image.width, (row + 1) * image.width);
+                if rows.contains(&row) {
+                    background.learn(image, start..start + columns.start);
+                    background.learn(image, start + columns.end..end);
+                } else {
+                    background.learn(image, start..end);
+                }
+            }
+        }
+    }
+
+    /// Nothing is known behind this image any more; in the place of a background that no image of the frame has.
+    fn start_anew(&mut self, image: &DepthImage, frame: &Frame) -> usize {
+        let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
+        let index = self.images.iter().position(gone).unwrap_or(self.images.len());
+        if index == self.images.len() {
+            self.images.push(Background::default());
+        }
+        let background = &mut self.images[index];
+        background.world_from_sensor = Some(image.world_from_sensor);
+        background.width = image.width;
+        background.depth.clear();
+        background.depth.resize(image.pixels.len(), 0.0);
+        index
+    }
+}
+
+fn fill_row(row: &mut [f32]) {
+    let mut start = 0;
+    while let Some(gap) = row[start..].iter().position(|depth| *depth <= 0.0) {
+        let first = start + gap;
+        let end = row[first..].iter().position(|depth| *depth > 0.0).map_or(row.len(), |length| first + length);
+        let (left, right) = (first.checked_sub(1).map(|index| row[index]), row.get(end).copied());
+        let count = (end - first + 1) as f32;
+        for index in first..end {
+            let t = (index - first + 1) as f32 / count;
+            row[index] = match (left, right) {
+                (Some(a), Some(b)) if (a - b).abs() < SAME => a + t * (b - a),
+                (Some(a), Some(b)) => a.max(b),
+                (a, b) => a.or(b).unwrap_or(0.0),
+            };
+        }
+        start = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn a_gap_is_filled_from_its_sides() {
+        let mut row = [0.0, 3.0, 0.0, 0.0, 3.3, 0.0, 1.0, 0.0, 2.5, 0.0];
+        fill_row(&mut row);
+        let expected = [3.0, 3.0, 3.1, 3.2, 3.3, 3.3, 1.0, 2.5, 2.5, 2.5];
+        assert!(row.iter().zip(expected).all(|(found, wanted)| (found - wanted).abs() < 1e-6), "{row:?}");
+        let mut nothing = [0.0; 3];
+        fill_row(&mut nothing);
+        assert_eq!(nothing, [0.0; 3]);
+    }
+
+    #[test]
+    fn a_silent_camera_is_remembered_and_a_moved_one_starts_anew() {
+        let pixels = [3.0_f32; 4 * ROW_STEP];
+        let image = |x: f64| DepthImage {
+            pixels: DepthPixels::F32(&pixels),
+            width: 4,
+            height: ROW_STEP,
+            metres_per_unit: 1.0,
+            intrinsics: [4.0, 4.0, 2.0, 4.0],
+            rays: None,
+            world_from_sensor: Pose::from_translation(Vec3::new(x, 0.0, 0.0)),
+            weight: 1.0,
+            source: 0,
+        };
+        let mut backgrounds = Backgrounds::default();
+        let mut learn = |images: &[DepthImage]| {
+            let frame = Frame { images, ..Frame::empty(0.0) };
+            backgrounds.update(&frame, |_| (0..0, 0..0));
+            [0.0, 1.0, 2.0].map(|x| {
+                let learnt = backgrounds.of(&image(x)).map(Background::depth);
+                learnt.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count() / 4)
+            })
+        };
+        assert_eq!(learn(&[image(0.0), image(1.0)]), [Some(1), Some(1), None]);
+        assert_eq!(learn(&[]), [Some(1), Some(1), None]);
+        assert_eq!(learn(&[image(1.0)]), [Some(1), Some(2), None], "the other one is silent");
+        assert_eq!(learn(&[image(2.0), image(1.0)]), [None, Some(3), Some(1)], "the other one moved");
+    }
+}

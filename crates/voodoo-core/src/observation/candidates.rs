@@ -1,0 +1,338 @@
+//! Step 1: free points inside the enlarged whole-body box, joined by the points known to be on the body (K06 IV-B.1).
+
+use crate::body::Body;
+use crate::config::Config;
+use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, widest};
+use crate::observation::background::{Background, Backgrounds};
+use crate::observation::clusters::Clusters;
+use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
+
+/// Mark of a point that may belong to any limb.
+pub const ANY_LIMB: u16 = u16::MAX;
+
+/// Measured points that may lie on the body, in the working frame: world axes, origin near the body, single precision.
+#[derive(Debug, Default)]
+pub struct Candidates {
+    /// Where they are.
+    pub points: Points,
+    /// What they weigh.
+    pub weight: Vec<f32>,
+    /// The limb they are known to be on, or [`ANY_LIMB`].
+    pub limb: Vec<u16>,
+    /// Which source they come from.
+    pub source: Vec<u16>,
+    /// The pixels of depth images come first, image after image: the number of points up to the end of each, and where its
+    /// camera stands.
+    pub cameras: Vec<(u32, Vec3)>,
+    /// The points once more, neighbours together.
+    pub(crate) clusters: Clusters,
+}
+
+/// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
+struct Gate {
+    low: [f32; 3],
+    high: [f32; 3],
+    up: [f32; 3],
+    floor: f32,
+}
+
+impl Gate {
+    #[inline(always)]
+    fn passes(&self, p: [f32; 3]) -> bool {
+        let inside = |axis: usize| (p[axis] >= self.low[axis]) & (p[axis] <= self.high[axis]);
+        inside(0) & inside(1) & inside(2) & (p[0] * self.up[0] + p[1] * self.up[1] + p[2] * self.up[2] >= self.floor)
+    }
+}
+
+/// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
+pub fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
+    let mut total = Aabb::new_invalid();
+    for (limb, pose) in body.limbs().iter().zip(poses) {
+        let bounds = limb.shape.aabb(pose);
+        total.mins = total.mins.min(bounds.mins);
+        total.maxs = total.maxs.max(bounds.maxs);
+    }
+    Aabb::new(total.mins - Vec3::splat(margin), total.maxs + Vec3::splat(margin))
+}
+
+impl Candidates {
+    /// Number of candidates.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// True when there is none.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
+    /// whole-body box in the working frame, and pixels of the learnt
+    /// backgrounds are left out.
+    pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, backgrounds: &Backgrounds, config: &Config) {
+        self.points.clear();
+        self.weight.clear();
+        self.limb.clear();
+        self.source.clear();
+        self.cameras.clear();
+        let (up, floor) = match frame.ground {
+            Some(ground) => (ground.normal, ground.offset + config.ground_clearance - ground.normal.dot(origin)),
+            None => (Vec3::ZERO, -1.0),
+        };
+        let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
+        let gate = Gate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
+        for image in frame.images {
+            let background = backgrounds.of(image).map_or(&[][..], Background::depth);
+            self.gather_image(image, background, origin, bounds, &gate, config.max_points);
+            self.cameras.push((self.points.len() as u32, image.world_from_sensor.translation - origin));
+        }
+        for cloud in frame.clouds {
+            self.gather_cloud(cloud, origin, &gate);
+        }
+        self.clusters.arrange(&self.points);
+    }
+
+    fn push(&mut self, point: [f32; 3], weight: f32, limb: u16, source: u16) {
+        self.points.push(point);
+        self.weight.push(weight);
+        self.limb.push(limb);
+        self.source.push(source);
+    }
+
+    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &Gate) {
+        let working_from_sensor = shifted(&cloud.world_from_sensor, origin);
+        let (rotation, shift) = (Mat3::from_quat(working_from_sensor.rotation), working_from_sensor.translation);
+        let limb = match cloud.scope {
+            Scope::Limb(limb) => limb as u16,
+            Scope::Free | Scope::Body => ANY_LIMB,
+        };
+        let mut visit = |point: Vec3| {
+            let point = (rotation * point + shift).to_array().map(|value| value as f32);
+            if cloud.scope != Scope::Free || gate.passes(point) {
+                self.push(point, cloud.weight as f32, limb, cloud.source);
+            }
+        };
+        match cloud.points {
+            PointSlice::F32(points) => points.iter().for_each(|p| visit(Vec3::from_array(p.map(f64::from)))),
+            PointSlice::F64(points) => points.iter().for_each(|p| visit(Vec3::from_array(*p))),
+        }
+    }
+
+    fn gather_image(
+        &mut self,
+        image: &DepthImage,
+        background: &[f32],
+        origin: Vec3,
+        bounds: &Aabb,
+        gate: &Gate,
+        max_points: usize,
+    ) {
+        let working_from_sensor = shifted(&image.world_from_sensor, origin);
+        let (columns, rows) = image_window(image, &working_from_sensor, bounds);
+        let m = columns_f32(&working_from_sensor);
+        let points = &mut self.points;
+        // A pixel stands for a patch of surface: its size follows from the distance of the body.
+        let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(0.3);
+        let patch = distance * distance / (image.intrinsics[0] * image.intrinsics[1]);
+        let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
+        let weight = image.weight * patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
+        let stride = grid.columns;
+        widest(
+            #[inline(always)]
+            || {
+                for row in rows.step_by(grid.rows) {
+                    for start in (columns.start + grid.offset(row)..columns.end).step_by(STRETCH * stride) {
+                        let stretch = Stretch::load(image, background, row, start, columns.end, stride);
+                        if stretch.returned() {
+                            stretch.gather(&m, gate, points);
+                        }
+                    }
+                }
+            },
+        );
+        let count = self.points.len();
+        self.weight.resize(count, weight as f32);
+        self.limb.resize(count, ANY_LIMB);
+        self.source.resize(count, image.source);
+    }
+}
+
+/// Area of a person that a camera sees, about, m^2; what stands beside counts as well.
+const VISIBLE_AREA: f64 = 0.6;
+/// A depth pixel that stands for this much surface has weight one: 12 mm squared, that of a 160x124 time-of-flight camera
+/// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
+pub const REFERENCE_PATCH: f64 = 0.012 * 0.012;
+
+/// Which pixels of an image are used: every so manyth row, and in it every so manyth column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Grid {
+    rows: usize,
+    columns: usize,
+}
+
+impl Grid {
+    /// About one pixel in `share`, as evenly as whole numbers allow.
+    fn new(share: f64) -> Self {
+        let rows = share.sqrt().floor().max(1.0);
+        let columns = (share / rows).round().max(1.0);
+        Self { rows: rows as usize, columns: columns as usize }
+    }
+
+    /// First column of a row: where columns are wider than rows, those of one row stand between those of the next.
+    fn offset(self, row: usize) -> usize {
+        if self.columns == self.rows { 0 } else { row / self.rows * (self.columns / 2) % self.columns }
+    }
+}
+
+/// Pixels of a row that are looked at together.
+const STRETCH: usize = 32;
+
+/// Visits every `stride`th value with its place in `to`; neighbours fill whole registers.
+#[inline(always)]
+fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, &T)) {
+    if stride == 1 {
+        to.iter_mut().zip(from).for_each(|(to, value)| visit(to, value));
+    } else {
+        to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, value)| visit(to, value));
+    }
+}
+
+/// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
+struct Stretch {
+    x: [f32; STRETCH],
+    y: [f32; STRETCH],
+    z: [f32; STRETCH],
+}
+
+impl Stretch {
+    #[inline(always)]
+    fn load(image: &DepthImage, background: &[f32], row: usize, start: usize, end: usize, stride: usize) -> Self {
+        let count = STRETCH.min((end - start).div_ceil(stride));
+        let first = row * image.width + start;
+        let scale = image.metres_per_unit as f32;
+        let mut z = [0.0; STRETCH];
+        match image.pixels {
+            DepthPixels::U16(pixels) => {
+                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = f32::from(*pixel) * scale);
+            }
+            DepthPixels::F32(pixels) => {
+                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = *pixel * scale);
+            }
+        }
+        if !background.is_empty() {
+            every(&background[first..], stride, &mut z[..count], |z, depth| {
+                *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
+            });
+        }
+        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
+        let mut x = [0.0; STRETCH];
+        let mut y = [(row as f32 - cy) * (1.0 / fy); STRETCH];
+        match image.rays {
+            Some(rays) => {
+                for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(rays[first..].iter().step_by(stride)).take(count) {
+                    (*x, *y) = (ray[0], ray[1]);
+                }
+            }
+            None => {
+                let inverse = 1.0 / fx;
+                for (x, offset) in x.iter_mut().zip(0_i32..) {
+                    *x = ((start as i32 + offset * stride as i32) as f32 - cx) * inverse;
+                }
+            }
+        }
+        Self { x, y, z }
+    }
+
+    /// Whether any pixel returned anything that is not the background.
+    #[inline(always)]
+    fn returned(&self) -> bool {
+        self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
+    }
+
+    /// Appends the points that returned and lie inside the gate, in order.
+    #[inline(always)]
+    fn gather(&self, m: &[[f32; 3]; 4], gate: &Gate, points: &mut Points) {
+        let mut p = [[0.0; STRETCH]; 3];
+        let mut passes = [false; STRETCH];
+        for i in 0..STRETCH {
+            let z = self.z[i];
+            let (x, y) = (self.x[i] * z, self.y[i] * z);
+            let place = |axis: usize| m[0][axis] * x + (m[1][axis] * y + (m[2][axis] * z + m[3][axis]));
+            let point = [place(0), place(1), place(2)];
+            // A NaN fails the first comparison.
+            passes[i] = (z > 0.0) & (z < f32::INFINITY) & gate.passes(point);
+            (p[0][i], p[1][i], p[2][i]) = (point[0], point[1], point[2]);
+        }
+        if passes.iter().fold(0, |any, pass| any | u8::from(*pass)) == 0 {
+            return;
+        }
+        let mut kept = 0;
+        for i in 0..STRETCH {
+            // `kept` is at most `i`; the mask only spares the bounds checks.
+            let to = kept % STRETCH;
+            (p[0][to], p[1][to], p[2][to]) = (p[0][i], p[1][i], p[2][i]);
+            kept += usize::from(passes[i]);
+        }
+        points.x.extend_from_slice(&p[0][..kept]);
+        points.y.extend_from_slice(&p[1][..kept]);
+        points.z.extend_from_slice(&p[2][..kept]);
+    }
+}
+
+/// The pixels that can show anything inside the box: the bounds of its projected corners, the whole image when a corner
+/// lies behind the camera or the lens distorts.
+pub fn image_window(
+    image: &DepthImage,
+    working_from_sensor: &Pose,
+    bounds: &Aabb,
+) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+    let whole = (0..image.width, 0..image.height);
+    if image.rays.is_some() {
+        return whole;
+    }
+    let [fx, fy, cx, cy] = image.intrinsics;
+    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+    for corner in bounds.vertices() {
+        let corner = working_from_sensor.inverse_transform_point(corner);
+        if corner.z < 0.05 {
+            return whole;
+        }
+        for (axis, pixel) in [fx * corner.x / corner.z + cx, fy * corner.y / corner.z + cy].into_iter().enumerate() {
+            low[axis] = low[axis].min(pixel);
+            high[axis] = high[axis].max(pixel);
+        }
+    }
+    let range = |axis: usize, size: usize| {
+        let start = low[axis].floor().clamp(0.0, size as f64) as usize;
+        let end = (high[axis].ceil() + 1.0).clamp(0.0, size as f64) as usize;
+        start..end.max(start)
+    };
+    (range(0, image.width), range(1, image.height))
+}
+
+/// Columns of the rotation, then the translation.
+fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
+    [pose.rotation * Vec3::X, pose.rotation * Vec3::Y, pose.rotation * Vec3::Z, pose.translation]
+        .map(|column| column.to_array().map(|value| value as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Grid;
+
+    #[test]
+    fn a_grid_keeps_the_share_asked_for_and_spreads_it() {
+        for tenths in 1..400 {
+            let share = f64::from(tenths) / 10.0;
+            let grid = Grid::new(share);
+            let kept = (grid.rows * grid.columns) as f64 / share.max(1.0);
+            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {share}");
+            assert!((0..50).all(|row| grid.offset(row) < grid.columns));
+        }
+        let columns = |share: f64| [0, 1, 2, 3].map(|row| Grid::new(share).offset(row));
+        assert_eq!((Grid::new(0.3), columns(0.3)), (Grid { rows: 1, columns: 1 }, [0; 4]));
+        assert_eq!((Grid::new(2.0), columns(2.0)), (Grid { rows: 1, columns: 2 }, [0, 1, 0, 1]));
+        assert_eq!((Grid::new(4.0), columns(4.0)), (Grid { rows: 2, columns: 2 }, [0; 4]));
+        assert_eq!((Grid::new(8.0), columns(8.0)), (Grid { rows: 2, columns: 4 }, [0, 0, 2, 2]));
+    }
+}

@@ -1,0 +1,325 @@
+//! What is measured at one instant, from any number of sensors (K06 IV-A). Borrowed: nothing is copied on the way in.
+
+use crate::body::Body;
+use crate::error::TrackError;
+use crate::math::{Pose, Vec3};
+
+/// Three-dimensional points as they lie in memory, in metres.
+#[derive(Clone, Copy, Debug)]
+pub enum PointSlice<'a> {
+    /// Single precision.
+    F32(&'a [[f32; 3]]),
+    /// Double precision.
+    F64(&'a [[f64; 3]]),
+}
+
+impl PointSlice<'_> {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(points) => points.len(),
+            Self::F64(points) => points.len(),
+        }
+    }
+
+    /// True when there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The point at `index`.
+    pub fn get(&self, index: usize) -> Vec3 {
+        match self {
+            Self::F32(points) => Vec3::from_array(points[index].map(f64::from)),
+            Self::F64(points) => Vec3::from_array(points[index]),
+        }
+    }
+}
+
+/// What is known beforehand about where 3-D points belong (K06 IV-A, the first three kinds).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// Anywhere: background, or any limb.
+    Free,
+    /// On the tracked body: the whole-body box is not applied.
+    Body,
+    /// On this limb: no box is applied.
+    Limb(usize),
+}
+
+/// 3-D points of one sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct Cloud<'a> {
+    /// The points in the sensor's frame.
+    pub points: PointSlice<'a>,
+    /// Pose of the sensor.
+    pub world_from_sensor: Pose,
+    /// Weight of each point.
+    pub weight: f64,
+    /// Where they belong.
+    pub scope: Scope,
+    /// Number of the source they come from, for the report.
+    pub source: u16,
+}
+
+/// The pixels of a depth image: distance along the optical axis, 0 (or NaN) = no return, row by row.
+#[derive(Clone, Copy, Debug)]
+pub enum DepthPixels<'a> {
+    /// In units of `metres_per_unit`.
+    U16(&'a [u16]),
+    /// In units of `metres_per_unit`.
+    F32(&'a [f32]),
+}
+
+impl DepthPixels<'_> {
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U16(pixels) => pixels.len(),
+            Self::F32(pixels) => pixels.len(),
+        }
+    }
+
+    /// True when there is no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The value of a pixel; not finite or not above zero means no return.
+    #[inline(always)]
+    pub fn get(&self, index: usize) -> f32 {
+        match self {
+            Self::U16(pixels) => f32::from(pixels[index]),
+            Self::F32(pixels) => pixels[index],
+        }
+    }
+}
+
+/// An organised depth image; its pixels are free points.
+#[derive(Clone, Copy, Debug)]
+pub struct DepthImage<'a> {
+    /// `width * height` pixels.
+    pub pixels: DepthPixels<'a>,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Length of one unit of the pixels, metres.
+    pub metres_per_unit: f64,
+    /// Focal lengths and principal point `(fx, fy, cx, cy)`, pixels; integer coordinates are pixel centres.
+    pub intrinsics: [f64; 4],
+    /// For a lens with distortion: undistorted `(x/z, y/z)` of every pixel.
+    pub rays: Option<&'a [[f32; 2]]>,
+    /// Pose of the camera's optical frame (x right, y down, z forward).
+    pub world_from_sensor: Pose,
+    /// Weight of each point.
+    pub weight: f64,
+    /// Number of the source, for the report.
+    pub source: u16,
+}
+
+impl DepthImage<'_> {
+    /// The point of a pixel in the camera's frame for a depth of `z` metres.
+    pub fn back_project(&self, index: usize, z: f32) -> Vec3 {
+        let [fx, fy, cx, cy] = self.intrinsics;
+        let [x, y] = match self.rays {
+            Some(rays) => rays[index].map(f64::from),
+            None => [((index % self.width) as f64 - cx) / fx, ((index / self.width) as f64 - cy) / fy],
+        };
+        f64::from(z) * Vec3::new(x, y, 1.0)
+    }
+}
+
+/// A named site was seen at a position (K06 IV-A: 3-D point-to-point relation).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionRelation {
+    /// Index of the site.
+    pub site: usize,
+    /// Where it was seen, world frame.
+    pub position: Vec3,
+    /// Its weight.
+    pub weight: f64,
+    /// It may always be this far off, metres: within, it says nothing; beyond, it pulls with the rest of the distance.
+    pub bias: f64,
+    /// Number of the source, for the report.
+    pub source: u16,
+}
+
+/// A named site was seen along a ray (K06 IV-A: 2-D point-to-line relation).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayRelation {
+    /// Index of the site.
+    pub site: usize,
+    /// Where the ray starts (the focal point), world frame.
+    pub origin: Vec3,
+    /// Where it goes, world frame, any length above zero.
+    pub direction: Vec3,
+    /// Its weight.
+    pub weight: f64,
+    /// It may always be this far off, metres: within, it says nothing; beyond, it pulls with the rest of the distance.
+    pub bias: f64,
+    /// Number of the source, for the report.
+    pub source: u16,
+}
+
+/// The floor: points `p` with `normal . p < offset` lie below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Unit vector upwards, world frame.
+    pub normal: Vec3,
+    /// Height of the floor along it, metres.
+    pub offset: f64,
+}
+
+/// All measurements of one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// Seconds.
+    pub stamp: f64,
+    /// 3-D points.
+    pub clouds: &'a [Cloud<'a>],
+    /// Depth images.
+    pub images: &'a [DepthImage<'a>],
+    /// Sites with positions.
+    pub positions: &'a [PositionRelation],
+    /// Sites with rays.
+    pub rays: &'a [RayRelation],
+    /// The floor, where it is known.
+    pub ground: Option<Ground>,
+}
+
+impl<'a> Frame<'a> {
+    /// A frame without measurements.
+    pub fn empty(stamp: f64) -> Self {
+        Self { stamp, clouds: &[], images: &[], positions: &[], rays: &[], ground: None }
+    }
+
+    /// Refuses what cannot be used: nothing of it may reach the tracker's state.
+    ///
+    /// Depth images and point clouds may hold NaN only where the sensor had no return; for a cloud that is an error (drop
+    /// such rows before), for a depth image it is tolerated as "no return".
+    pub fn check(&self, body: &Body, previous_stamp: Option<f64>) -> Result<(), TrackError> {
+        if !self.stamp.is_finite() {
+            return Err(TrackError::Stamp(self.stamp));
+        }
+        if let Some(previous) = previous_stamp.filter(|previous| *previous >= self.stamp) {
+            return Err(TrackError::TimeBackwards { previous, found: self.stamp });
+        }
+        for (index, cloud) in self.clouds.iter().enumerate() {
+            let what = |part: &str| format!("points[{index}].{part}");
+            check_weight(|| what("weight"), cloud.weight)?;
+            check_pose(|| what("world_from_sensor"), &cloud.world_from_sensor)?;
+            if let Scope::Limb(limb) = cloud.scope
+                && limb >= body.limbs().len()
+            {
+                return Err(TrackError::measurement(what("limb"), "the index of a limb", limb.to_string()));
+            }
+            let bad = match cloud.points {
+                PointSlice::F32(points) => points.iter().position(|p| !p.iter().all(|value| value.is_finite())),
+                PointSlice::F64(points) => points.iter().position(|p| !p.iter().all(|value| value.is_finite())),
+            };
+            if let Some(row) = bad {
+                let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
+                return Err(TrackError::measurement(what("points"), "finite metres", found));
+            }
+        }
+        for (index, image) in self.images.iter().enumerate() {
+            check_image(index, image)?;
+        }
+        for (index, relation) in self.positions.iter().enumerate() {
+            let what = |part: &str| format!("positions[{index}].{part}");
+            check_site(|| what("site"), relation.site, body)?;
+            check_weight(|| what("weight"), relation.weight)?;
+            check_bias(|| what("bias"), relation.bias)?;
+            check_vector(|| what("position"), relation.position)?;
+        }
+        for (index, relation) in self.rays.iter().enumerate() {
+            let what = |part: &str| format!("rays[{index}].{part}");
+            check_site(|| what("site"), relation.site, body)?;
+            check_weight(|| what("weight"), relation.weight)?;
+            check_bias(|| what("bias"), relation.bias)?;
+            check_vector(|| what("origin"), relation.origin)?;
+            check_vector(|| what("direction"), relation.direction)?;
+            if relation.direction.length() < 1e-9 {
+                return Err(TrackError::measurement(
+                    what("direction"),
+                    "a vector that is not zero",
+                    format!("{:?}", relation.direction.to_array()),
+                ));
+            }
+        }
+        if let Some(ground) = self.ground
+            && (!ground.offset.is_finite() || !ground.normal.is_normalized())
+        {
+            let found = format!("normal {:?} and offset {}", ground.normal.to_array(), ground.offset);
+            return Err(TrackError::measurement("ground", "a unit normal and a finite offset", found));
+        }
+        Ok(())
+    }
+}
+
+fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
+    let wrong = |part: &str, expected, found: String| {
+        Err(TrackError::measurement(format!("depth[{index}].{part}"), expected, found))
+    };
+    let count = image.width * image.height;
+    if image.pixels.len() != count || count == 0 {
+        return wrong(
+            "image",
+            "width x height pixels",
+            format!("{} for {}x{}", image.pixels.len(), image.width, image.height),
+        );
+    }
+    if image.rays.is_some_and(|rays| rays.len() != count) {
+        return wrong("rays", "one ray a pixel", format!("{:?} for {count} pixels", image.rays.map(<[_]>::len)));
+    }
+    let [fx, fy, cx, cy] = image.intrinsics;
+    if !(fx > 0.0 && fy > 0.0 && fx.is_finite() && fy.is_finite() && cx.is_finite() && cy.is_finite()) {
+        return wrong("camera", "positive focal lengths and a finite centre", format!("{:?}", image.intrinsics));
+    }
+    if !(image.metres_per_unit > 0.0 && image.metres_per_unit.is_finite()) {
+        return wrong("metres_per_unit", "a finite length above zero", image.metres_per_unit.to_string());
+    }
+    check_weight(|| format!("depth[{index}].weight"), image.weight)?;
+    check_pose(|| format!("depth[{index}].world_from_sensor"), &image.world_from_sensor)
+}
+
+fn check_site(what: impl FnOnce() -> String, site: usize, body: &Body) -> Result<(), TrackError> {
+    if site < body.sites().len() {
+        Ok(())
+    } else {
+        Err(TrackError::measurement(what(), "the index of a site", site.to_string()))
+    }
+}
+
+fn check_weight(what: impl FnOnce() -> String, weight: f64) -> Result<(), TrackError> {
+    if weight.is_finite() && weight > 0.0 {
+        Ok(())
+    } else {
+        Err(TrackError::measurement(what(), "a finite weight above zero", weight.to_string()))
+    }
+}
+
+fn check_bias(what: impl FnOnce() -> String, bias: f64) -> Result<(), TrackError> {
+    if bias.is_finite() && bias >= 0.0 {
+        Ok(())
+    } else {
+        Err(TrackError::measurement(what(), "a finite length, zero or above", bias.to_string()))
+    }
+}
+
+fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), TrackError> {
+    if vector.is_finite() {
+        Ok(())
+    } else {
+        Err(TrackError::measurement(what(), "finite metres", format!("{:?}", vector.to_array())))
+    }
+}
+
+fn check_pose(what: impl FnOnce() -> String, pose: &Pose) -> Result<(), TrackError> {
+    if pose.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6 {
+        Ok(())
+    } else {
+        Err(TrackError::measurement(what(), "a rigid transform", format!("{pose:?}")))
+    }
+}

@@ -1,0 +1,215 @@
+//! What a depth camera sees of the body, in the picture of a colour camera beside it.
+
+use std::ops::Range;
+
+use crate::error::TrackError;
+
+/// Part of a depth image (metres, along the optical axis) in which the body is expected.
+#[derive(Clone, Debug)]
+pub struct Window<'a> {
+    /// Depths, row by row; what is not finite and above zero is no return.
+    pub depth: &'a [f32],
+    /// Rows and columns of that image.
+    pub size: [usize; 2],
+    /// `(x/z, y/z)` of every pixel of the camera, row by row.
+    pub rays: &'a [[f32; 2]],
+    /// Rows and columns of the camera.
+    pub camera: [usize; 2],
+    /// The image has every so-many-th row and column of the camera.
+    pub step: usize,
+    /// Rows of the image that are looked at.
+    pub rows: Range<usize>,
+    /// And columns.
+    pub columns: Range<usize>,
+}
+
+impl Window<'_> {
+    fn check(&self) -> Result<(), TrackError> {
+        let [height, width] = self.size;
+        let fits = self.step > 0
+            && self.size.iter().zip(&self.camera).all(|(size, camera)| *size == camera.div_ceil(self.step.max(1)))
+            && self.camera[0].checked_mul(self.camera[1]) == Some(self.rays.len())
+            && height.checked_mul(width) == Some(self.depth.len());
+        if fits && self.rows.end <= height && self.columns.end <= width {
+            return Ok(());
+        }
+        let found = format!(
+            "{} depths for {:?}, {} rays for {:?}, step {}, rows {:?} and columns {:?}",
+            self.depth.len(),
+            self.size,
+            self.rays.len(),
+            self.camera,
+            self.step,
+            self.rows,
+            self.columns
+        );
+        Err(TrackError::measurement(
+            "window",
+            "a depth, and a ray, for every pixel, and rows and columns of them",
+            found,
+        ))
+    }
+
+    /// The points within the box from `low` to `high` (world, metres), in the frame of another camera, metres; and the index
+    /// of each one's pixel in the image.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when sizes do not fit together.
+    pub fn within(
+        &self,
+        low: [f64; 3],
+        high: [f64; 3],
+        world_from_sensor: &[[f64; 4]; 4],
+        other_from_sensor: &[[f64; 4]; 4],
+    ) -> Result<(Vec<[f64; 3]>, Vec<isize>), TrackError> {
+        self.check()?;
+        let to_world = world_from_sensor.map(|row| row.map(|entry| entry as f32));
+        let (mut points, mut pixels) = (Vec::new(), Vec::new());
+        for row in self.rows.clone() {
+            for column in self.columns.clone() {
+                let index = row * self.size[1] + column;
+                let z = self.depth[index];
+                if !(z.is_finite() && z > 0.0) {
+                    continue;
+                }
+                let ray = self.rays[(row * self.camera[1] + column) * self.step];
+                let (x, y) = (ray[0] * z, ray[1] * z);
+                let inside = (0..3).all(|axis| {
+                    let turn = &to_world[axis];
+                    let place = f64::from(turn[0] * x + turn[1] * y + turn[2] * z + turn[3]);
+                    place > low[axis] && place < high[axis]
+                });
+                if inside {
+                    let [x, y, z] = [x, y, z].map(f64::from);
+                    points.push([0, 1, 2].map(|axis| {
+                        let turn = &other_from_sensor[axis];
+                        turn[0] * x + turn[1] * y + turn[2] * z + turn[3]
+                    }));
+                    pixels.push(index as isize);
+                }
+            }
+        }
+        Ok((points, pixels))
+    }
+}
+
+/// Points in a picture of so many rows and columns.
+#[derive(Clone, Debug)]
+pub struct ProjectedPoints {
+    /// 1 where a point is, row by row.
+    pub seen: Vec<u8>,
+    /// 1 where a marked point is; empty without marks.
+    pub marked: Vec<u8>,
+    /// Indices of the points that lie in the picture.
+    pub inside: Vec<isize>,
+    /// Rows that hold them.
+    pub rows: Range<usize>,
+    /// And columns.
+    pub columns: Range<usize>,
+    /// Depth of the nearest point in each pixel of those, infinite where none is.
+    pub nearest: Vec<f32>,
+}
+
+impl ProjectedPoints {
+    /// Puts points into the pixels that are nearest to their places (column, row) in a picture of `[height, width]`; NaN,
+    /// where the camera cannot see, is in none.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when there are not as many depths, or marks, as places.
+    pub fn new(
+        places: &[[f64; 2]],
+        points: &[[f64; 3]],
+        marks: Option<&[bool]>,
+        [height, width]: [usize; 2],
+    ) -> Result<Self, TrackError> {
+        if points.len() != places.len() || marks.is_some_and(|marks| marks.len() != places.len()) {
+            let found = format!("{} points and {:?} marks", points.len(), marks.map(<[_]>::len));
+            let expected = "as many points, and marks, as pixels";
+            return Err(TrackError::measurement("points", expected, format!("{found} for {} pixels", places.len())));
+        }
+        let mut inside = Vec::with_capacity(places.len());
+        let mut cells = Vec::with_capacity(places.len());
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for (index, place) in places.iter().enumerate() {
+            let [u, v] = place.map(f64::round_ties_even);
+            if u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64 {
+                let cell = [v as usize, u as usize];
+                inside.push(index as isize);
+                cells.push(cell);
+                low = [0, 1].map(|axis| low[axis].min(cell[axis]));
+                high = [0, 1].map(|axis| high[axis].max(cell[axis] + 1));
+            }
+        }
+        let [rows, columns] = [0, 1].map(|axis| low[axis].min(high[axis])..high[axis]);
+        let mut nearest = vec![f32::INFINITY; rows.len() * columns.len()];
+        let mut seen = vec![0; height * width];
+        let mut marked = vec![0; if marks.is_some() { seen.len() } else { 0 }];
+        for (&index, [row, column]) in inside.iter().zip(cells) {
+            let index = index as usize;
+            let place = row * width + column;
+            seen[place] = 1;
+            if marks.is_some_and(|marks| marks[index]) {
+                marked[place] = 1;
+            }
+            let least = &mut nearest[(row - rows.start) * columns.len() + column - columns.start];
+            *least = least.min(points[index][2] as f32);
+        }
+        Ok(Self { seen, marked, inside, rows, columns, nearest })
+    }
+}
+
+/// Places of a picture, and what was measured there.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured<'a> {
+    /// Columns and rows.
+    pub places: &'a [[f64; 2]],
+    /// Depths, metres.
+    pub depths: &'a [f64],
+    /// Which may be the still scene.
+    pub still: Option<&'a [bool]>,
+}
+
+/// Surfaces farther behind the nearest one than this are others, metres.
+const ONE_SURFACE: f64 = 0.1;
+
+impl Measured<'_> {
+    /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
+    /// three points there. Where three of the points `among` are there, only those count.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when there are not as many depths, or marks, as places.
+    pub fn nearest_surface(
+        &self,
+        place: [f64; 2],
+        radius: f64,
+        among: Option<&[bool]>,
+    ) -> Result<Option<(f64, bool)>, TrackError> {
+        let count = self.places.len();
+        let marks = [self.still, among];
+        if self.depths.len() != count || marks.iter().flatten().any(|marks| marks.len() != count) {
+            let found = format!("{} depths, {:?} marks", self.depths.len(), marks.map(|marks| marks.map(<[_]>::len)));
+            return Err(TrackError::measurement("depths", "as many depths, and marks, as pixels", found));
+        }
+        let (mut near, mut chosen) = (Vec::new(), Vec::new());
+        for (index, other) in self.places.iter().enumerate() {
+            let (u, v) = (other[0] - place[0], other[1] - place[1]);
+            if u * u + v * v < radius * radius {
+                near.push(index);
+                if among.is_some_and(|among| among[index]) {
+                    chosen.push(index);
+                }
+            }
+        }
+        if chosen.len() >= 3 {
+            near = chosen;
+        }
+        if near.len() < 3 {
+            return Ok(None);
+        }
+        near.sort_unstable_by(|a, b| self.depths[*a].total_cmp(&self.depths[*b]));
+        let fifth = self.depths[near[(near.len() - 1) / 5]];
+        near.retain(|index| (self.depths[*index] - fifth).abs() < ONE_SURFACE);
+        let still = self.still.map_or(0, |still| near.iter().filter(|index| still[**index]).count());
+        Ok(near.get(near.len() / 2).map(|middle| (self.depths[*middle], 2 * still > near.len())))
+    }
+}

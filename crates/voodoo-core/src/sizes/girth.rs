@@ -1,0 +1,248 @@
+//! Girths. In the first frame the named joints fix pose and lengths, the points around them how thick each limb is and where
+//! its surface lies about the line of its joints. Later frames show sides that were hidden then (a trunk behind hanging
+//! arms): two edges across a limb tell how wide it is, wherever it is, and one as far as its axis is known.
+
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
+
+use crate::association::contour::Edge;
+use crate::association::correspondence::LimbMatches;
+use crate::math::{Pose, Vec3};
+use crate::shape::TaperedEllipticCylinder;
+
+/// Standard deviation of the shift of a limb's surface against its joints (metres) and of its relative girth: what
+/// anthropometry leaves open between persons, clothes and definitions of joint centres.
+const SHIFT_SIGMA: f64 = 0.03;
+const GIRTH_SIGMA: f64 = 0.15;
+/// Scatter of a surface point about the model, and how many independent ones a limb shows at most: neighbours err alike.
+const POINT_SIGMA: f64 = 0.015;
+const INDEPENDENT: f64 = 30.0;
+/// Scatter of an edge of the outline: about a pixel.
+const EDGE_SIGMA: f64 = 0.01;
+/// How far the axis of a tracked limb is off across the line of sight, metres.
+const ASIDE_SIGMA: f64 = 0.01;
+/// Edges of following frames err alike: this many frames tell as much as one.
+const ALIKE: f64 = 10.0;
+/// So many frames are remembered: clothes move.
+const REMEMBERED: f64 = 100.0;
+/// Fewer matched points than this tell nothing.
+const ENOUGH: usize = 15;
+
+/// Change of a limb's surface in its own frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GirthFit {
+    /// Shift across the axis, metres; z is 0.
+    pub shift: Vec3,
+    /// Factors of the semi-axes along x, of those along y, and of both at the distal end. Three, not four: both axes taper
+    /// alike, so that the side of the limb stays nearly developable and its closest points cheap.
+    pub factors: [f64; 3],
+}
+
+impl Default for GirthFit {
+    fn default() -> Self {
+        Self { shift: Vec3::ZERO, factors: [1.0; 3] }
+    }
+}
+
+/// One Gauss-Newton step for shift and semi-axes from the matches of one limb.
+///
+/// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb
+/// frame), asks for `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, `e` the relative changes. Robust (Cauchy); `total`, the change made so far, is drawn to none.
+pub fn girth_step(
+    shape: &TaperedEllipticCylinder,
+    matches: &LimbMatches,
+    working_from_limb: &Pose,
+    edges: &[Edge],
+    total: &GirthFit,
+) -> Option<GirthFit> {
+    let (points, _) = matches.accepted();
+    if points < ENOUGH {
+        return None;
+    }
+    let mut h = SMatrix::<f64, 5, 5>::zeros();
+    let mut g = SVector::<f64, 5>::zeros();
+    let row = |foot: Vec3, n: Vec3| {
+        let girth = girth_row(shape, foot, n);
+        SVector::from([n.x, n.y, girth.x, girth.y, girth.z])
+    };
+    for index in 0..matches.weight.len() {
+        if matches.weight[index] <= 0.0 {
+            continue;
+        }
+        let distance = f64::from(matches.surface.signed_distance[index]);
+        let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
+        let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
+        let row = row(foot, n);
+        let weight = kernel(distance);
+        h += weight * row * row.transpose();
+        g += weight * distance * row;
+    }
+    let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
+    let [e0, e1, e2] = total.factors.map(|factor| factor - 1.0);
+    let so_far = SVector::from([total.shift.x, total.shift.y, e0, e1, e2]);
+    let prior = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA])
+        .map(|sigma| 1.0 / (sigma * sigma));
+    let mut h = h * information + SMatrix::from_diagonal(&prior);
+    let mut g = g * information - prior.component_mul(&so_far);
+    for edge in edges {
+        let distance = edge.seen - edge.rim;
+        let row = row(edge.foot, edge.side);
+        let weight = kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA);
+        h += weight * row * row.transpose();
+        g += weight * distance * row;
+    }
+    let step = h.cholesky()?.solve(&g);
+    let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
+    step.iter().all(|value| value.is_finite()).then(|| GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors })
+}
+
+/// How far the surface at `foot` moves along `n` (limb frame) with the three relative changes of girth.
+fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
+    let t = (foot.z / shape.length()).clamp(0.0, 1.0);
+    let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
+    let (a, b) = (n.x * foot.x, n.y * foot.y);
+    Vector3::new(a, b, a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1()))
+}
+
+/// Cauchy's weight of a distance, metres.
+fn kernel(distance: f64) -> f64 {
+    1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
+}
+
+/// What is known about the girth of one limb since it was fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Girth {
+    information: Matrix3<f64>,
+    total: GirthFit,
+}
+
+impl Default for Girth {
+    fn default() -> Self {
+        Self { information: Matrix3::identity() / (GIRTH_SIGMA * GIRTH_SIGMA), total: GirthFit::default() }
+    }
+}
+
+impl Girth {
+    /// Factors of the semi-axes after one more frame: a Kalman filter of the three relative changes. `edges` lie on the sides
+    /// of the limb; how far its axis is off across them in this frame is eliminated, so that edges on both sides tell the
+    /// most. The thickness along the line of sight stays: the surface there is where it was seen.
+    pub fn follow(&mut self, shape: &TaperedEllipticCylinder, edges: impl Iterator<Item = Edge>) -> Option<[f64; 4]> {
+        let mut aside = Matrix2::identity() / (ASIDE_SIGMA * ASIDE_SIGMA * ALIKE);
+        let (mut mixed, mut pull) = (Matrix3x2::zeros(), Vector2::zeros());
+        let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());
+        let mut thickness = Vector3::zeros();
+        for edge in edges {
+            let row = girth_row(shape, edge.foot, edge.side);
+            let side = Vector2::new(edge.side.x, edge.side.y);
+            let wider = edge.seen - edge.rim;
+            let weight = kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA * ALIKE);
+            h += weight * row * row.transpose();
+            g += weight * wider * row;
+            aside += weight * side * side.transpose();
+            mixed += weight * row * side.transpose();
+            pull += weight * wider * side;
+            let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
+            let t = edge.foot.z / shape.length();
+            let a = shape.a0() + t * (shape.a1() - shape.a0());
+            let b = shape.b0() + t * (shape.b1() - shape.b0());
+            let depth = (a * ahead.x).hypot(b * ahead.y);
+            let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, edge.foot.z);
+            thickness += 0.5 * girth_row(shape, front, ahead);
+        }
+        let inverse = aside.try_inverse()?;
+        h -= mixed * inverse * mixed.transpose();
+        g -= mixed * inverse * pull;
+        h += thickness * thickness.transpose() / (EDGE_SIGMA * EDGE_SIGMA);
+        if h.trace() <= 0.0 {
+            return None;
+        }
+        self.information = self.information * (1.0 - 1.0 / REMEMBERED) + h;
+        let step = self.information.cholesky()?.solve(&g);
+        if !step.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let step = GirthFit { shift: Vec3::ZERO, factors: [0, 1, 2].map(|index: usize| 1.0 + step[index]) };
+        let (total, step) = self.total.then(&step);
+        self.total = total;
+        Some(step.axes())
+    }
+}
+
+impl GirthFit {
+    /// Factors of the semi-axes a0, b0, a1, b1.
+    pub fn axes(&self) -> [f64; 4] {
+        let [a, b, distal] = self.factors;
+        [a, b, a * distal, b * distal]
+    }
+
+    /// This change followed by another, held to what a person may differ by; and the part of the other that is left.
+    pub fn then(&self, step: &Self) -> (Self, Self) {
+        let mut total = Self { shift: self.shift + step.shift, factors: self.factors };
+        let mut done = *step;
+        for index in 0..3 {
+            total.factors[index] = (self.factors[index] * step.factors[index]).clamp(0.6, 1.6);
+            done.factors[index] = total.factors[index] / self.factors[index];
+        }
+        (total, done)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Edges of a limb seen along x whose rims lie `wider` beyond the shape's and whose axis is off by `aside`.
+    fn sides(shape: &TaperedEllipticCylinder, wider: f64, aside: f64) -> Vec<[Edge; 2]> {
+        let edge = |t: f64, sign: f64| {
+            let rim = shape.b0() + t * (shape.b1() - shape.b0());
+            let foot = Vec3::new(0.0, sign * rim, t * shape.length());
+            Edge { side: Vec3::Y * sign, rim, foot, seen: rim + wider + sign * aside, place: Vec3::ZERO }
+        };
+        [0.2, 0.35, 0.5, 0.65, 0.8].map(|t| [edge(t, 1.0), edge(t, -1.0)]).to_vec()
+    }
+
+    #[test]
+    fn girths_follow_the_outline_and_keep_their_thickness() {
+        let truth = 0.20;
+        let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
+        let mut girth = Girth::default();
+        let mut after_one = 0.0;
+        for frame in 0..60 {
+            let seen = sides(&shape, truth - 0.5 * (shape.b0() + shape.b1()), 0.02);
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen.into_iter().flatten()).unwrap();
+            let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
+            shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
+            if frame == 0 {
+                after_one = 0.5 * (shape.b0() + shape.b1());
+            }
+        }
+        assert!(after_one < 0.199, "one frame does not decide: {after_one}");
+        let (a, b) = (0.5 * (shape.a0() + shape.a1()), 0.5 * (shape.b0() + shape.b1()));
+        assert!((b - truth).abs() < 0.003, "width {b}");
+        assert!((a - 0.1).abs() < 0.003, "thickness {a}");
+    }
+
+    #[test]
+    fn edges_on_one_side_tell_as_far_as_the_axis_is_known() {
+        let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
+        let mut girth = Girth::default();
+        let both = Girth::default().follow(&shape, sides(&shape, 0.02, 0.0).into_iter().flatten()).unwrap();
+        let one = |shape: &_| sides(shape, 0.02, 0.0).into_iter().map(|[left, _]| left).collect::<Vec<_>>();
+        let [_, after_one, ..] = girth.follow(&shape, one(&shape).into_iter()).unwrap();
+        assert!(1.0 < after_one && after_one < both[1], "one side tells less: {after_one}, both {}", both[1]);
+        for _ in 0..100 {
+            let wider = 0.2 - 0.5 * (shape.b0() + shape.b1());
+            let seen = sides(&shape, wider, 0.0).into_iter().map(|[left, _]| left);
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen).unwrap();
+            let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
+            shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
+        }
+        let b = 0.5 * (shape.b0() + shape.b1());
+        assert!(b > 0.19, "width {b}");
+    }
+
+    #[test]
+    fn girths_without_edges_stay() {
+        let shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
+        assert_eq!(Girth::default().follow(&shape, std::iter::empty()), None);
+    }
+}

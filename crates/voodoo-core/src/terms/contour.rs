@@ -1,0 +1,29 @@
+//! The body's outline in depth images: no limb stands out of it, and none keeps from an edge that is its own.
+
+use super::{Term, surface::geman_mcclure};
+use crate::association::correspondence::EdgePair;
+use crate::body::Body;
+use crate::math::Pose;
+use crate::terms::normal_equations::NormalEquations;
+
+/// Edges along their direction across the limb, under the Geman-McClure kernel.
+#[derive(Debug)]
+pub struct Contour<'a> {
+    /// The pairs.
+    pub edges: &'a [EdgePair],
+    /// Information of an edge, 1/m^2.
+    pub information: f64,
+    /// Scale of the kernel, metres.
+    pub scale: f64,
+}
+
+impl Term for Contour<'_> {
+    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
+        for pair in self.edges {
+            let (rho, kernel) = geman_mcclure(pair.distance, self.scale);
+            normal.cost += self.information * rho;
+            let row = crate::terms::normal_equations::line(pair.x, pair.normal);
+            normal.limbs[pair.limb].add_row(self.information * kernel, &row, -pair.distance);
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! What a step found.
+
+use crate::math::{Pose, Vec3};
+
+/// How much a pose can be relied on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Status {
+    /// Measurements support the pose.
+    Tracking,
+    /// More than a quarter of the limbs are not measured.
+    Degraded,
+    /// Hardly anything measured supports the pose, or what is seen there is flat.
+    #[default]
+    Lost,
+}
+
+/// How much the pose of one limb can be relied on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LimbStatus {
+    /// Measurements support it.
+    Measured,
+    /// Hidden, out of view, or nothing seen that another limb would not explain as well: carried by its joints and the
+    /// prediction.
+    Inferred,
+    /// It should show where it is, and does not.
+    #[default]
+    Lost,
+}
+
+/// What one source gave to a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SourceReport {
+    /// Measurements of the source that were candidates.
+    pub count: usize,
+    /// Those that matched the body.
+    pub inliers: usize,
+    /// Sum of the weights of the matched ones.
+    pub weight: f64,
+    /// Root of the weighted mean of their squared distances, metres; NaN without any.
+    pub residual: f64,
+}
+
+/// Pose and quality of one frame. World frame, metres, seconds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Time of the frame; NaN after a reset and before the first one.
+    pub stamp: f64,
+    /// How much it can be relied on.
+    pub status: Status,
+    /// How much every limb can be relied on.
+    pub limb_status: Vec<LimbStatus>,
+    /// Pose of every limb.
+    pub world_from_limb: Vec<Pose>,
+    /// Position of every site.
+    pub sites: Vec<Vec3>,
+    /// Weighted mean of the squared distances of all measurements to the final pose; NaN without any.
+    pub mean_squared_distance: f64,
+    /// ICP steps used.
+    pub steps: usize,
+    /// Matched points of every limb.
+    pub limb_points: Vec<usize>,
+    /// Root of the mean squared distance of every limb; NaN without points.
+    pub limb_residual: Vec<f64>,
+    /// Distance between the two centres of the joint of every limb to its parent; 0 for the root.
+    pub joint_gaps: Vec<f64>,
+    /// What each source gave.
+    pub sources: Vec<SourceReport>,
+}
+
+impl Default for Estimate {
+    /// Of a tracker without a pose: lost, nothing measured.
+    fn default() -> Self {
+        Self {
+            stamp: f64::NAN,
+            status: Status::default(),
+            limb_status: Vec::new(),
+            world_from_limb: Vec::new(),
+            sites: Vec::new(),
+            mean_squared_distance: f64::NAN,
+            steps: 0,
+            limb_points: Vec::new(),
+            limb_residual: Vec::new(),
+            joint_gaps: Vec::new(),
+            sources: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! How well a pose explains a frame: one score for comparing hypotheses. In units of surface patches (weight one).
+//!
+//! Points that no limb explains cost, and so does visible surface of the model where the camera sees past it. Either alone
+//! would be fooled: a limb hidden inside the torso contradicts nothing, a limb in empty space leaves few points unexplained.
+
+use crate::association::correspondence::Correspondences;
+use crate::body::Limb;
+use crate::math::{Pose, Vec3};
+use crate::observation::candidates::REFERENCE_PATCH;
+use crate::observation::depth_view::{DepthViews, Pixel, View};
+
+/// A point this far from the model is not explained, metres.
+pub const EXPLAINED: f64 = 0.04;
+/// The camera sees past the model's surface when the return lies this much behind it, metres.
+const PAST: f64 = 0.08;
+/// Cost of a patch that hides behind what is seen.
+const HIDDEN: f64 = 0.3;
+/// Places along a limb and across it that are looked at.
+const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
+
+/// What a camera says about a place on the model's surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sight {
+    /// Behind what is seen.
+    Occluded,
+    /// Seen where it is.
+    Consistent,
+    /// The camera sees past it.
+    FreeSpaceViolation,
+}
+
+/// Patches of a limb that face a camera inside its image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Patches {
+    /// Those that a camera sees past.
+    pub free_space: f64,
+    /// Those behind what the camera sees.
+    pub occluded: f64,
+    /// All.
+    pub front_facing: f64,
+}
+
+impl std::ops::AddAssign for Patches {
+    fn add_assign(&mut self, other: Self) {
+        self.free_space += other.free_space;
+        self.occluded += other.occluded;
+        self.front_facing += other.front_facing;
+    }
+}
+
+/// What the cameras see of a limb.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Visibility {
+    /// By the area in the image.
+    pub image: Patches,
+    /// As if the limb were seen from its side: to point along the ray hides nothing.
+    pub side: Patches,
+}
+
+impl std::ops::AddAssign for Visibility {
+    fn add_assign(&mut self, other: Self) {
+        self.image += other.image;
+        self.side += other.side;
+    }
+}
+
+impl Visibility {
+    /// Cost in unexplained patches: to be seen past is as bad as to leave a patch unexplained, to hide is suspicious.
+    pub fn cost(&self) -> f64 {
+        self.image.free_space + HIDDEN * self.side.occluded
+    }
+}
+
+/// How much of a limb's surface is seen by the cameras and how much contradicted.
+pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Visibility {
+    let shape = &limb.shape;
+    let mut found = Visibility::default();
+    for view in views.iter() {
+        let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
+        for t in ALONG {
+            let z = t * shape.length();
+            let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
+            let centre = camera_from_limb * Vec3::new(0.0, 0.0, z);
+            // Direction to the camera, across the limb, in the limb frame.
+            let ahead = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0);
+            if ahead.length() < 1e-6 {
+                continue;
+            }
+            // A limb seen aslant covers so much less of the image, as the points seen on it do.
+            let aslant = ahead.length() / centre.length();
+            let ahead = ahead.normalize();
+            let side = Vec3::new(-ahead.y, ahead.x, 0.0);
+            for s in ACROSS {
+                let forward = (1.0 - s * s).sqrt();
+                let place = ahead * forward + side * s;
+                let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
+                let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
+                    / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
+                let Some(sight) = sight(&view, point) else { continue };
+                for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
+                    match sight {
+                        Sight::FreeSpaceViolation => counts.free_space += patches,
+                        Sight::Occluded => counts.occluded += patches,
+                        Sight::Consistent => {}
+                    }
+                    counts.front_facing += patches;
+                }
+            }
+        }
+    }
+    found
+}
+
+fn sight(view: &View, point: Vec3) -> Option<Sight> {
+    Some(match view.at(point) {
+        Pixel::Unknown => return None,
+        Pixel::Background(z) if z > point.z + 0.5 * PAST => Sight::FreeSpaceViolation,
+        Pixel::Foreground(z) if z > point.z + PAST => Sight::FreeSpaceViolation,
+        Pixel::Background(z) | Pixel::Foreground(z) if z > point.z - PAST => Sight::Consistent,
+        _ => Sight::Occluded,
+    })
+}
+
+/// Cost of the points that the pose leaves unexplained: `w min(d^2 / c^2, 1)` of every candidate.
+pub fn unexplained(correspondences: &Correspondences, total_weight: f64) -> f64 {
+    let mut cost = total_weight;
+    for matches in &correspondences.limbs {
+        for (weight, distance) in matches.weight.iter().zip(&matches.surface.signed_distance) {
+            let ratio = f64::from(*distance) / EXPLAINED;
+            cost -= f64::from(*weight) * (1.0 - ratio * ratio).max(0.0);
+        }
+    }
+    cost
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{Body, HumanModel};
+    use crate::math::Quat;
+    use crate::observation::background::Backgrounds;
+    use crate::observation::frame::{DepthImage, DepthPixels, Frame};
+
+    #[test]
+    fn a_limb_seen_aslant_shows_as_much_less_as_its_image_is_shorter() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let limb = &body.limbs()[body.limb_index("l_calf").unwrap()];
+        let pixels = vec![4000_u16; 160 * 120];
+        let images = [DepthImage {
+            pixels: DepthPixels::U16(&pixels),
+            width: 160,
+            height: 120,
+            metres_per_unit: 0.001,
+            intrinsics: [140.0, 140.0, 79.5, 59.5],
+            rays: None,
+            world_from_sensor: Pose::identity(),
+            weight: 1.0,
+            source: 0,
+        }];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let views =
+            DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
+        let at = |angle: f64| {
+            let turn = Quat::from_axis_angle(Vec3::Y, angle);
+            let middle = turn * Vec3::new(0.0, 0.0, 0.5 * limb.shape.length());
+            limb_visibility(views, limb, &Pose::from_parts(Vec3::new(0.0, 0.0, 2.5) - middle, turn)).image
+        };
+        let across = at(std::f64::consts::FRAC_PI_2);
+        assert!(across.front_facing > 50.0 && across.free_space == across.front_facing, "{across:?}");
+        for angle in [0.2_f64, 0.6, 1.0] {
+            let ratio = at(angle).front_facing / across.front_facing;
+            assert!((ratio - angle.sin()).abs() < 0.02, "{angle}: {ratio}");
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! What of an arm or leg the cameras see, and only it explains.
+//!
+//! An arm put on the trunk fits the trunk's points, and every camera sees something where it is: neither proves it right. A
+//! place on its surface does when nothing of the posed body stands before it, the camera sees something there, and without
+//! this arm the body would leave that unexplained. The limbs of one arm or leg are no rivals of each other: they overlap at
+//! their joint.
+
+use crate::body::Body;
+use crate::body::two_bone::TwoBone;
+use crate::math::{Pose, Vec3};
+use crate::observation::depth_view::{DepthViews, Pixel, View};
+use crate::shape::TaperedEllipticCylinder;
+use crate::visibility::render::LimbRaycaster;
+
+/// Places along a limb and across it that are looked at; nearer to the rim, a pixel shows what lies beside it.
+const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const ACROSS: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+/// The outer part of a limb begins here, with so many places.
+const OUTER: f64 = 0.6;
+const OUTER_PLACES: f64 = 10.0;
+/// What a camera sees at a place this near is explained by it, and by any other surface this near, metres along the ray.
+const NEAR: f64 = 0.04;
+/// The camera sees past a place when what may be the body lies this much behind it, metres; what is known to be the scene
+/// behind the body less.
+const PAST: f64 = 0.08;
+const PAST_SCENE: f64 = 0.04;
+/// A limb stands before a place when it is nearer by this, metres.
+const BEFORE: f64 = 0.01;
+
+/// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
+/// of each.
+///
+/// First of the whole limb, each place weighted with its distance from the proximal joint: that is the lever with which it
+/// holds the distal joint, and a place at the proximal joint says nothing of where the limb points. Then of the places in the
+/// outer two fifths alone: what hides in the trunk from the middle on may end anywhere in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LimbSupport {
+    /// Seen where they are, and explained by no limb of another arm, leg or the trunk.
+    pub own: [f64; 2],
+    /// A camera sees past them.
+    pub past: [f64; 2],
+    /// Some image says something about the limb.
+    pub known: bool,
+}
+
+impl LimbSupport {
+    /// What speaks for the limb less what speaks against it.
+    pub fn net(&self) -> [f64; 2] {
+        [self.own[0] - self.past[0], self.own[1] - self.past[1]]
+    }
+}
+
+/// Looks at the upper and lower limbs of all `chains`; `proofs` gets one entry a limb, `raycasters` is working memory.
+pub fn measure_support(
+    views: DepthViews,
+    body: &Body,
+    poses: &[Pose],
+    chains: &[TwoBone],
+    raycasters: &mut Vec<LimbRaycaster>,
+    proofs: &mut Vec<LimbSupport>,
+) {
+    proofs.clear();
+    proofs.resize(poses.len(), LimbSupport::default());
+    for view in views.iter() {
+        raycasters.clear();
+        let limbs = body.limbs().iter().zip(poses);
+        raycasters
+            .extend(limbs.map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.working_from_camera))));
+        for chain in chains {
+            for limb in [chain.upper, chain.lower] {
+                let seen = support_seen_by(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);
+                let proof = &mut proofs[limb];
+                for part in 0..2 {
+                    proof.own[part] = proof.own[part].max(seen.own[part]);
+                    proof.past[part] = proof.past[part].max(seen.past[part]);
+                }
+                proof.known |= seen.known;
+            }
+        }
+    }
+}
+
+/// What one camera says of a limb of a chain.
+fn support_seen_by(
+    view: &View,
+    shape: &TaperedEllipticCylinder,
+    working_from_limb: &Pose,
+    limb: usize,
+    chain: &TwoBone,
+    raycasters: &[LimbRaycaster],
+) -> LimbSupport {
+    let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
+    let mut proof = LimbSupport::default();
+    for t in ALONG {
+        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
+        let centre = camera_from_limb * Vec3::new(0.0, 0.0, t * shape.length());
+        // Direction to the camera, across the limb, in the limb frame.
+        let Some(ahead) = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0).try_normalize() else {
+            continue;
+        };
+        let side = Vec3::new(-ahead.y, ahead.x, 0.0);
+        // The weights of all places add up to one, in the whole and in the outer part.
+        let lever = t / (ALONG.iter().sum::<f64>() * ACROSS.len() as f64);
+        let outer = if t > OUTER { 1.0 / OUTER_PLACES } else { 0.0 };
+        let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
+        for s in ACROSS {
+            let place = ahead * (1.0 - s * s).sqrt() + side * s;
+            let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, t * shape.length());
+            let pixel = view.at(point);
+            if pixel == Pixel::Unknown {
+                continue;
+            }
+            proof.known = true;
+            let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
+            let others = || raycasters.iter().enumerate().filter(|(other, _)| *other != limb);
+            if others().any(|(_, other)| depth(other) < point.z - BEFORE) {
+                continue;
+            }
+            match pixel {
+                Pixel::Background(z) if z > point.z + PAST_SCENE => count(&mut proof.past),
+                Pixel::Foreground(z) if z > point.z + PAST => count(&mut proof.past),
+                Pixel::Foreground(z) if (z - point.z).abs() < NEAR => {
+                    let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
+                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < NEAR) {
+                        count(&mut proof.own);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    proof
+}

@@ -1,0 +1,381 @@
+//! The depth image that a camera should see of a posed body, and which limb each pixel shows: geometry, no drawing.
+//!
+//! Every pixel's ray meets the limbs whose outline can cover it. Along a ray `o + u (x, y, 1)`, `u` the depth, the side is
+//! `(X / a)² + (Y / b)² = 1` with X, Y, a and b linear in u. With the aspect `a / b` held fixed that is a quadratic; two
+//! rounds of it, the aspect taken where the last one ended, and two Newton steps on the true equation give the root to a
+//! micrometre. Rays near an outline, along the axis of a limb, and limbs whose aspect changes much go through
+//! [`TaperedEllipticCylinder::cast_ray`], which is exact and fifty times slower.
+
+use rayon::prelude::*;
+
+use crate::body::Body;
+use crate::error::TrackError;
+use crate::math::{Pose, Vec3, widest};
+use crate::shape::TaperedEllipticCylinder;
+
+/// Mark of a pixel that shows no limb.
+pub const NO_LIMB: u16 = u16::MAX;
+/// Rays worked on together.
+const LANES: usize = 8;
+/// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
+const BAND: usize = 16;
+/// Limbs nearer to the camera plane than this have no usable outline, metres; every ray is tried.
+const NEAR: f64 = 0.01;
+/// Outlines are widened by this, in units of `x / z`, against rounding.
+const ROUNDING: f64 = 1e-9;
+/// Greatest `|ln(a0 b1 / (a1 b0))|` for which the aspect may be held fixed (method section 2).
+const PLAIN_ASPECT: f64 = 0.3;
+/// A ray whose least squared distance from the axis is within this share of the squared radius grazes the limb.
+const GRAZING: f64 = 0.02;
+/// Where the last Newton step was longer than this, metres, the root is not trusted.
+const CONVERGED: f64 = 1e-6;
+
+/// Where a depth camera stands and how its pixels look out.
+#[derive(Clone, Copy, Debug)]
+pub struct Viewpoint<'a> {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Focal lengths and principal point `(fx, fy, cx, cy)`, pixels; integer coordinates are pixel centres.
+    pub intrinsics: [f64; 4],
+    /// For a lens with distortion: undistorted `(x/z, y/z)` of every pixel; NaN sees nothing.
+    pub rays: Option<&'a [[f32; 2]]>,
+    /// Pose of the camera's optical frame (x right, y down, z forward).
+    pub world_from_sensor: Pose,
+}
+
+impl Viewpoint<'_> {
+    fn check(&self) -> Result<(), TrackError> {
+        let wrong = |what: &str, expected, found: String| Err(TrackError::measurement(what, expected, found));
+        let [fx, fy, cx, cy] = self.intrinsics;
+        if !(fx > 0.0 && fy > 0.0 && [fx, fy, cx, cy].iter().all(|value| value.is_finite())) {
+            return wrong("camera", "positive focal lengths and a finite centre", format!("{:?}", self.intrinsics));
+        }
+        let Some(count) = self.width.checked_mul(self.height).filter(|count| *count > 0) else {
+            return wrong("camera", "at least one pixel", format!("{}x{}", self.width, self.height));
+        };
+        if self.rays.is_some_and(|rays| rays.len() != count) {
+            return wrong("rays", "one ray a pixel", format!("{:?} for {count} pixels", self.rays.map(<[_]>::len)));
+        }
+        let pose = &self.world_from_sensor;
+        if !pose.is_finite() || (pose.rotation.length() - 1.0).abs() > 1e-6 {
+            return wrong("world_from_sensor", "a rigid transform", format!("{pose:?}"));
+        }
+        Ok(())
+    }
+
+    /// `x / z` and `y / z` of some pixels of a row, from `start`; NaN beyond the last column.
+    #[inline(always)]
+    fn lanes(&self, row: usize, start: usize) -> ([f64; LANES], [f64; LANES]) {
+        let (mut x, mut y) = ([f64::NAN; LANES], [f64::NAN; LANES]);
+        let count = LANES.min(self.width - start);
+        if let Some(rays) = self.rays {
+            let first = row * self.width + start;
+            for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(&rays[first..first + count]) {
+                (*x, *y) = (f64::from(ray[0]), f64::from(ray[1]));
+            }
+            return (x, y);
+        }
+        let [fx, fy, cx, cy] = self.intrinsics;
+        for (lane, x) in x[..count].iter_mut().enumerate() {
+            *x = ((start + lane) as f64 - cx) / fx;
+        }
+        (x, [(row as f64 - cy) / fy; LANES])
+    }
+}
+
+/// What a camera should see; keeps its memory from image to image.
+#[derive(Clone, Debug, Default)]
+pub struct Rendering {
+    width: usize,
+    depth: Vec<f32>,
+    limb: Vec<u16>,
+    outlines: Vec<LimbRaycaster>,
+}
+
+impl Rendering {
+    /// Depth along the optical axis, metres, row by row; 0 where no limb is seen.
+    pub fn depth(&self) -> &[f32] {
+        &self.depth
+    }
+
+    /// Index of the limb that each pixel shows, row by row; [`NO_LIMB`] where none is seen.
+    pub fn limb(&self) -> &[u16] {
+        &self.limb
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Predicts what `view` sees of `body` in the poses `world_from_limb`, one a limb.
+    ///
+    /// On the threads of `pool`, or on this one; the result is the same, bit by bit. A limb that the camera is inside of is
+    /// not seen from within. A second image of the same size allocates nothing on one thread.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when the poses or the camera cannot be used; the last image is kept then.
+    pub fn render(
+        &mut self,
+        body: &Body,
+        world_from_limb: &[Pose],
+        view: &Viewpoint,
+        pool: Option<&rayon::ThreadPool>,
+    ) -> Result<(), TrackError> {
+        view.check()?;
+        let limbs = body.limbs();
+        if world_from_limb.len() != limbs.len() || !world_from_limb.iter().all(Pose::is_finite) {
+            let found = format!("{} poses for {} limbs, or one not finite", world_from_limb.len(), limbs.len());
+            return Err(TrackError::measurement("world_from_limb", "one finite pose a limb", found));
+        }
+        let Self { width, depth, limb, outlines } = self;
+        *width = view.width;
+        depth.clear();
+        depth.resize(view.width * view.height, 0.0);
+        limb.clear();
+        limb.resize(view.width * view.height, NO_LIMB);
+        outlines.clear();
+        outlines.extend(
+            limbs
+                .iter()
+                .zip(world_from_limb)
+                .map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.world_from_sensor))),
+        );
+        let outlines = &*outlines;
+        let size = view.width * BAND;
+        let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
+            widest(
+                #[inline(always)]
+                || {
+                    for (index, outline) in (0..).zip(outlines) {
+                        outline.fill(view, band * BAND, index, depth, limb);
+                    }
+                },
+            );
+        };
+        match pool {
+            Some(pool) => pool.install(|| {
+                depth.par_chunks_mut(size).zip(limb.par_chunks_mut(size)).enumerate().for_each(work);
+            }),
+            None => depth.chunks_mut(size).zip(limb.chunks_mut(size)).enumerate().for_each(work),
+        }
+        Ok(())
+    }
+}
+
+/// A limb as one camera sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct LimbRaycaster {
+    shape: TaperedEllipticCylinder,
+    /// The camera's centre and axes in the limb frame.
+    origin: Vec3,
+    axes: [Vec3; 3],
+    /// `x / z` and `y / z` of the corners of a frustum that holds the limb; none when some lie beside or behind the camera.
+    corners: Option<[[f64; 2]; 8]>,
+    /// Least and greatest of the corners' coordinates.
+    low: [f64; 2],
+    high: [f64; 2],
+    /// The aspect changes little, and the camera is outside.
+    plain: bool,
+}
+
+impl LimbRaycaster {
+    /// The outline of a limb of this shape for a camera in this place.
+    pub fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
+        let sensor_from_limb = limb_from_sensor.inverse();
+        let mut corners = Some([[0.0; 2]; 8]);
+        let (mut low, mut high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+        for index in 0..8 {
+            let (a, b, z) = match index & 4 {
+                0 => (shape.a0(), shape.b0(), 0.0),
+                _ => (shape.a1(), shape.b1(), shape.length()),
+            };
+            let sign = |bit: usize| if index & bit == 0 { 1.0 } else { -1.0 };
+            let corner = sensor_from_limb * Vec3::new(sign(1) * a, sign(2) * b, z);
+            corners = corners.filter(|_| corner.z > NEAR);
+            if let Some(corners) = &mut corners {
+                corners[index] = [corner.x / corner.z, corner.y / corner.z];
+            }
+        }
+        if let Some(corners) = &corners {
+            for axis in 0..2 {
+                let values = || corners.iter().map(|corner| corner[axis]);
+                low[axis] = values().fold(f64::INFINITY, f64::min) - ROUNDING;
+                high[axis] = values().fold(f64::NEG_INFINITY, f64::max) + ROUNDING;
+            }
+        }
+        // A cone's tip or a wedge has no aspect: the logarithm is not finite, and the comparison false.
+        let twist = ((shape.a0() * shape.b1()) / (shape.a1() * shape.b0())).ln().abs();
+        Self {
+            shape,
+            origin: limb_from_sensor.translation,
+            axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| limb_from_sensor.rotation * axis),
+            plain: twist < PLAIN_ASPECT && corners.is_some(),
+            corners,
+            low,
+            high,
+        }
+    }
+
+    /// Depth at which the ray through `(x / z, y / z)` meets the limb, metres; NaN where it does not.
+    #[inline(always)]
+    pub fn depth_at(&self, x: f64, y: f64) -> f64 {
+        // Most rays pass far from most limbs.
+        let near = (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]);
+        if near { self.depth_within(x, y) } else { f64::NAN }
+    }
+
+    #[inline(never)]
+    fn depth_within(&self, x: f64, y: f64) -> f64 {
+        let (depth, unsure) = if self.plain { self.meet_plain(x, y) } else { (f64::NAN, true) };
+        if unsure { self.meet_exactly(x, y) } else { depth }
+    }
+
+    fn meet_exactly(&self, x: f64, y: f64) -> f64 {
+        let direction = self.axes[0] * x + self.axes[1] * y + self.axes[2];
+        let hit = self.shape.cast_ray(self.origin, direction, f64::INFINITY);
+        hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
+    }
+
+    /// Columns of a row of a camera without distortion that the limb can cover.
+    fn span(&self, view: &Viewpoint, row: usize) -> (usize, usize) {
+        let [fx, fy, cx, cy] = view.intrinsics;
+        let Some(corners) = &self.corners else { return (0, view.width) };
+        let y = (row as f64 - cy) / fy;
+        if y < self.low[1] || y > self.high[1] {
+            return (0, 0);
+        }
+        // The limb lies in the convex hull of the corners; a row cuts the hull between its outermost crossings of the lines
+        // from corner to corner.
+        let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (index, from) in corners.iter().enumerate() {
+            for to in &corners[index + 1..] {
+                let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
+                if low[1] > y + ROUNDING || high[1] < y - ROUNDING {
+                    continue;
+                }
+                let rise = high[1] - low[1];
+                if rise < ROUNDING {
+                    first = first.min(low[0]).min(high[0]);
+                    last = last.max(low[0]).max(high[0]);
+                } else {
+                    let x = low[0] + (high[0] - low[0]) * ((y - low[1]) / rise).clamp(0.0, 1.0);
+                    first = first.min(x);
+                    last = last.max(x);
+                }
+            }
+        }
+        let column = |x: f64| (fx * x + cx).clamp(-1.0, view.width as f64);
+        let start = column(first - 2.0 * ROUNDING).ceil().max(0.0) as usize;
+        let end = (column(last + 2.0 * ROUNDING).floor() + 1.0).clamp(0.0, view.width as f64) as usize;
+        (start, end.max(start))
+    }
+
+    /// Draws nearer what the limb hides in a band of rows that starts at row `top`.
+    #[inline(always)]
+    fn fill(&self, view: &Viewpoint, top: usize, index: u16, depth: &mut [f32], limb: &mut [u16]) {
+        for (offset, (depth, limb)) in depth.chunks_mut(view.width).zip(limb.chunks_mut(view.width)).enumerate() {
+            let row = top + offset;
+            let (first, end) = if view.rays.is_some() { (0, view.width) } else { self.span(view, row) };
+            for start in (first..end).step_by(LANES) {
+                let (x, y) = view.lanes(row, start);
+                let mut near = false;
+                for lane in 0..LANES {
+                    near |= (x[lane] >= self.low[0])
+                        & (x[lane] <= self.high[0])
+                        & (y[lane] >= self.low[1])
+                        & (y[lane] <= self.high[1]);
+                }
+                if !near {
+                    continue;
+                }
+                let found = self.meet(&x, &y);
+                let count = LANES.min(end - start);
+                let seen = depth[start..start + count].iter_mut().zip(&mut limb[start..start + count]);
+                for ((depth, limb), found) in seen.zip(found) {
+                    // NaN: not met.
+                    if found > 0.0 && (*limb == NO_LIMB || (found as f32) < *depth) {
+                        (*depth, *limb) = (found as f32, index);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Depths at which rays meet the limb, NaN where they do not.
+    #[inline(always)]
+    fn meet(&self, x: &[f64; LANES], y: &[f64; LANES]) -> [f64; LANES] {
+        let exact = |lane: usize| self.meet_exactly(x[lane], y[lane]);
+        if !self.plain {
+            return std::array::from_fn(exact);
+        }
+        let (mut found, mut unsure) = ([f64::NAN; LANES], [false; LANES]);
+        for lane in 0..LANES {
+            (found[lane], unsure[lane]) = self.meet_plain(x[lane], y[lane]);
+        }
+        for lane in 0..LANES {
+            if unsure[lane] {
+                found[lane] = exact(lane);
+            }
+        }
+        found
+    }
+
+    /// Depth at which a ray meets a limb of nearly fixed aspect from outside, NaN where it does not; and whether that is
+    /// unsure. No branches: it runs on several rays at once.
+    #[inline(always)]
+    fn meet_plain(&self, x: f64, y: f64) -> (f64, bool) {
+        let select = |condition: bool, yes: f64, no: f64| if condition { yes } else { no };
+        let o = self.origin;
+        let d = self.axes[0] * x + self.axes[1] * y + self.axes[2];
+        let length = self.shape.length();
+        let (a0, b0) = (self.shape.a0(), self.shape.b0());
+        let (da, db) = ((self.shape.a1() - a0) / length, (self.shape.b1() - b0) / length);
+        let inside = |z: f64| select(z < 0.0, 0.0, select(z > length, length, z));
+        // Through the planes of the caps.
+        let (one, other) = (-o.z / d.z, (length - o.z) / d.z);
+        let (enter, leave) = (select(one < other, one, other), select(one < other, other, one));
+        let z = inside(o.z + enter * d.z);
+        let (u, v) = ((o.x + enter * d.x) / (a0 + da * z), (o.y + enter * d.y) / (b0 + db * z));
+        let through_cap = (enter > 0.0) & (u * u + v * v < 1.0);
+        // a(z) = a + slope u along the ray.
+        let (a, slope) = (a0 + da * o.z, da * d.z);
+        let mut z = 0.5 * length;
+        let mut root = 0.0;
+        let mut grazing = false;
+        for _ in 0..2 {
+            let aspect = (a0 + da * z) / (b0 + db * z);
+            let square = aspect * aspect;
+            let p = d.x * d.x + square * d.y * d.y - slope * slope;
+            let q = o.x * d.x + square * o.y * d.y - a * slope;
+            let r = o.x * o.x + square * o.y * o.y - a * a;
+            let discriminant = q * q - p * r;
+            let radius = a0 + da * z;
+            grazing = discriminant.abs() < GRAZING * p * radius * radius;
+            // Looking along the axis, a cone is no ellipse any more.
+            grazing |= p < 0.01 * slope * slope + 1e-4;
+            // A ray that misses comes nearest where the root's real part is.
+            root = (-q - select(discriminant > 0.0, discriminant, 0.0).sqrt()) / p;
+            root = select(discriminant >= 0.0, root, f64::NAN);
+            let nearest = -q / p;
+            z = inside(o.z + d.z * select(discriminant >= 0.0, root, nearest));
+        }
+        let mut step = 0.0;
+        for _ in 0..2 {
+            let (px, py, pz) = (o.x + root * d.x, o.y + root * d.y, o.z + root * d.z);
+            let (a, b) = (a0 + da * pz, b0 + db * pz);
+            let (xb, ya, ab) = (px * b, py * a, a * b);
+            let value = xb * xb + ya * ya - ab * ab;
+            let (a_rate, b_rate) = (da * d.z, db * d.z);
+            let rate = xb * (d.x * b + px * b_rate) + ya * (d.y * a + py * a_rate) - ab * (a_rate * b + a * b_rate);
+            step = 0.5 * value / rate;
+            root -= step;
+        }
+        let on_side = (root >= enter) & (root <= leave) & (root > 0.0);
+        let depth = select(on_side, root, f64::NAN);
+        let unsure = !through_cap & (grazing | (on_side & !(step.abs() < CONVERGED)) | (d.z.abs() < 1e-9));
+        (select(through_cap, enter, depth), unsure)
+    }
+}
