@@ -11,6 +11,7 @@ pub mod association;
 pub mod body;
 pub mod config;
 pub mod error;
+pub mod fit;
 pub mod hypotheses;
 pub mod ik;
 pub mod math;
@@ -20,6 +21,8 @@ pub mod shape;
 pub mod sizes;
 pub mod solver;
 pub mod terms;
+#[cfg(test)]
+mod testing;
 pub mod tracker;
 pub mod visibility;
 

@@ -5,11 +5,13 @@ mod fit;
 mod human;
 mod joint;
 pub mod kinematics;
+mod model;
 pub mod two_bone;
 
 pub use edit::Pair;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
+pub use model::Model;
 
 use crate::error::BodyError;
 use crate::math::{Pose, Vec3};

@@ -1,18 +1,17 @@
 //! Sizes of the body: what the first frame corrects and fits, and what those that follow refine.
 
-use crate::hypotheses::GAIN;
-use crate::tracker::Tracker;
 pub mod girth;
 
 use crate::association::contour::edges;
-use crate::body::two_bone::TwoBone;
-use crate::math::Vec3;
-use crate::observation::depth_view::DepthViews;
-use crate::observation::frame::Frame;
-use crate::solver::{Gate, Problem};
+use crate::body::{Model, Pair};
+use crate::config::Config;
+use crate::fit::{CONTOUR_FROM, Fit, Setting};
+use crate::hypotheses::{GAIN, overall_cost};
+use crate::math::{Pose, Vec3};
+use crate::solver::Gate;
 use girth::{Girth, GirthFit, girth_step};
 
-/// Gauss-Newton steps of the girth fit.
+/// Gauss-Newton steps of the girth fit: it settles in four or five.
 const GIRTH_STEPS: usize = 6;
 /// Points farther than this from the set pose say nothing about sizes, metres.
 const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
@@ -20,88 +19,89 @@ const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
 const LENGTH_STEP: f64 = 0.02;
 /// Nobody's arm is shorter than this share of the other one, nor a leg: one of them was set wrong.
 const UNLIKE_REACH: f64 = 0.88;
+/// A limb's tip in the first frame makes it shorter or longer by these factors at most.
+const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
+/// All frames together make a limb shorter or longer by these factors at most.
+const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
-impl Tracker {
+/// What is known of the sizes, and whether the next frame shall fit them.
+#[derive(Debug, Default)]
+pub struct Sizes {
+    open: bool,
+    /// What is known about the girths since the first frame fitted them; empty when they were given.
+    girths: Vec<Girth>,
+    /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
+    pairs: Vec<Pair>,
+    stretched: Vec<f64>,
+    change: Vec<f64>,
+}
+
+impl Sizes {
+    /// The pose was set: with `fit`, the next frame fits the sizes, and those that follow refine the lengths.
+    pub fn restart(&mut self, model: &Model, fit: bool, config: &Config) {
+        self.open = fit;
+        self.girths.clear();
+        self.pairs.clear();
+        if fit && config.fit_lengths {
+            self.follow_lengths(model);
+        }
+    }
+
+    /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
+    pub fn edited(&mut self, model: &Model) {
+        self.girths.clear();
+        if !self.pairs.is_empty() {
+            self.follow_lengths(model);
+        }
+    }
+
+    /// Starts to refine the limbs' lengths from those they have.
+    fn follow_lengths(&mut self, model: &Model) {
+        self.pairs = model.body.pairs();
+        self.stretched = vec![1.0; self.pairs.len()];
+    }
+
     /// Fits the sizes to the first frame after a reset, whose pose is known.
-    pub(crate) fn fit_sizes(&mut self, frame: &Frame) {
-        if self.config.fit_lengths {
-            self.equalise_limb_lengths(frame);
+    pub fn initialise(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
+        if !self.open {
+            return;
         }
-        if self.config.fit_girths {
-            self.fit_girths(frame);
+        self.open = false;
+        if setting.config.fit_lengths {
+            equalise_limb_lengths(setting, model, poses, fit);
         }
-    }
-
-    /// Where one arm or leg of the start is much longer than the other, gives one the lengths of the other if that explains the
-    /// first frame clearly better: a skeleton whose foot is under the floor, or ends at the shin.
-    fn equalise_limb_lengths(&mut self, frame: &Frame) {
-        for pair in self.body.pairs() {
-            let bones = |limb: &usize| self.chains.iter().find(|c| c.upper == *limb).map(|c| [c.upper, c.lower]);
-            let [one, other] = pair.iter().filter_map(bones).collect::<Vec<_>>()[..] else { continue };
-            let lengths = [one, other].map(|bones| bones.map(|limb| self.body.limbs()[limb].shape.length()));
-            let [first, second] = lengths.map(|lengths| lengths.iter().sum::<f64>());
-            if first.min(second) > UNLIKE_REACH * first.max(second) {
-                continue;
-            }
-            let given = (self.body.clone(), self.poses.clone());
-            let (mut least, mut best) = (self.cost_of_start(frame) - GAIN, given.clone());
-            for (bones, own, wanted) in [(other, lengths[1], lengths[0]), (one, lengths[0], lengths[1])] {
-                (self.body, self.poses) = given.clone();
-                for (limb, (own, wanted)) in bones.into_iter().zip(own.into_iter().zip(wanted)) {
-                    self.body.change_length(limb, wanted / own);
-                }
-                self.body.close_joints(&mut self.poses);
-                let cost = self.cost_of_start(frame);
-                if cost < least {
-                    (least, best) = (cost, (self.body.clone(), self.poses.clone()));
-                }
-            }
-            (self.body, self.poses) = best;
-            self.chains = TwoBone::of(&self.body);
+        if setting.config.fit_girths {
+            self.fit_girths(setting, model, poses, fit);
         }
     }
 
-    /// What the first frame has against the pose that was set, in unexplained patches.
-    fn cost_of_start(&mut self, frame: &Frame) -> f64 {
-        self.assign(&START_GATE);
-        self.match_points(&START_GATE, true, false);
-        self.overall_cost(frame).evidence
-    }
-
-    fn fit_girths(&mut self, frame: &Frame) {
-        self.girths = vec![Girth::default(); self.poses.len()];
-        let mut totals = vec![GirthFit::default(); self.poses.len()];
+    fn fit_girths(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
+        self.girths = vec![Girth::default(); poses.len()];
+        let mut totals = vec![GirthFit::default(); poses.len()];
         let mut seen = Vec::new();
         for _ in 0..GIRTH_STEPS {
             // The pose is known: what is closest is what was seen.
-            self.assign(&START_GATE);
-            self.match_points(&START_GATE, true, false);
+            fit.match_points(setting.of(model), poses, &START_GATE);
             for (limb, total) in totals.iter_mut().enumerate() {
-                let shape = self.body.limbs()[limb].shape;
-                let matches = &self.correspondences.limbs[limb];
+                let shape = model.body.limbs()[limb].shape;
                 seen.clear();
-                let views = DepthViews {
-                    frame,
-                    backgrounds: &self.backgrounds,
-                    segmented: &self.segmented,
-                    origin: self.origin,
-                };
-                for view in views.iter() {
-                    edges(&view, &self.body.limbs()[limb], &self.poses[limb], |edge| {
+                for view in setting.seen.views.iter() {
+                    edges(&view, &model.body.limbs()[limb], &poses[limb], |edge| {
                         // Beyond the rim, the edge may be another limb's.
-                        if edge.seen <= edge.rim || self.body.closest_limb(&self.poses, edge.place) == limb {
+                        if edge.seen <= edge.rim || model.body.closest_limb(poses, edge.place) == limb {
                             seen.push(edge);
                         }
                     });
                 }
                 if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
                     let longer = 1.0 + (tip.seen - tip.rim) / shape.length();
-                    self.body.change_tip(limb, longer.clamp(0.8, 1.25));
+                    model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
-                let Some(step) = girth_step(&shape, matches, &self.poses[limb], &seen, total) else { continue };
+                let matches = &fit.correspondences().limbs[limb];
+                let Some(step) = girth_step(&shape, matches, &poses[limb], &seen, total) else { continue };
                 let (sum, step) = total.then(&step);
-                if self.body.change_girth(limb, step.shift, step.axes()) {
-                    let pose = &mut self.poses[limb];
+                if model.body.change_girth(limb, step.shift, step.axes()) {
+                    let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;
                     *total = sum;
                 }
@@ -109,42 +109,112 @@ impl Tracker {
         }
     }
 
-    /// Draws the girths to what the outline of this frame shows of the sides of each limb.
-    pub(crate) fn refine_girths(&mut self) {
-        for (limb, girth) in self.girths.iter_mut().enumerate() {
-            if !self.judgement.relied_on(limb) {
-                continue;
-            }
-            let shape = self.body.limbs()[limb].shape;
-            if let Some(axes) = girth.follow(&shape, self.contour.sides(limb)) {
-                self.body.change_girth(limb, Vec3::ZERO, axes);
-            }
+    /// Draws the sizes to what a frame shows of the body at `poses`: lengths unless it is `lost`, and with `girths` those of the
+    /// limbs that are `relied_on`. Changed lengths leave the joints closed.
+    pub fn refine(
+        &mut self,
+        setting: Setting,
+        model: &mut Model,
+        poses: &mut [Pose],
+        predicted: &[Pose],
+        fit: &mut Fit,
+        reliance: Reliance<impl Fn(usize) -> bool>,
+    ) {
+        if !(self.pairs.is_empty() && self.girths.is_empty()) && setting.config.max_steps >= CONTOUR_FROM {
+            // Sizes follow the contour.
+            fit.match_contour(setting.of(model), poses);
+        }
+        if !self.pairs.is_empty() && !reliance.lost {
+            self.refine_lengths(setting, model, poses, predicted, fit);
+        }
+        if reliance.girths {
+            self.refine_girths(model, fit, reliance.limb);
         }
     }
 
-    /// Starts to refine the limbs' lengths from those they have.
-    pub(crate) fn follow_lengths(&mut self) {
-        self.pairs = self.body.pairs();
-        self.stretched = vec![1.0; self.pairs.len()];
-    }
-
-    /// Draws the limbs' lengths to what the frame asks for: those of a seated start are rough.
-    pub(crate) fn refine_lengths(&mut self, pace: f64) {
-        let Self { body, correspondences, predicted, config, solver, poses, pairs, stretched, change, .. } = self;
+    /// The lengths of a seated start are rough.
+    fn refine_lengths(
+        &mut self,
+        setting: Setting,
+        model: &mut Model,
+        poses: &mut [Pose],
+        predicted: &[Pose],
+        fit: &mut Fit,
+    ) {
+        let Self { pairs, stretched, change, .. } = self;
         change.clear();
         change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
-        let step = config.max_steps;
-        if !solver.lengths(&Problem { body, correspondences, predicted, step, pace, config }, poses, pairs, change) {
+        if !fit.lengths(setting.of(model), predicted, poses, pairs, change) {
             return;
         }
+        let [shortest, longest] = LENGTH_FACTORS;
         for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
-            let factor =
-                ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total).clamp(0.5 / *total, 2.0 / *total);
+            let factor = ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total)
+                .clamp(shortest / *total, longest / *total);
             *total *= factor;
             pair.iter().for_each(|limb| {
-                body.change_length(*limb, factor);
+                model.body.change_length(*limb, factor);
             });
         }
-        body.close_joints(poses);
+        model.body.close_joints(poses);
     }
+
+    /// Draws the girths to what the contour shows of the sides of each limb.
+    fn refine_girths(&mut self, model: &mut Model, fit: &Fit, relied_on: impl Fn(usize) -> bool) {
+        for (limb, girth) in self.girths.iter_mut().enumerate() {
+            if !relied_on(limb) {
+                continue;
+            }
+            let shape = model.body.limbs()[limb].shape;
+            if let Some(axes) = girth.follow(&shape, fit.contour().sides(limb)) {
+                model.body.change_girth(limb, Vec3::ZERO, axes);
+            }
+        }
+    }
+}
+
+/// What may be learnt from a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Reliance<F> {
+    /// The body was lost.
+    pub lost: bool,
+    /// Girths are followed.
+    pub girths: bool,
+    /// Whether the pose of a limb was known in the frame before.
+    pub limb: F,
+}
+
+/// Where one arm or leg of the start is much longer than the other, gives one the lengths of the other if that explains the first
+/// frame clearly better: a skeleton whose foot is under the floor, or ends at the shin.
+fn equalise_limb_lengths(setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
+    for pair in model.body.pairs() {
+        let bones = |limb: &usize| model.extremities.iter().find(|c| c.upper == *limb).map(|c| [c.upper, c.lower]);
+        let [one, other] = pair.iter().filter_map(bones).collect::<Vec<_>>()[..] else { continue };
+        let lengths = [one, other].map(|bones| bones.map(|limb| model.body.limbs()[limb].shape.length()));
+        let [first, second] = lengths.map(|lengths| lengths.iter().sum::<f64>());
+        if first.min(second) > UNLIKE_REACH * first.max(second) {
+            continue;
+        }
+        let start = (model.body.clone(), poses.clone());
+        let (mut least, mut best) = (start_cost(setting, model, poses, fit) - GAIN, start.clone());
+        for (bones, own, wanted) in [(other, lengths[1], lengths[0]), (one, lengths[0], lengths[1])] {
+            (model.body, *poses) = start.clone();
+            for (limb, (own, wanted)) in bones.into_iter().zip(own.into_iter().zip(wanted)) {
+                model.body.change_length(limb, wanted / own);
+            }
+            model.body.close_joints(poses);
+            let cost = start_cost(setting, model, poses, fit);
+            if cost < least {
+                (least, best) = (cost, (model.body.clone(), poses.clone()));
+            }
+        }
+        *poses = best.1;
+        model.adopt(best.0);
+    }
+}
+
+/// What the first frame has against the pose that was set, in unexplained patches.
+fn start_cost(setting: Setting, model: &Model, poses: &[Pose], fit: &mut Fit) -> f64 {
+    fit.match_points(setting.of(model), poses, &START_GATE);
+    overall_cost(setting.of(model), fit.matched(poses)).evidence
 }

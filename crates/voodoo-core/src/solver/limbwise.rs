@@ -1,6 +1,6 @@
 //! The published solver: weighted absolute orientation, each limb alone (K06 IV-B.7, K07 3.2).
 
-use super::{Gate, Problem, Solver, WarmStart};
+use super::{Gate, Problem, Reassociation, Schedule, Solver, WarmStart, WarmStartInput};
 use crate::association::correspondence::LimbMatches;
 use crate::config::Config;
 use crate::math::{Mat3, Moments, Pose, Vec3};
@@ -11,11 +11,11 @@ const STAY: f64 = 0.05;
 /// Each limb moves to the optimum of its own pairs; information crosses one joint a step through the bands.
 #[derive(Debug, Default)]
 pub struct Limbwise {
-    guide: WarmStart,
+    warm_start: WarmStart,
 }
 
-/// Rounds in which the chain follows the sites.
-const LEAD: usize = 3;
+/// Rounds in which the chain follows the sites: an arm is three joints long.
+const WARM_START_ROUNDS: usize = 3;
 
 impl Solver for Limbwise {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
@@ -44,32 +44,24 @@ impl Solver for Limbwise {
         }
     }
 
-    fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        if !self.guide.leads_all(problem) {
+    fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+        if !self.warm_start.drives_all(problem) {
             return false;
         }
-        self.guide.step(problem, poses);
-        problem.step + 1 < LEAD
+        self.warm_start.step(problem, poses);
+        problem.step + 1 < WARM_START_ROUNDS
     }
 
-    fn leads_with_points(&self) -> bool {
-        true
-    }
-
-    fn reads_bands(&self) -> bool {
-        true
-    }
-
-    fn gate(&self, config: &Config, _step: usize) -> Gate {
-        Gate { box_margin: config.limb_box_margin, distance: config.max_distance }
-    }
-
-    fn starts_from_prediction(&self) -> bool {
-        false
-    }
-
-    fn faces_cameras(&self) -> bool {
-        false
+    fn schedule(&self, config: &Config) -> Schedule {
+        let gate = Gate { box_margin: config.limb_box_margin, distance: config.max_distance };
+        Schedule {
+            gates: [gate; 2],
+            reassociation: Reassociation::EveryStep,
+            warm_start: WarmStartInput::SitesAndPoints,
+            bands: true,
+            visible_side: false,
+            whole_body: false,
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Named sites lead: before a solver that moves each limb alone sees a frame, the joint chain follows the sites.
+//! Warm start: named sites drive the body. Before a solver that moves each limb alone sees a frame, the joint chain follows the sites.
 //!
 //! A position of a hand says something about the whole arm, but a limb alone hears of it one joint a step (K06 IV-B.7). Here
 //! the sites with positions and rays move the chain as one, each joint by no more than its motion allows (R07, J10).
@@ -20,8 +20,8 @@ const LIMIT_SIGMA: f64 = 0.05;
 const DAMPING: f64 = 1e-3;
 /// Information of the heaviest site in surface points of weight one. Only the proportions of weights matter in this solver,
 /// and the limbs' own points have their say afterwards.
-const LED: f64 = 2.0;
-/// Scale of the kernel, metres: sites that are led come from far.
+const DRIVING_INFORMATION: f64 = 2.0;
+/// Scale of the kernel, metres: sites that drive come from far.
 const SCALE: f64 = 0.5;
 
 /// Damped Gauss-Newton steps on the sites, and the points where they are matched before.
@@ -35,8 +35,8 @@ pub struct WarmStart {
     closed: Vec<Pose>,
     before: Vec<Pose>,
     moved: Vec<Pose>,
-    /// The limbs that are led.
-    led: Vec<bool>,
+    /// The limbs that are driven.
+    driven: Vec<bool>,
     /// With points: the limbs that follow theirs, and what holds the others.
     following: Vec<bool>,
     held: NormalEquations,
@@ -44,31 +44,31 @@ pub struct WarmStart {
 
 impl WarmStart {
     /// Lets all limbs move, against their points; false without sites.
-    pub fn leads_all(&mut self, problem: &Problem) -> bool {
+    pub fn drives_all(&mut self, problem: &Problem) -> bool {
         let count = problem.body.limbs().len();
-        self.led.clear();
-        self.led.resize(count, true);
+        self.driven.clear();
+        self.driven.resize(count, true);
         self.following.clear();
         self.following.resize(count, false);
         for pair in problem.correspondences.sites.iter().filter(|pair| pair.given > 0.0) {
             self.following[pair.limb] = true;
-            lead_from(problem.body, pair.limb, &mut self.following);
+            drive_from(problem.body, pair.limb, &mut self.following);
         }
         self.following.contains(&true)
     }
 
     /// Whether sites farther than `from` metres from where they were seen lead their limbs alone in this frame.
-    pub fn leads(&mut self, problem: &Problem, from: f64) -> bool {
+    pub fn drives_far(&mut self, problem: &Problem, from: f64) -> bool {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
             self.following.clear();
-            self.led.clear();
-            self.led.resize(problem.body.limbs().len(), false);
+            self.driven.clear();
+            self.driven.resize(problem.body.limbs().len(), false);
             for pair in problem.correspondences.sites.iter().filter(far) {
-                lead_from(problem.body, pair.limb, &mut self.led);
+                drive_from(problem.body, pair.limb, &mut self.driven);
             }
         }
-        self.led.contains(&true)
+        self.driven.contains(&true)
     }
 
     /// One step: the limbs move as those of a body with closed joints would; gaps that the bands left stay as they are.
@@ -80,17 +80,18 @@ impl WarmStart {
             close(body, &mut self.start);
             self.closed.clone_from(&self.start);
         }
-        let pace = problem.pace * config.motion_scale;
+        let time_scale = problem.time_scale * config.motion_scale;
         self.joint_sigmas.clear();
-        self.joint_sigmas
-            .extend(body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * pace));
-        let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * pace);
+        self.joint_sigmas.extend(
+            body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * time_scale),
+        );
+        let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * time_scale);
         self.normal.clear(poses.len());
         // Beside points a site within its bias must not count as much as any other.
         let with_points = !self.following.is_empty();
         let weights = correspondences.sites.iter().map(|pair| if with_points { pair.given } else { pair.weight });
         let heaviest = weights.fold(f64::MIN_POSITIVE, f64::max);
-        let information = LED / (heaviest * config.point_sigma * config.point_sigma);
+        let information = DRIVING_INFORMATION / (heaviest * config.point_sigma * config.point_sigma);
         if with_points {
             self.add_points(problem, information);
         }
@@ -108,11 +109,11 @@ impl WarmStart {
         self.moved.clone_from(&self.closed);
         for (limb, part) in body.limbs().iter().enumerate() {
             self.closed[limb] = match &part.parent {
-                Some((parent, joint)) if self.led[limb] => {
+                Some((parent, joint)) if self.driven[limb] => {
                     let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
                     place(joint, &self.closed[*parent], turn)
                 }
-                None if self.led[limb] => self.moved[limb],
+                None if self.driven[limb] => self.moved[limb],
                 _ => self.before[limb],
             };
         }
@@ -148,11 +149,11 @@ fn close(body: &Body, poses: &mut [Pose]) {
 }
 
 /// Marks the limbs from `limb` to the first whose parent carries several.
-fn lead_from(body: &Body, limb: usize, led: &mut [bool]) {
+fn drive_from(body: &Body, limb: usize, driven: &mut [bool]) {
     let mut next = Some(limb);
     while let Some(limb) = next {
         let Some((parent, _)) = &body.limbs()[limb].parent else { break };
-        led[limb] = true;
+        driven[limb] = true;
         let carried = body.limbs().iter().filter(|other| other.parent.as_ref().is_some_and(|(limb, _)| limb == parent));
         next = (carried.count() == 1).then_some(*parent);
     }

@@ -1,7 +1,8 @@
 //! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
-use super::{ChainSolver, Gate, Problem, Solver, TreeSolver, WarmStart};
+use super::schedule::narrowed;
+use super::{ChainSolver, Gate, Problem, Reassociation, Schedule, Solver, TreeSolver, WarmStart, WarmStartInput};
 use crate::body::Pair;
 use crate::config::Config;
 use crate::math::Pose;
@@ -12,14 +13,10 @@ use crate::terms::{Contour, Limits, Penetration, Prior, Sites, Surface, Term};
 const LIMIT_SIGMA: f64 = 0.05;
 /// Standard deviation of an axis that lies in another limb, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
-/// Factor from step to step.
-const NARROWING: f64 = 0.7;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
 const ROUGH: f64 = 0.35;
 /// From this step on, what is left of a deviation from the prediction may be noise: before, the body has to find its points.
 const CALM_FROM: usize = 3;
-/// From this step on, only every second one assigns points and looks for edges.
-const RENEWED: usize = 2;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const SHOWN: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
@@ -27,16 +24,11 @@ const HIDDEN_MOTION: f64 = 0.1;
 const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
 const SITE_SCALE: f64 = 0.15;
-/// Sites farther than this from their measurement lead the chain before the points are assigned, metres; rounds of it.
-const LED_FROM: f64 = 0.25;
-const LEAD: usize = 4;
+/// Sites farther than this from their measurement drive the chain before the points are assigned, metres; rounds of it.
+const DRIVEN_FROM: f64 = 0.25;
+const WARM_START_ROUNDS: usize = 4;
 /// Relative damping of the normal matrix.
 const DAMPING: f64 = 1e-3;
-
-/// Gates and kernels narrow from step to step: far points pull while the pose is rough.
-fn narrowed(start: f64, end: f64, step: usize) -> f64 {
-    (start * NARROWING.powi(step.min(1000) as i32)).max(end)
-}
 
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
@@ -46,7 +38,7 @@ pub struct WholeBody {
     /// Moves the limbs instead of the chain, if there.
     tree: Option<TreeSolver>,
     lengths: Lengths,
-    guide: WarmStart,
+    warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
@@ -67,30 +59,25 @@ impl Solver for WholeBody {
         chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
     }
 
-    fn lead(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+    fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
         // From so far, points that are thought to lie on the limb where it was would hold it there.
-        if self.tree.is_some() || !self.guide.leads(problem, LED_FROM) {
+        if self.tree.is_some() || !self.warm_start.drives_far(problem, DRIVEN_FROM) {
             return false;
         }
-        self.guide.step(problem, poses);
-        problem.step + 1 < LEAD
+        self.warm_start.step(problem, poses);
+        problem.step + 1 < WARM_START_ROUNDS
     }
 
-    fn gate(&self, config: &Config, step: usize) -> Gate {
-        let distance = narrowed(config.gate_start, config.gate_end, step);
-        Gate { box_margin: distance, distance }
-    }
-
-    fn renews(&self, step: usize) -> bool {
-        step < RENEWED || (step - RENEWED).is_multiple_of(2)
-    }
-
-    fn starts_from_prediction(&self) -> bool {
-        true
-    }
-
-    fn faces_cameras(&self) -> bool {
-        true
+    fn schedule(&self, config: &Config) -> Schedule {
+        let gate = |distance: f64| Gate { box_margin: distance, distance };
+        Schedule {
+            gates: [gate(config.gate_start), gate(config.gate_end)],
+            reassociation: Reassociation::EverySecondStep,
+            warm_start: WarmStartInput::Sites,
+            bands: false,
+            visible_side: config.facing,
+            whole_body: true,
+        }
     }
 }
 
@@ -102,51 +89,69 @@ impl WholeBody {
 
     /// The normal equations at `poses`, with or without the sites that may always be off.
     fn sum_terms(&mut self, problem: &Problem, poses: &[Pose], biased: bool) {
+        self.weigh_sites(problem, poses.len(), biased);
+        self.expect_motion(problem);
         let Problem { body, correspondences, predicted, config, .. } = problem;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
-        // A site speaks for every joint between it and the root: what a hand is seen to do, its arm does.
+        let root = [config.root_turn_sigma, config.root_shift_sigma]
+            .map(|sigma| sigma * problem.time_scale * config.motion_scale);
+        let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
+        let surface = Surface { correspondences, information, slide: config.slide, scale };
+        let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
+        let contour = Contour { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale };
+        let calm = still_prior_gain(problem, information);
+        let prior = Prior { predicted, root, joints: &self.joint_sigmas, calm };
+        let limits = Limits { sigma: LIMIT_SIGMA };
+        let penetration = Penetration { sigma: OVERLAP_SIGMA };
+        // The objective: one more term is a file and a line here.
+        let terms: [Option<&dyn Term>; 6] = [
+            Some(&surface),
+            Some(&sites),
+            Some(&contour),
+            Some(&prior),
+            config.limits.then_some(&limits),
+            config.penetration.then_some(&penetration),
+        ];
+        self.normal.clear(poses.len());
+        for term in terms.into_iter().flatten() {
+            term.add(body, poses, &mut self.normal);
+        }
+    }
+
+    /// A site speaks for every joint between it and the root: what a hand is seen to do, its arm does.
+    fn weigh_sites(&mut self, problem: &Problem, limbs: usize, biased: bool) {
         self.sites.clear();
-        self.sites.resize(poses.len(), 0.0);
-        for pair in correspondences.sites.iter().filter(|pair| biased || pair.bias <= 0.0) {
+        self.sites.resize(limbs, 0.0);
+        for pair in problem.correspondences.sites.iter().filter(|pair| biased || pair.bias <= 0.0) {
             self.sites[pair.limb] += pair.weight;
         }
-        for (limb, part) in body.limbs().iter().enumerate().rev() {
+        for (limb, part) in problem.body.limbs().iter().enumerate().rev() {
             if let Some((parent, _)) = &part.parent {
                 self.sites[*parent] += self.sites[limb];
             }
         }
+    }
+
+    /// Standard deviation of every joint's motion.
+    fn expect_motion(&mut self, problem: &Problem) {
         self.joint_sigmas.clear();
-        for (limb, part) in body.limbs().iter().enumerate() {
+        for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
-            let measured = correspondences.limbs[limb].total_weight() + self.sites[limb];
+            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb];
             let shown = (measured / SHOWN).clamp(HIDDEN_MOTION, 1.0);
-            self.joint_sigmas.push(motion * shown * problem.pace * config.motion_scale);
-        }
-        let root =
-            [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * problem.pace * config.motion_scale);
-        // After the last step only lengths are asked for: a pose held tightly would let them bear every deviation.
-        let calm = (CALM_FROM..config.max_steps).contains(&problem.step);
-        // Points that lie closer to the body than they are trusted to are not at rest by chance: what they show is motion.
-        let scatter = if calm { correspondences.scatter(config.kernel_end).unwrap_or(0.0) } else { 0.0 };
-        let calm = config.calm * (scatter * information / (ROUGH * ROUGH)).min(1.0);
-        self.normal.clear(poses.len());
-        let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
-        let terms: [&dyn Term; 4] = [
-            &Surface { correspondences, information, slide: config.slide, scale },
-            &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased },
-            &Contour { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
-            &Prior { predicted, root, joints: &self.joint_sigmas, calm },
-        ];
-        for term in terms {
-            term.add(body, poses, &mut self.normal);
-        }
-        if config.limits {
-            Limits { sigma: LIMIT_SIGMA }.add(body, poses, &mut self.normal);
-        }
-        if config.penetration {
-            Penetration { sigma: OVERLAP_SIGMA }.add(body, poses, &mut self.normal);
+            self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
     }
+}
+
+/// How much tighter small deviations from the prediction are held, in this step.
+fn still_prior_gain(problem: &Problem, information: f64) -> f64 {
+    let Problem { correspondences, config, step, .. } = problem;
+    // After the last step only lengths are asked for: a pose held tightly would let them bear every deviation.
+    let holds = (CALM_FROM..config.max_steps).contains(step);
+    // Points that lie closer to the body than they are trusted to are not at rest by chance: what they show is motion.
+    let scatter = if holds { correspondences.scatter(config.kernel_end).unwrap_or(0.0) } else { 0.0 };
+    config.calm * (scatter * information / (ROUGH * ROUGH)).min(1.0)
 }

@@ -1,24 +1,23 @@
 //! Changes of the body between frames that keep the track (K06 IV: "changes in the model itself").
 
 use super::Tracker;
-use crate::body::{Body, Joint};
+use crate::body::Joint;
 use crate::error::BodyError;
 use crate::math::Vec3;
 use crate::shape::TaperedEllipticCylinder;
-use crate::tracker::estimate::LimbStatus;
 
 impl Tracker {
     /// Scales the whole body about its root.
     pub fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
-        let (body, given) = (self.body.scaled(factor)?, self.given.scaled(factor)?);
-        self.adopt(body, given);
+        self.model.scale(factor)?;
+        self.edited();
         Ok(())
     }
 
     /// Changes the dimensions of one limb.
     pub fn set_shape(&mut self, limb: &str, shape: TaperedEllipticCylinder) -> Result<(), BodyError> {
-        let (body, given) = (self.body.with_shape(limb, shape)?, self.given.with_shape(limb, shape)?);
-        self.adopt(body, given);
+        self.model.set_shape(limb, shape)?;
+        self.edited();
         Ok(())
     }
 
@@ -31,58 +30,46 @@ impl Tracker {
         joint: Joint,
         sites: Vec<(String, Vec3)>,
     ) -> Result<(), BodyError> {
-        let given = self.given.with_limb(name, parent, shape, joint.clone(), sites.clone())?;
-        let body = self.body.with_limb(name, parent, shape, joint, sites)?;
-        if self.started
-            && let Some((parent, joint)) = body.limbs().last().and_then(|limb| limb.parent.as_ref())
+        self.model.add_limb(name, parent, shape, &joint, &sites)?;
+        if self.is_started()
+            && let Some((parent, joint)) = self.model.body.limbs().last().and_then(|limb| limb.parent.as_ref())
         {
-            self.poses.push(self.poses[*parent] * joint.parent_from_limb_at_rest());
+            self.motion.poses.push(self.motion.poses[*parent] * joint.parent_from_limb_at_rest());
         }
-        self.adopt(body, given);
+        self.edited();
         Ok(())
     }
 
     /// Removes a limb with all that hangs on it.
     pub fn remove_limb(&mut self, name: &str) -> Result<(), BodyError> {
-        let (given, _) = self.given.without_limb(name)?;
-        let (body, kept) = self.body.without_limb(name)?;
-        if self.started {
-            self.poses = kept.iter().map(|index| self.poses[*index]).collect();
+        let kept = self.model.remove_limb(name)?;
+        if self.is_started() {
+            self.motion.poses = kept.iter().map(|index| self.motion.poses[*index]).collect();
         }
-        self.adopt(body, given);
+        self.edited();
         Ok(())
     }
 
-    /// Takes a changed body and closes its joints from the root outwards, orientations kept.
-    fn adopt(&mut self, body: Body, given: Body) {
-        self.body = body;
-        self.given = given;
+    /// Takes note of a changed body and closes its joints from the root outwards, orientations kept.
+    fn edited(&mut self) {
+        let Self { model, motion, fit, hypotheses, relocalizer, sizes, assessor, estimate, .. } = self;
         // The motion starts anew: the poses before belong to another body.
-        self.previous.clear();
-        self.interval = None;
-        self.prepare_hypotheses();
-        if !self.started {
+        motion.forget();
+        hypotheses.restart(model);
+        if motion.poses.is_empty() {
             return;
         }
-        for (index, limb) in self.body.limbs().iter().enumerate() {
+        for (index, limb) in model.body.limbs().iter().enumerate() {
             if let Some((parent, joint)) = &limb.parent {
-                let centre = self.poses[*parent] * joint.parent_from_joint.translation;
-                self.poses[index].translation = centre - self.poses[index].rotation * joint.limb_from_joint.translation;
+                let centre = motion.poses[*parent] * joint.parent_from_joint.translation;
+                let pose = &mut motion.poses[index];
+                pose.translation = centre - pose.rotation * joint.limb_from_joint.translation;
             }
         }
-        self.girths.clear();
-        self.correspondences.limbs.clear();
-        self.correspondences.sites.clear();
-        self.correspondences.edges.clear();
-        if !self.pairs.is_empty() {
-            self.follow_lengths();
-        }
-        self.prepare_search();
-        self.judgement.clear();
-        self.estimate.limb_status.clear();
-        self.estimate.limb_status.resize(self.poses.len(), LimbStatus::Inferred);
-        let status = self.estimate.status;
-        self.report(self.stamp.unwrap_or(f64::NAN), 0);
-        self.estimate.status = status;
+        fit.clear();
+        sizes.edited(model);
+        relocalizer.restart(model, &motion.poses);
+        assessor.edited(estimate.status);
+        self.report(self.motion.stamp.unwrap_or(f64::NAN), 0);
     }
 }

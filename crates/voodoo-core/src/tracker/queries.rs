@@ -1,15 +1,38 @@
-//! Distances of places in the world from the limbs of the posed body.
+//! What can be asked of a tracker between frames: body, configuration, last estimate, distances of places from the posed body.
 
 use super::Tracker;
+use super::estimate::Estimate;
+use crate::body::Body;
+use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::Points;
 use crate::observation::frame::PointSlice;
 use crate::shape::SurfaceBatch;
 
 impl Tracker {
+    /// The body in its current sizes.
+    pub fn body(&self) -> &Body {
+        &self.model.body
+    }
+
+    /// The parameters.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The last estimate.
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    /// A pose was set.
+    pub(super) fn is_started(&self) -> bool {
+        !self.motion.poses.is_empty()
+    }
+
     /// Signed distances of world points to the surface of every limb, metres, negative inside: limb by limb, a point each.
     pub fn limb_distances(&self, points: PointSlice) -> Result<Vec<Vec<f32>>, TrackError> {
-        if !self.started {
+        if !self.is_started() {
             return Err(TrackError::NotInitialised);
         }
         let mut queries = Points::default();
@@ -22,10 +45,10 @@ impl Tracker {
                     format!("{:?} in row {index}", point.to_array()),
                 ));
             }
-            queries.push((point - self.origin).to_array().map(|value| value as f32));
+            queries.push((point - self.motion.origin).to_array().map(|value| value as f32));
         }
         let mut surface = SurfaceBatch::default();
-        let limbs = self.body.limbs().iter().zip(&self.poses);
+        let limbs = self.model.body.limbs().iter().zip(&self.motion.poses);
         Ok(limbs
             .map(|(limb, pose)| {
                 limb.shape.closest_points(pose, &queries, &mut surface);

@@ -1,17 +1,24 @@
 //! Filling the estimate from the tracker's state, without allocating once it is warm.
 
-use super::Tracker;
-use crate::math::shifted;
-use crate::tracker::estimate::SourceReport;
+use super::estimate::{Estimate, SourceReport};
+use crate::association::correspondence::Correspondences;
+use crate::body::Body;
+use crate::fit::Motion;
+use crate::observation::candidates::Candidates;
 
-impl Tracker {
-    pub(crate) fn report(&mut self, stamp: f64, steps: usize) {
-        let Self { body, poses, origin, correspondences, candidates, estimate, .. } = self;
-        estimate.stamp = stamp;
-        estimate.steps = steps;
+impl Estimate {
+    /// Fills in everything but stamp, steps and status.
+    pub(super) fn fill(
+        &mut self,
+        body: &Body,
+        motion: &Motion,
+        correspondences: &Correspondences,
+        candidates: &Candidates,
+    ) {
+        let (estimate, poses) = (self, &motion.poses);
         estimate.mean_squared_distance = correspondences.mean_squared_distance().unwrap_or(f64::NAN);
         estimate.world_from_limb.clear();
-        estimate.world_from_limb.extend(poses.iter().map(|pose| shifted(pose, -*origin)));
+        estimate.world_from_limb.extend(motion.world_from_limb());
         estimate.sites.clear();
         estimate.sites.extend((0..body.sites().len()).map(|site| body.site_position(&estimate.world_from_limb, site)));
         estimate.limb_points.clear();

@@ -1,34 +1,36 @@
 //! What is not the body: the still scene, learnt around it.
 
+use super::background::Backgrounds;
+use super::candidates::image_window;
+use super::frame::{DepthImage, Frame};
+use super::observer::Expectation;
 use crate::math::{Aabb, Points, shifted};
-use crate::observation::candidates::image_window;
-use crate::observation::frame::{DepthImage, Frame};
 use crate::shape::SurfaceBatch;
-use crate::tracker::Tracker;
 
-/// In the first frame, what lies within this of the body may be the body, metres.
+/// In the first frame, what lies within this of the body may be the body, metres: poses that are set are that far off.
 const BODY_REACH: f32 = 0.15;
 
-impl Tracker {
+impl Backgrounds {
     /// In the first frame after a reset the pose is known, and all that is not near the body is scene. While the body is lost,
     /// nothing of the image is its.
-    pub(crate) fn learn_background(&mut self, frame: &Frame, bounds: &Aabb) {
-        let searching = if self.config.recovery { self.searching() } else { None };
-        let Self { backgrounds, body, poses, origin, .. } = self;
-        if self.stamp.is_some() {
-            let window = |image: &DepthImage| match searching {
-                Some(_) => (0..0, 0..0),
-                None => image_window(image, &shifted(&image.world_from_sensor, *origin), bounds),
-            };
-            if searching == Some(0) {
-                backgrounds.fill();
-            }
-            backgrounds.update(frame, window);
+    pub(super) fn learn_around(&mut self, frame: &Frame, expected: Expectation, bounds: &Aabb) {
+        if expected.first {
+            self.learn_first(frame, expected, bounds);
             return;
         }
+        if expected.searched == Some(0) {
+            self.fill();
+        }
+        self.update(frame, |image: &DepthImage| match expected.searched {
+            Some(_) => (0..0, 0..0),
+            None => image_window(image, &shifted(&image.world_from_sensor, expected.origin), bounds),
+        });
+    }
+
+    fn learn_first(&mut self, frame: &Frame, expected: Expectation, bounds: &Aabb) {
         let (mut queries, mut pixels, mut surface) = (Points::default(), Vec::new(), SurfaceBatch::default());
-        backgrounds.start(frame, |image, depth| {
-            let working_from_sensor = shifted(&image.world_from_sensor, *origin);
+        self.start(frame, |image, depth| {
+            let working_from_sensor = shifted(&image.world_from_sensor, expected.origin);
             queries.clear();
             pixels.clear();
             for (index, z) in depth.iter().enumerate().filter(|(_, z)| **z > 0.0) {
@@ -38,7 +40,7 @@ impl Tracker {
                     pixels.push(index);
                 }
             }
-            for (limb, pose) in body.limbs().iter().zip(poses.iter()) {
+            for (limb, pose) in expected.body.limbs().iter().zip(expected.poses) {
                 limb.shape.closest_points(pose, &queries, &mut surface);
                 for (pixel, distance) in pixels.iter().zip(&surface.signed_distance) {
                     if *distance < BODY_REACH {

@@ -1,0 +1,123 @@
+//! What is tracked: the body in its current sizes, the sizes it was given in, and its arms and legs.
+
+use super::two_bone::TwoBone;
+use super::{Body, Joint};
+use crate::error::{BodyError, TrackError};
+use crate::math::{Pose, Vec3};
+use crate::shape::TaperedEllipticCylinder;
+
+/// The tracked body. It changes when sizes are fitted and when limbs are edited, never with the pose.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The body in its current sizes.
+    pub body: Body,
+    /// The body in the sizes it was given in: every start is fitted from these.
+    pub reference_body: Body,
+    /// Arms and legs, with the lengths they had at the last start or edit.
+    pub extremities: Vec<TwoBone>,
+}
+
+impl Model {
+    /// The model of `body`.
+    pub fn new(body: Body) -> Self {
+        Self { reference_body: body.clone(), extremities: TwoBone::of(&body), body }
+    }
+
+    /// Takes the body in other sizes, or with other limbs.
+    pub fn adopt(&mut self, body: Body) {
+        self.extremities = TwoBone::of(&body);
+        self.body = body;
+    }
+
+    /// Sizes and world poses that put named sites (index, world position) where they are; see [`Body::fit`].
+    pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Body, Vec<Pose>), TrackError> {
+        if let Some((site, _)) = positions.iter().find(|(site, _)| *site >= self.body.sites().len()) {
+            return Err(TrackError::measurement("joints", "the index of a site", site.to_string()));
+        }
+        let start = if fit_sizes { &self.reference_body } else { &self.body };
+        start.fit(positions, fit_sizes)
+    }
+
+    /// Scales the whole body.
+    pub fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
+        self.edit(|body| body.scaled(factor))
+    }
+
+    /// Changes the dimensions of one limb.
+    pub fn set_shape(&mut self, limb: &str, shape: TaperedEllipticCylinder) -> Result<(), BodyError> {
+        self.edit(|body| body.with_shape(limb, shape))
+    }
+
+    /// Adds a limb to `parent`.
+    pub fn add_limb(
+        &mut self,
+        name: &str,
+        parent: &str,
+        shape: TaperedEllipticCylinder,
+        joint: &Joint,
+        sites: &[(String, Vec3)],
+    ) -> Result<(), BodyError> {
+        self.edit(|body| body.with_limb(name, parent, shape, joint.clone(), sites.to_vec()))
+    }
+
+    /// Removes a limb with all that hangs on it; returns the indices of those that stay.
+    pub fn remove_limb(&mut self, name: &str) -> Result<Vec<usize>, BodyError> {
+        let (_, kept) = self.body.without_limb(name)?;
+        self.edit(|body| body.without_limb(name).map(|(body, _)| body))?;
+        Ok(kept)
+    }
+
+    /// The same change in both sizes; on error neither changes.
+    fn edit(&mut self, change: impl Fn(&Body) -> Result<Body, BodyError>) -> Result<(), BodyError> {
+        let (body, reference_body) = (change(&self.body)?, change(&self.reference_body)?);
+        self.reference_body = reference_body;
+        self.adopt(body);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+
+    fn human() -> Model {
+        Model::new(Body::human(1.75, HumanModel::Full).unwrap())
+    }
+
+    #[test]
+    fn an_edit_that_is_refused_changes_nothing() {
+        let mut model = human();
+        let before = model.clone();
+        assert!(model.scale(f64::NAN).is_err() && model.remove_limb("tail").is_err());
+        assert_eq!((model.body, model.reference_body), (before.body, before.reference_body));
+    }
+
+    #[test]
+    fn a_removed_arm_is_no_extremity_any_more() {
+        let mut model = human();
+        let (limbs, arms) = (model.body.limbs().len(), model.extremities.len());
+        let upper = model.extremities[0].upper;
+        let name = model.body.limbs()[upper].name.clone();
+        let kept = model.remove_limb(&name).unwrap();
+        assert_eq!(model.extremities.len(), arms - 1);
+        assert_eq!(kept.len(), model.body.limbs().len());
+        assert!(kept.len() < limbs && !kept.contains(&upper));
+        assert_eq!(model.reference_body.limbs().len(), kept.len());
+    }
+
+    #[test]
+    fn a_start_is_fitted_from_the_given_sizes_not_from_those_of_the_start_before() {
+        let mut model = human();
+        let poses = model.body.rest_pose(Pose::identity());
+        let sites: Vec<(usize, Vec3)> =
+            (0..model.body.sites().len()).map(|site| (site, model.body.site_position(&poses, site))).collect();
+        let (first, _) = model.fit(&sites, true).unwrap();
+        let larger: Vec<(usize, Vec3)> = sites.iter().map(|(site, place)| (*site, *place * 1.2)).collect();
+        let (large, _) = model.fit(&larger, true).unwrap();
+        model.adopt(large);
+        let (again, _) = model.fit(&sites, true).unwrap();
+        assert_eq!(first, again);
+        assert!(model.fit(&[(10_000, Vec3::ZERO)], true).is_err());
+    }
+}

@@ -1,0 +1,55 @@
+//! What everything that looks for a pose in a frame may read.
+
+use crate::association::correspondence::Correspondences;
+use crate::body::Model;
+use crate::config::Config;
+use crate::math::Pose;
+use crate::observation::observer::Observation;
+
+/// One frame of one body. Cheap to copy.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    /// Parameters.
+    pub config: &'a Config,
+    /// What is tracked.
+    pub model: &'a Model,
+    /// What the frame shows of it.
+    pub seen: Observation<'a>,
+    /// Poses of the frame before, working frame; empty where nothing is known of the motion.
+    pub previous: &'a [Pose],
+    /// Seconds since the last frame, as multiples of 1/30 s.
+    pub time_scale: f64,
+}
+
+/// A frame before it is said what is tracked: for those who change the model meanwhile.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting<'a> {
+    /// As in [`Context`].
+    pub config: &'a Config,
+    /// As in [`Context`].
+    pub seen: Observation<'a>,
+    /// As in [`Context`].
+    pub previous: &'a [Pose],
+    /// As in [`Context`].
+    pub time_scale: f64,
+}
+
+impl<'a> Setting<'a> {
+    /// The frame of this model.
+    pub fn of<'b>(self, model: &'b Model) -> Context<'b>
+    where
+        'a: 'b,
+    {
+        let Self { config, seen, previous, time_scale } = self;
+        Context { config, model, seen, previous, time_scale }
+    }
+}
+
+/// Correspondences and the poses at which they were found.
+#[derive(Clone, Copy, Debug)]
+pub struct Matched<'a> {
+    /// The correspondences.
+    pub correspondences: &'a Correspondences,
+    /// The poses, working frame.
+    pub poses: &'a [Pose],
+}

@@ -1,0 +1,257 @@
+//! The loop of a frame: match, solve, until the mean squared distance settles (K06 III-B and IV-B.2 to 7).
+
+mod context;
+mod motion;
+
+pub use context::{Context, Matched, Setting};
+pub use motion::{Motion, predict};
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use crate::association::assignment::{Assignment, match_limb};
+use crate::association::contour::Contour;
+use crate::association::correspondence::{Correspondences, LimbMatches};
+use crate::association::visible_side::match_visible_side;
+use crate::body::Pair;
+use crate::config::Config;
+use crate::error::TrackError;
+use crate::math::Pose;
+use crate::solver::{Gate, Problem, Schedule, Solver, WarmStartInput, solver};
+
+/// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
+pub const CONTOUR_FROM: usize = 2;
+
+/// Finds the pose that fits a frame, from one that is near. Keeps what was matched last.
+#[derive(Debug)]
+pub struct Fit {
+    solver: Box<dyn Solver>,
+    assignment: Assignment,
+    correspondences: Correspondences,
+    contour: Contour,
+    band_weights: Vec<f64>,
+    threads: Option<ThreadPool>,
+}
+
+impl Fit {
+    /// The solver and the threads of a configuration.
+    pub fn new(config: &Config) -> Result<Self, TrackError> {
+        let threads = match config.threads {
+            1 => None,
+            count => Some(rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(|error| {
+                TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
+            })?),
+        };
+        Ok(Self {
+            solver: solver(config.solver),
+            assignment: Assignment::default(),
+            correspondences: Correspondences::default(),
+            contour: Contour::default(),
+            band_weights: Vec::new(),
+            threads,
+        })
+    }
+
+    /// What the solver wants of the loop.
+    pub fn schedule(&self, config: &Config) -> Schedule {
+        self.solver.schedule(config)
+    }
+
+    /// What was matched last.
+    pub fn correspondences(&self) -> &Correspondences {
+        &self.correspondences
+    }
+
+    /// What was matched last, and where.
+    pub fn matched<'a>(&'a self, poses: &'a [Pose]) -> Matched<'a> {
+        Matched { correspondences: &self.correspondences, poses }
+    }
+
+    /// Exchanges what was matched last: another pose can be tried in between.
+    pub fn exchange(&mut self, matched: &mut Correspondences) {
+        std::mem::swap(&mut self.correspondences, matched);
+    }
+
+    /// Forgets what was matched.
+    pub fn clear(&mut self) {
+        self.correspondences.limbs.clear();
+        self.correspondences.sites.clear();
+        self.correspondences.edges.clear();
+    }
+
+    /// Warm start, then steps 2 to 7 until they settle; the matches at the end are those of the found poses. Returns the
+    /// number of steps.
+    pub fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
+        self.warm_start(context, poses);
+        let schedule = self.schedule(context.config);
+        let mut steps = 0;
+        let mut before = f64::INFINITY;
+        while steps < context.config.max_steps {
+            if schedule.reassociates(steps) {
+                self.match_all(context, poses, steps);
+            } else {
+                self.match_again(context, poses, steps);
+            }
+            let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
+            self.solve(context, predicted, poses, steps);
+            steps += 1;
+            if (before - distance).abs() < context.config.min_change {
+                break;
+            }
+            before = distance;
+        }
+        self.match_last(context, poses);
+        steps
+    }
+
+    /// One ICP step (2 to 7) with all associations made anew.
+    pub fn step(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
+        self.match_all(context, poses, step);
+        self.solve(context, predicted, poses, step);
+    }
+
+    /// Steps 2 to 5 at `poses`: everything measured becomes a correspondence.
+    pub fn match_all(&mut self, context: Context, poses: &[Pose], step: usize) {
+        let gate = self.schedule(context.config).gate(step);
+        // 2 Assign points to limbs.
+        self.assign(context, poses, &gate);
+        if step >= CONTOUR_FROM {
+            self.find_contour(context, poses);
+        } else {
+            self.contour.clear();
+        }
+        self.match_assigned(context, poses, &gate, true);
+    }
+
+    /// The same after the last step, but for the contour: it moves nothing any more.
+    pub fn match_last(&mut self, context: Context, poses: &[Pose]) {
+        let gate = self.schedule(context.config).gate(context.config.max_steps);
+        self.assign(context, poses, &gate);
+        self.contour.clear();
+        self.match_assigned(context, poses, &gate, true);
+    }
+
+    /// Points alone, within `gate`, wherever on a limb they are closest: for poses that somebody set.
+    pub fn match_points(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
+        self.assign(context, poses, gate);
+        self.match_surface(context, poses, gate, true, false);
+    }
+
+    /// Looks for the edges of limbs in depth images, as pairs at `poses`.
+    pub fn match_contour(&mut self, context: Context, poses: &[Pose]) {
+        self.find_contour(context, poses);
+        self.contour.pairs(poses, &mut self.correspondences.edges);
+    }
+
+    /// The edges that were looked for last.
+    pub fn contour(&self) -> &Contour {
+        &self.contour
+    }
+
+    /// Relative changes of length, one a pair of limbs, that the matches ask for; see [`Solver::lengths`].
+    pub fn lengths(
+        &mut self,
+        context: Context,
+        predicted: &[Pose],
+        poses: &[Pose],
+        pairs: &[Pair],
+        change: &mut [f64],
+    ) -> bool {
+        let Self { solver, correspondences, .. } = self;
+        solver.lengths(&problem(context, correspondences, predicted, context.config.max_steps), poses, pairs, change)
+    }
+
+    /// Lets the solver follow the named sites before the frame's steps.
+    fn warm_start(&mut self, context: Context, poses: &mut [Pose]) {
+        let frame = context.seen.frame();
+        let named = !frame.positions.is_empty() || !frame.rays.is_empty();
+        let points = self.schedule(context.config).warm_start == WarmStartInput::SitesAndPoints;
+        let mut round = 0;
+        loop {
+            if named && points {
+                self.match_all(context, poses, 0);
+            } else {
+                self.match_sites(context, poses);
+            }
+            let Self { solver, correspondences, .. } = self;
+            if !solver.prepare(&problem(context, correspondences, context.previous, round), poses) {
+                break;
+            }
+            round += 1;
+        }
+    }
+
+    /// Steps 3 to 5: points stay with their limbs, contours with their edges.
+    fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
+        let gate = self.schedule(context.config).gate(step);
+        self.match_assigned(context, poses, &gate, false);
+    }
+
+    fn match_assigned(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool) {
+        // 3 Reduce the number of points, 4 find closest points.
+        self.match_surface(context, poses, gate, anew, self.schedule(context.config).visible_side);
+        // 4 Point-to-point relations, 5 closest points on rays.
+        self.match_sites(context, poses);
+        self.contour.pairs(poses, &mut self.correspondences.edges);
+    }
+
+    fn match_sites(&mut self, context: Context, poses: &[Pose]) {
+        let (frame, origin) = (context.seen.frame(), context.seen.origin());
+        self.correspondences.add_sites(&context.model.body, poses, frame, origin);
+    }
+
+    fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
+        let Context { config, model, seen, .. } = context;
+        self.assignment.assign(&model.body, poses, seen.candidates, config.overlap, gate.box_margin);
+    }
+
+    fn find_contour(&mut self, context: Context, poses: &[Pose]) {
+        if context.config.outline {
+            self.contour.find(&context.model.body, poses, context.seen.views.iter());
+        }
+    }
+
+    /// Closest points of the limbs' candidates; `anew` says whether those are others than the last time.
+    fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
+        let Context { config, model, seen: crate::observation::observer::Observation { candidates, .. }, .. } = context;
+        let Self { assignment, correspondences, threads, .. } = self;
+        let (assignment, limbs) = (&*assignment, model.body.limbs());
+        correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
+        let work = |(index, matches): (usize, &mut LimbMatches)| {
+            if anew {
+                assignment.sample_limb(index, candidates, config, matches);
+            }
+            match_limb(&limbs[index], &poses[index], gate.distance, matches);
+            if visible_side {
+                match_visible_side(&limbs[index].shape, &poses[index], candidates, gate.distance, matches);
+            }
+        };
+        match threads {
+            // Every limb is worked on by one thread in a fixed order: the result does not depend on their number.
+            Some(pool) => pool.install(|| correspondences.limbs.par_iter_mut().enumerate().for_each(work)),
+            None => correspondences.limbs.iter_mut().enumerate().for_each(work),
+        }
+    }
+
+    /// Steps 6 and 7: moves the body to what was matched.
+    fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
+        let bands = self.schedule(context.config).bands;
+        let Self { solver, correspondences, band_weights, .. } = self;
+        // 6 Elastic bands on both limbs.
+        if bands {
+            correspondences.add_bands(&context.model.body, poses, context.config.band_ratio, band_weights);
+        }
+        // 7 Fit the model.
+        solver.solve(&problem(context, correspondences, predicted, step), poses);
+    }
+}
+
+fn problem<'a>(
+    context: Context<'a>,
+    correspondences: &'a Correspondences,
+    predicted: &'a [Pose],
+    step: usize,
+) -> Problem<'a> {
+    let Context { config, model, time_scale, .. } = context;
+    Problem { body: &model.body, correspondences, predicted, step, time_scale, config }
+}

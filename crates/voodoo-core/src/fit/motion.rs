@@ -1,0 +1,184 @@
+//! Where the body is, was and is expected: constant-velocity prediction (R07 eq. 16, 17), damped, in a working frame that
+//! follows the body.
+
+use crate::body::Body;
+use crate::body::kinematics::{joint_turn, place};
+use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
+
+/// A motion is taken to go on for at most this many of its own intervals.
+const LONGEST_PREDICTION: f64 = 2.0;
+/// In the second frame after a reset the body's motion is not known yet: this many times as much of it is unexpected.
+const UNKNOWN_MOTION: f64 = 4.0;
+/// Motion priors are standard deviations for one frame of this rate, 1/s.
+const REFERENCE_RATE: f64 = 30.0;
+/// Shortest and longest interval that they are scaled to, in frames of that rate.
+const TIME_SCALES: [f64; 2] = [0.1, 10.0];
+
+/// The poses of the body over time. All in the working frame: world axes, origin near the body.
+#[derive(Debug, Default)]
+pub struct Motion {
+    /// Current poses, one a limb; none before the first reset.
+    pub poses: Vec<Pose>,
+    /// Poses of the frame before; none after a reset.
+    pub previous: Vec<Pose>,
+    /// Poses expected before the frame was seen.
+    pub predicted: Vec<Pose>,
+    /// The working frame's origin in the world.
+    pub origin: Vec3,
+    /// Time of the last frame, seconds; none after a reset.
+    pub stamp: Option<f64>,
+    /// Seconds between the last two frames; none until two have come.
+    interval: Option<f64>,
+}
+
+impl Motion {
+    /// Starts anew at these world poses.
+    pub fn restart(&mut self, world_from_limb: Vec<Pose>) {
+        self.poses = world_from_limb;
+        self.origin = Vec3::ZERO;
+        self.stamp = None;
+        self.forget();
+    }
+
+    /// Forgets how the body moves, not where it is.
+    pub fn forget(&mut self) {
+        self.previous.clear();
+        self.interval = None;
+    }
+
+    /// Moves the working frame to the body, so that single precision is enough for points.
+    fn follow(&mut self) {
+        let shift = self.poses[0].translation;
+        self.origin += shift;
+        for pose in self.poses.iter_mut().chain(&mut self.previous) {
+            *pose = shifted(pose, shift);
+        }
+    }
+
+    /// Goes on to the time of a new frame: the current poses become the previous ones, and with `start` the predicted ones the
+    /// current ones; `damping` is the share of the last motion that is expected to go on. Returns the time since the last
+    /// frame in units of 1/30 s, held to what a motion prior can say.
+    pub fn advance(&mut self, body: &Body, stamp: f64, damping: f64, start: bool) -> f64 {
+        self.follow();
+        let step = self.stamp.map(|last| stamp - last);
+        let ratio = match (step, self.interval) {
+            (Some(step), Some(interval)) => (step / interval).min(LONGEST_PREDICTION),
+            _ => 0.0,
+        };
+        if self.previous.len() != self.poses.len() {
+            self.previous.clone_from(&self.poses);
+        }
+        predict(body, &self.previous, &self.poses, ratio * damping, &mut self.predicted);
+        self.previous.clone_from(&self.poses);
+        if start {
+            self.poses.clone_from(&self.predicted);
+        }
+        // Unexpected motion of short intervals adds up like noise; over long ones nothing is known of the speed.
+        let [least, most] = TIME_SCALES;
+        let scale = step.map_or(1.0, |step| (step * REFERENCE_RATE).clamp(least, most));
+        let scale = scale.max(scale.sqrt());
+        match self.interval {
+            None if step.is_some() => scale * UNKNOWN_MOTION,
+            _ => scale,
+        }
+    }
+
+    /// The frame is done.
+    pub fn commit(&mut self, stamp: f64) {
+        self.interval = self.stamp.map(|last| stamp - last);
+        self.stamp = Some(stamp);
+    }
+
+    /// Current poses in the world.
+    pub fn world_from_limb(&self) -> impl Iterator<Item = Pose> + '_ {
+        self.poses.iter().map(|pose| shifted(pose, -self.origin))
+    }
+}
+
+/// Poses expected after `current` when `previous` came before it, into `predicted`; `factor` scales the motion.
+pub fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predicted: &mut Vec<Pose>) {
+    predicted.clear();
+    for (index, limb) in body.limbs().iter().enumerate() {
+        let pose = match &limb.parent {
+            None => {
+                let (before, now) = (&previous[0], &current[0]);
+                let rotation = go_on(before.rotation, now.rotation, factor);
+                Pose::from_parts(now.translation + factor * (now.translation - before.translation), rotation)
+            }
+            Some((parent, joint)) => {
+                let before = joint_turn(joint, &previous[*parent], &previous[index]);
+                let now = joint_turn(joint, &current[*parent], &current[index]);
+                place(joint, &predicted[*parent], go_on(before, now, factor))
+            }
+        };
+        predicted.push(Pose::from_parts(pose.translation, pose.rotation.normalize()));
+    }
+}
+
+fn go_on(before: Quat, now: Quat, factor: f64) -> Quat {
+    let motion = (now * before.inverse()).to_scaled_axis_shortest();
+    Quat::from_scaled_axis(factor * motion) * now
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+
+    const STEP: Vec3 = Vec3::new(0.03, -0.01, 0.02);
+
+    fn walking() -> (Body, Motion) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let mut motion = Motion::default();
+        motion.restart(body.rest_pose(Pose::from_parts(Vec3::new(400.0, -70.0, 1.0), Quat::IDENTITY)));
+        for frame in 0..3 {
+            motion.advance(&body, f64::from(frame) / 30.0, 1.0, false);
+            motion.poses.iter_mut().for_each(|pose| pose.translation += STEP);
+            motion.commit(f64::from(frame) / 30.0);
+        }
+        (body, motion)
+    }
+
+    #[test]
+    fn a_steady_motion_is_expected_to_go_on_as_far_as_it_is_damped() {
+        for damping in [0.0, 0.6, 1.0] {
+            let (body, mut motion) = walking();
+            let before: Vec<Pose> = motion.world_from_limb().collect();
+            motion.advance(&body, 3.0 / 30.0, damping, true);
+            for (pose, before) in motion.world_from_limb().zip(before) {
+                assert!((pose.translation - before.translation - damping * STEP).length() < 1e-9);
+                assert!(pose.rotation.angle_between(before.rotation) < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_long_gap_is_bridged_by_two_intervals_at_most() {
+        let (body, mut motion) = walking();
+        let before = motion.world_from_limb().next().unwrap();
+        let scale = motion.advance(&body, 5.0, 1.0, true);
+        let moved = motion.world_from_limb().next().unwrap().translation - before.translation;
+        assert!((moved - LONGEST_PREDICTION * STEP).length() < 1e-9);
+        assert_eq!(scale, TIME_SCALES[1]);
+    }
+
+    #[test]
+    fn the_working_frame_follows_the_body() {
+        let (body, mut motion) = walking();
+        motion.advance(&body, 0.1, 0.0, true);
+        assert!(motion.poses[0].translation.length() < 1e-12 && motion.origin.x > 400.0);
+    }
+
+    #[test]
+    fn after_a_reset_nothing_is_expected_and_then_much_is_allowed() {
+        let (body, mut motion) = walking();
+        let poses: Vec<Pose> = motion.world_from_limb().collect();
+        motion.restart(poses.clone());
+        assert_eq!(motion.advance(&body, 9.0, 1.0, true), 1.0);
+        motion.commit(9.0);
+        assert_eq!(motion.advance(&body, 9.0 + 1.0 / 30.0, 1.0, true), UNKNOWN_MOTION);
+        for (pose, expected) in motion.world_from_limb().zip(&poses) {
+            assert!((pose.translation - expected.translation).length() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! Where the arm or leg was a frame ago, carried along by its parent.
+
+use super::{Basis, Pool, Propose};
+use crate::body::Body;
+use crate::body::two_bone::TwoBone;
+use crate::hypotheses::history::History;
+use crate::hypotheses::rough::{Extremity, RoughSearch};
+use crate::math::Pose;
+
+/// Its joints as in the frame before.
+#[derive(Debug)]
+pub(in crate::hypotheses) struct CarriedByParent;
+
+impl Propose for CarriedByParent {
+    fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
+        let previous = at.context.previous;
+        if previous.len() != at.matched.poses.len() {
+            return;
+        }
+        let body = &at.context.model.body;
+        let carry = |poses: &mut [Pose]| move_with_parent(at.chain(), body, previous, poses);
+        let least = rough.changed(at, carry, pool.least, &mut pool.points.poses);
+        if least < pool.least {
+            pool.least = least;
+            pool.points.set(Basis::Points);
+        }
+    }
+}
+
+/// The relative pose that the arm or leg had `then`, on its parent of `now`.
+fn move_with_parent(chain: &TwoBone, body: &Body, then: &[Pose], now: &mut [Pose]) {
+    for limb in chain.limbs() {
+        if let Some((parent, _)) = &body.limbs()[limb].parent {
+            now[limb] = now[*parent] * then[*parent].inverse() * then[limb];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::math::{Quat, Vec3};
+
+    #[test]
+    fn an_arm_moves_with_its_parent_and_nothing_else_does() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let then = body.rest_pose(Pose::identity());
+        let motion = Pose::from_parts(Vec3::new(0.3, -0.2, 0.1), Quat::from_rotation_z(0.4));
+        for chain in TwoBone::of(&body) {
+            let mut now: Vec<Pose> = then.iter().map(|pose| motion * *pose).collect();
+            let wanted = now.clone();
+            // The arm itself went elsewhere.
+            chain.limbs().for_each(|limb| now[limb] = Pose::identity());
+            move_with_parent(&chain, &body, &then, &mut now);
+            for (found, wanted) in now.iter().zip(&wanted) {
+                assert!((found.translation - wanted.translation).length() < 1e-12);
+                assert!(found.rotation.angle_between(wanted.rotation) < 1e-6);
+            }
+        }
+    }
+}

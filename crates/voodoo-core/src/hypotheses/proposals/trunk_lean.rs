@@ -1,0 +1,290 @@
+//! A body that sits down, squats or stands up: the trunk leans about its shoulders while the feet stay where they were when all
+//! was well. A body that sinks pushes both legs out of place, and each alone is held by the other and by the trunk.
+
+use std::f64::consts::TAU;
+
+use super::{Basis, Pool, Propose, SWIVELS};
+use crate::body::Model;
+use crate::body::two_bone::TwoBone;
+use crate::fit::{Context, Matched};
+use crate::hypotheses::history::History;
+use crate::hypotheses::rough::{Extremity, RoughSearch};
+use crate::hypotheses::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
+use crate::math::{Pose, Quat, Vec3, WeightedPoints};
+use crate::visibility::evidence::limb_visibility;
+
+/// Leans that are tried after none, radians: coarser or finer ones were no better.
+const LEANS: [f64; 4] = [-0.2, 0.2, -0.4, 0.4];
+
+/// What leans and what stands, and working memory.
+#[derive(Debug, Default)]
+pub(in crate::hypotheses) struct TrunkLean {
+    /// The two legs among the extremities, none of a body on one or four, and the two arms: without them nothing leans.
+    legs: Option<[usize; 2]>,
+    arms: Option<[usize; 2]>,
+    /// The limbs from the root to the arms.
+    trunk: Vec<usize>,
+    sample: WeightedPoints,
+    distances: Distances,
+    trial: Vec<Pose>,
+    /// The body as it is, with both feet in place; the best that leans.
+    upright: Vec<Pose>,
+    leant: Vec<Pose>,
+}
+
+/// Distances of the sample to the nearest limb of those that stay, of those and the leaning trunk, and of the legs tried there as
+/// well.
+#[derive(Debug, Default)]
+struct Distances {
+    staying: Vec<f32>,
+    leaning: Vec<f32>,
+    tried: Vec<f32>,
+    scratch: Vec<f32>,
+}
+
+/// How a body stands best with both feet in place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stance {
+    /// Its trunk as it is.
+    Upright,
+    /// Leaning.
+    Leant,
+}
+
+/// A leg and the place of its foot, working frame.
+type Standing<'a> = (&'a TwoBone, Vec3);
+
+impl TrunkLean {
+    /// Learns what leans and what stands of a body.
+    pub(in crate::hypotheses) fn prepare(&mut self, model: &Model) {
+        let Model { body, extremities, .. } = model;
+        let pair = |leg: bool| {
+            let mut found = (0..extremities.len()).filter(|index| extremities[*index].leg == leg);
+            match (found.next(), found.next(), found.next()) {
+                (Some(one), Some(two), None) => Some([one, two]),
+                _ => None,
+            }
+        };
+        (self.legs, self.arms) = (pair(true), pair(false));
+        self.trunk.clear();
+        for arm in self.arms.iter().flatten() {
+            let mut limb = extremities[*arm].upper;
+            while let Some((parent, _)) = &body.limbs()[limb].parent {
+                limb = *parent;
+                if !self.trunk.contains(&limb) {
+                    self.trunk.push(limb);
+                }
+            }
+        }
+        for poses in [&mut self.trial, &mut self.upright, &mut self.leant] {
+            poses.clear();
+            poses.reserve(body.limbs().len());
+        }
+    }
+
+    /// Room for a frame of so many candidates.
+    pub(in crate::hypotheses) fn make_room(&mut self, count: usize) {
+        self.sample.clear();
+        self.sample.reserve(count);
+        let Distances { staying, leaning, tried, scratch } = &mut self.distances;
+        for distances in [staying, leaning, tried, scratch] {
+            distances.clear();
+            distances.reserve(count.min(ROUGH_SAMPLE));
+        }
+    }
+
+    /// The stance that costs least, and its poses in `upright` or `leant`; none when a foot's place is not known.
+    fn best_stance(&mut self, context: Context, matched: Matched, history: &[History]) -> Option<Stance> {
+        let extremities = &context.model.extremities;
+        let [one, two] = self.legs?;
+        let (one_end, two_end) = (history[one].last_good_end?, history[two].last_good_end?);
+        let origin = context.seen.origin();
+        let legs = [(&extremities[one], one_end - origin), (&extremities[two], two_end - origin)];
+        let (shoulders, axis) = self.shoulders(context, matched);
+        let leans = if axis == Vec3::ZERO { &[] } else { LEANS.as_slice() };
+        self.explain_what_stays(context, matched, legs);
+        let (mut least, mut stance) = (f64::INFINITY, None);
+        for angle in [&0.0].into_iter().chain(leans) {
+            let mut cost = self.lean_trunk(context, matched, shoulders, Quat::from_axis_angle(axis, *angle));
+            for leg in legs {
+                cost += self.stand(context, matched, leg);
+            }
+            cost += rough_cost(&self.distances.leaning, &self.sample.weights);
+            if stance.is_none() {
+                (least, stance) = (cost, Some(Stance::Upright));
+                self.upright.clone_from(&self.trial);
+            } else if cost < least {
+                (least, stance) = (cost, Some(Stance::Leant));
+                self.leant.clone_from(&self.trial);
+            }
+        }
+        stance
+    }
+
+    /// The middle between the shoulders and the axis through them; zero without two arms.
+    fn shoulders(&self, context: Context, matched: Matched) -> (Vec3, Vec3) {
+        let model = context.model;
+        let roots = self.arms.map(|arms| arms.map(|arm| model.extremities[arm].root(&model.body, matched.poses)));
+        roots.map_or((Vec3::ZERO, Vec3::ZERO), |[first, second]| {
+            (0.5 * (first + second), (second - first).normalize_or_zero())
+        })
+    }
+
+    /// Draws the sample, and its distances to the limbs that neither lean nor stand.
+    fn explain_what_stays(&mut self, context: Context, matched: Matched, legs: [Standing; 2]) {
+        let candidates = context.seen.candidates;
+        self.make_room(candidates.len());
+        self.sample.assign(&candidates.points, &candidates.weight);
+        self.sample.subsample(ROUGH_SAMPLE);
+        let Self { sample, distances: Distances { staying, scratch, .. }, trunk, .. } = self;
+        staying.resize(sample.len(), f32::INFINITY);
+        let stands = |limb: usize| legs.iter().any(|(leg, _)| leg.limbs().any(|own| own == limb));
+        for limb in (0..matched.poses.len()).filter(|limb| !trunk.contains(limb) && !stands(*limb)) {
+            explain(&context.model.body, limb, matched.poses, &sample.points, staying, scratch);
+        }
+    }
+
+    /// Turns the trunk about the shoulders, into `trial`; what cameras have against it there.
+    fn lean_trunk(&mut self, context: Context, matched: Matched, shoulders: Vec3, turn: Quat) -> f64 {
+        let body = &context.model.body;
+        let Self { trunk, sample, distances: Distances { staying, leaning, scratch, .. }, trial, .. } = self;
+        trial.clear();
+        trial.extend_from_slice(matched.poses);
+        leaning.clone_from(staying);
+        let mut cost = 0.0;
+        for limb in trunk.iter().copied() {
+            let pose = &matched.poses[limb];
+            trial[limb] =
+                Pose::from_parts(shoulders + turn * (pose.translation - shoulders), (turn * pose.rotation).normalize());
+            explain(body, limb, trial, &sample.points, leaning, scratch);
+            cost += limb_visibility(context.seen.views, &body.limbs()[limb], &trial[limb]).cost();
+        }
+        cost
+    }
+
+    /// Puts a leg on its foot's place below the trunk of `trial`, with the bend that costs least; what speaks against it there.
+    fn stand(&mut self, context: Context, matched: Matched, (leg, end): Standing) -> f64 {
+        let body = &context.model.body;
+        let Self { sample, distances: Distances { leaning, tried, scratch, .. }, trial, .. } = self;
+        let seen =
+            |limb: usize, poses: &[Pose]| limb_visibility(context.seen.views, &body.limbs()[limb], &poses[limb]).cost();
+        let (mut bend, mut least, mut own) = (0.0, f64::INFINITY, 0.0);
+        for swivel in 0..SWIVELS {
+            let swivel = TAU * swivel as f64 / SWIVELS as f64;
+            leg.reach(body, trial, end, swivel);
+            tried.clone_from(leaning);
+            leg.limbs().for_each(|limb| explain(body, limb, trial, &sample.points, tried, scratch));
+            let against = leg.limbs().map(|limb| seen(limb, trial)).sum::<f64>() + strain(context, matched, leg, trial);
+            let cost = rough_cost(tried, &sample.weights) + against;
+            if cost < least {
+                (bend, least, own) = (swivel, cost, against);
+            }
+        }
+        leg.reach(body, trial, end, bend);
+        leg.limbs().for_each(|limb| explain(body, limb, trial, &sample.points, leaning, scratch));
+        own
+    }
+}
+
+impl Propose for TrunkLean {
+    fn propose(&mut self, at: Extremity, history: &[History], _rough: &mut RoughSearch, pool: &mut Pool) {
+        if !at.chain().leg {
+            return;
+        }
+        match self.best_stance(at.context, at.matched, history) {
+            Some(Stance::Leant) => {
+                pool.lean.poses.clone_from(&self.leant);
+                pool.lean.set(Basis::Lean);
+            }
+            Some(Stance::Upright) => {
+                // Both feet, when both legs are in doubt.
+                let extremities = at.context.model.extremities.iter().zip(history);
+                if extremities.into_iter().all(|(chain, own)| !chain.leg || !own.persistence.is_clear()) {
+                    pool.both_feet.poses.clone_from(&self.upright);
+                    pool.both_feet.set(Basis::Rest);
+                }
+            }
+            None => {}
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::association::correspondence::Correspondences;
+    use crate::body::{Body, HumanModel};
+    use crate::config::Config;
+    use crate::testing::{depth, turned, with_context};
+
+    /// A person upright in a camera's frame whose trunk and head are bent forward by `bow`, with thighs and calves at these
+    /// angles from the vertical, the middle of the feet at the same place for all.
+    fn bent(body: &Body, bow: f64, thigh: f64, calf: f64) -> Vec<Pose> {
+        let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+        let rest = body.rest_pose(Pose::from_parts(Vec3::ZERO, upright * Quat::from_axis_angle(Vec3::Z, -1.571)));
+        let mut poses: Vec<Pose> = Vec::new();
+        for (limb, rest) in body.limbs().iter().zip(&rest) {
+            let angle = match limb.name.as_str() {
+                name if name.ends_with("thigh") => -thigh,
+                name if name.ends_with("calf") => calf,
+                name if name.ends_with("foot") => 0.0,
+                _ => bow,
+            };
+            let rotation = Quat::from_axis_angle(Vec3::X, angle) * rest.rotation;
+            let at = limb.parent.as_ref().map_or(Vec3::ZERO, |(parent, joint)| {
+                poses[*parent] * joint.parent_from_joint.translation - rotation * joint.limb_from_joint.translation
+            });
+            poses.push(Pose::from_parts(at, rotation));
+        }
+        let feet: Vec<Vec3> = TwoBone::of(body).iter().filter(|leg| leg.leg).map(|leg| leg.end(&poses)).collect();
+        let shift = Vec3::new(0.0, 0.9, 2.6) - 0.5 * (feet[0] + feet[1]);
+        poses.iter().map(|pose| Pose::from_parts(pose.translation + shift, pose.rotation)).collect()
+    }
+
+    /// Largest distance of a hip or knee from where it is in `truth`.
+    fn off(legs: &[&TwoBone], body: &Body, poses: &[Pose], truth: &[Pose]) -> f64 {
+        let places = |leg: &TwoBone, poses: &[Pose]| [leg.root(body, poses), poses[leg.lower].translation];
+        let distances = legs.iter().flat_map(|leg| {
+            let (is, was) = (places(leg, poses), places(leg, truth));
+            [is[0].distance(was[0]), is[1].distance(was[1])]
+        });
+        distances.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_body_that_sits_down_leans_until_its_feet_stand() {
+        let model = Model::new(Body::human(1.75, HumanModel::Full).unwrap());
+        let (body, config) = (&model.body, Config::default());
+        let truth = bent(body, 0.5, 1.1, 0.15);
+        let pixels = depth(body, &truth);
+        // The trunk has not bent, and straight legs hang on it: hips and feet are off.
+        let arms: Vec<Vec3> =
+            model.extremities.iter().filter(|arm| !arm.leg).map(|arm| arm.root(body, &truth)).collect();
+        let wrong = turned(&truth, 0.5 * (arms[0] + arms[1]), (arms[1] - arms[0]).normalize(), 0.35);
+        let ends = |poses: &[Pose]| -> Vec<History> {
+            let end = |chain: &TwoBone| History { last_good_end: Some(chain.end(poses)), ..History::default() };
+            model.extremities.iter().map(end).collect()
+        };
+        let mut lean = TrunkLean::default();
+        lean.prepare(&model);
+        let mut stance = |poses: &[Pose], history: &[History]| {
+            with_context(&pixels, &config, &model, poses, |context| {
+                let correspondences = Correspondences::default();
+                let matched = Matched { correspondences: &correspondences, poses };
+                (lean.best_stance(context, matched, history), lean.leant.clone())
+            })
+        };
+        let (found, leant) = stance(&wrong, &ends(&truth));
+        assert_eq!(found, Some(Stance::Leant));
+        let legs: Vec<&TwoBone> = model.extremities.iter().filter(|chain| chain.leg).collect();
+        let (before, after) = (off(&legs, body, &wrong, &truth), off(&legs, body, &leant, &truth));
+        assert!(before > 0.12 && after < 0.07, "{before} {after}");
+        for leg in legs {
+            assert!(leg.end(&leant).distance(leg.end(&truth)) < 0.02);
+        }
+        // Where all is right nothing leans, and without a foot's place nothing is said.
+        assert_eq!(stance(&truth, &ends(&truth)).0, Some(Stance::Upright));
+        assert_eq!(stance(&truth, &vec![History::default(); model.extremities.len()]).0, None);
+    }
+}

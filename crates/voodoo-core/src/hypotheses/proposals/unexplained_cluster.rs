@@ -1,0 +1,102 @@
+//! The arm or leg ends at a cluster of points that no limb explains.
+
+use super::{Basis, Pool, Propose, SWIVELS};
+use crate::hypotheses::history::History;
+use crate::hypotheses::rough::{Extremity, RoughSearch};
+use crate::math::{Vec3, WeightedPoints};
+
+/// Places where the end is tried, at most: costs time in proportion.
+const MOST_ENDS: usize = 5;
+/// Size of what stands for one cluster, metres: a hand.
+const CLUSTER_RADIUS: f64 = 0.08;
+/// Patches of a cluster that may be stray: a few stray points are no hand.
+const STRAY_PATCHES: f64 = 3.0;
+
+/// The end at the clusters that are farthest from the root and from each other.
+#[derive(Debug, Default)]
+pub(in crate::hypotheses) struct UnexplainedCluster {
+    apart: Vec<f32>,
+}
+
+impl UnexplainedCluster {
+    /// Room for a frame of so many candidates.
+    pub(in crate::hypotheses) fn make_room(&mut self, count: usize) {
+        self.apart.clear();
+        self.apart.reserve(count);
+    }
+}
+
+impl Propose for UnexplainedCluster {
+    fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
+        let ends = end_proposals(&rough.score.unexplained, at.root(), &mut self.apart);
+        for end in ends.into_iter().flatten() {
+            let least = rough.end_at(at, end, SWIVELS, pool.least, &mut pool.points.poses);
+            if least < pool.least {
+                pool.least = least;
+                pool.points.set(Basis::Points);
+            }
+        }
+    }
+}
+
+/// Where the end may be: middles of clusters, each as far as can be from the root and the others.
+fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; MOST_ENDS] {
+    let WeightedPoints { points, weights } = cluster;
+    apart.clear();
+    apart.extend((0..points.len()).map(|index| (points.get(index) - root).length() as f32));
+    let (mut ends, mut found) = ([None; MOST_ENDS], 0);
+    while found < MOST_ENDS {
+        let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
+        let place = points.get(next);
+        if f64::from(apart[next]) < CLUSTER_RADIUS {
+            break;
+        }
+        let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+        for (index, apart) in apart.iter_mut().enumerate() {
+            let point = points.get(index);
+            let distance = (point - place).length();
+            *apart = apart.min(distance as f32);
+            if distance < CLUSTER_RADIUS {
+                sum += weights[index] * point;
+                total += weights[index];
+            }
+        }
+        if total > STRAY_PATCHES {
+            ends[found] = Some(sum / total);
+            found += 1;
+        }
+    }
+    ends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cluster(points: &mut WeightedPoints, middle: Vec3, count: usize) {
+        for index in 0..count {
+            let around = Vec3::new((index as f64).sin(), (2.0 * index as f64).cos(), (3.0 * index as f64).sin());
+            points.push((middle + 0.02 * around).to_array().map(|value| value as f32), 1.0);
+        }
+    }
+
+    #[test]
+    fn ends_are_clusters_farthest_first_and_stray_points_are_none() {
+        let mut points = WeightedPoints::default();
+        let (far, near) = (Vec3::new(0.5, 0.1, 0.2), Vec3::new(-0.1, 0.3, -0.1));
+        cluster(&mut points, near, 40);
+        cluster(&mut points, far, 20);
+        cluster(&mut points, Vec3::new(0.0, -0.6, 0.0), 2);
+        let found: Vec<Vec3> = end_proposals(&points, Vec3::ZERO, &mut Vec::new()).into_iter().flatten().collect();
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found[0].distance(far) < 0.03 && found[1].distance(near) < 0.03, "{found:?}");
+    }
+
+    #[test]
+    fn nothing_is_proposed_without_points_or_beside_the_root() {
+        let mut points = WeightedPoints::default();
+        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; MOST_ENDS]);
+        cluster(&mut points, Vec3::new(0.02, 0.0, 0.0), 30);
+        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; MOST_ENDS]);
+    }
+}

@@ -1,0 +1,148 @@
+//! Rough looks at other configurations of one arm or leg: cheap, so that many can be tried before one is refined.
+
+use std::f64::consts::TAU;
+
+use super::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
+use super::suspicion::distances_to_others;
+use crate::body::two_bone::TwoBone;
+use crate::fit::{Context, Matched};
+use crate::math::{Pose, Vec3, WeightedPoints};
+use crate::visibility::evidence::{Visibility, limb_visibility};
+
+/// The arm or leg that is looked at, and where everything else is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extremity<'a> {
+    pub(super) context: Context<'a>,
+    /// The current poses, and what was matched there.
+    pub(super) matched: Matched<'a>,
+    /// Its number among the extremities.
+    pub(super) index: usize,
+}
+
+impl<'a> Extremity<'a> {
+    pub(super) fn chain(&self) -> &'a TwoBone {
+        &self.context.model.extremities[self.index]
+    }
+
+    /// Centre of its ball joint, working frame.
+    pub(super) fn root(&self) -> Vec3 {
+        self.chain().root(&self.context.model.body, self.matched.poses)
+    }
+}
+
+/// Points about one arm or leg by which rough configurations are compared, and working memory.
+#[derive(Debug, Default)]
+pub(super) struct RoughScore {
+    /// Those that nothing explains.
+    pub(super) unexplained: WeightedPoints,
+    /// Those, and the ones that the arm or leg explains now: they must stay explained. Not too many.
+    sample: WeightedPoints,
+    /// Distances of the sample to the nearest limb that does not belong to it: what that explains is no merit of this one.
+    others: Vec<f32>,
+    nearest: Vec<f32>,
+    distances: Vec<f32>,
+}
+
+/// Rough looks at places where an arm or leg may end.
+#[derive(Debug, Default)]
+pub(super) struct RoughSearch {
+    pub(super) score: RoughScore,
+    trial: Vec<Pose>,
+}
+
+impl RoughScore {
+    /// Room for a frame of so many candidates.
+    pub(super) fn make_room(&mut self, count: usize) {
+        for (points, count) in [(&mut self.unexplained, count), (&mut self.sample, 2 * count)] {
+            points.clear();
+            points.reserve(count);
+        }
+        for distances in [&mut self.others, &mut self.nearest, &mut self.distances] {
+            distances.clear();
+            distances.reserve(count);
+        }
+    }
+
+    /// Takes the points that count: what is unexplained near by, and what it explains itself.
+    pub(super) fn begin(&mut self, at: Extremity, own: &WeightedPoints) {
+        let Self { unexplained, sample, others, distances, .. } = self;
+        sample.clear();
+        sample.extend(unexplained);
+        sample.extend(own);
+        sample.subsample(ROUGH_SAMPLE);
+        distances_to_others(at.context, at.matched.poses, at.chain(), &sample.points, others, distances);
+    }
+
+    /// Cost of the arm or leg at `poses`, in unexplained patches. No part of it is negative: what cannot fall below `least` any
+    /// more is not looked at further.
+    pub(super) fn cost(&mut self, at: Extremity, poses: &[Pose], least: f64) -> f64 {
+        let Self { sample, others, nearest, distances, .. } = self;
+        let (context, chain) = (at.context, at.chain());
+        let body = &context.model.body;
+        nearest.clone_from(others);
+        chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
+        let points = rough_cost(nearest, &sample.weights);
+        if points >= least {
+            return points;
+        }
+        let mut visible = Visibility::default();
+        chain
+            .limbs()
+            .for_each(|limb| visible += limb_visibility(context.seen.views, &body.limbs()[limb], &poses[limb]));
+        let seen = points + visible.cost();
+        if seen >= least { seen } else { seen + strain(context, at.matched, chain, poses) }
+    }
+}
+
+impl RoughSearch {
+    /// Room for a body of so many limbs.
+    pub(super) fn prepare(&mut self, limbs: usize) {
+        self.trial.clear();
+        self.trial.reserve(limbs);
+    }
+
+    /// The best way to end at a place that costs less than `least`, into `best`; returns its cost. `swivels` bends about the line
+    /// from the root to the place are tried.
+    pub(super) fn end_at(
+        &mut self,
+        at: Extremity,
+        place: Vec3,
+        swivels: usize,
+        mut least: f64,
+        best: &mut Vec<Pose>,
+    ) -> f64 {
+        let Self { score, trial } = self;
+        for swivel in 0..swivels {
+            trial.clear();
+            trial.extend_from_slice(at.matched.poses);
+            at.chain().reach(&at.context.model.body, trial, place, TAU * swivel as f64 / swivels as f64);
+            let cost = score.cost(at, trial, least);
+            if cost < least {
+                least = cost;
+                best.clone_from(trial);
+            }
+        }
+        least
+    }
+
+    /// Takes the configuration that `change` makes of the current one, if it costs less than `least`, into `best`; returns the
+    /// lower cost.
+    pub(super) fn changed(
+        &mut self,
+        at: Extremity,
+        change: impl FnOnce(&mut [Pose]),
+        least: f64,
+        best: &mut Vec<Pose>,
+    ) -> f64 {
+        let Self { score, trial } = self;
+        trial.clear();
+        trial.extend_from_slice(at.matched.poses);
+        change(trial);
+        let cost = score.cost(at, trial, least);
+        if cost < least {
+            best.clone_from(trial);
+            return cost;
+        }
+        least
+    }
+}

@@ -1,0 +1,118 @@
+//! Points that weigh differently.
+
+use super::{Points, Vec3};
+
+/// Points in single precision, each with a weight. Metres.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WeightedPoints {
+    /// Where they are.
+    pub points: Points,
+    /// What they weigh.
+    pub weights: Vec<f64>,
+}
+
+impl WeightedPoints {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// True when there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Removes all points and keeps the memory.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.weights.clear();
+    }
+
+    /// Makes room for `len` points in all.
+    pub fn reserve(&mut self, len: usize) {
+        self.points.reserve(len);
+        self.weights.reserve(len.saturating_sub(self.weights.len()));
+    }
+
+    /// Appends a point.
+    pub fn push(&mut self, point: [f32; 3], weight: f64) {
+        self.points.push(point);
+        self.weights.push(weight);
+    }
+
+    /// Appends all points of `other`.
+    pub fn extend(&mut self, other: &Self) {
+        self.points.x.extend_from_slice(&other.points.x);
+        self.points.y.extend_from_slice(&other.points.y);
+        self.points.z.extend_from_slice(&other.points.z);
+        self.weights.extend_from_slice(&other.weights);
+    }
+
+    /// Becomes a set of points with single-precision weights.
+    pub fn assign(&mut self, points: &Points, weights: &[f32]) {
+        self.clear();
+        self.points.x.extend_from_slice(&points.x);
+        self.points.y.extend_from_slice(&points.y);
+        self.points.z.extend_from_slice(&points.z);
+        self.weights.extend(weights.iter().map(|weight| f64::from(*weight)));
+    }
+
+    /// Sum of the weights.
+    pub fn total(&self) -> f64 {
+        self.weights.iter().sum()
+    }
+
+    /// Point and weight at `index`.
+    pub fn get(&self, index: usize) -> (Vec3, f64) {
+        (self.points.get(index), self.weights[index])
+    }
+
+    /// Keeps about `most` of the points, evenly, and their total weight.
+    pub fn subsample(&mut self, most: usize) {
+        let count = self.len();
+        if count <= most {
+            return;
+        }
+        let Self { points, weights } = self;
+        let scale = count as f64 / most as f64;
+        for kept in 0..most {
+            let from = (kept as f64 * scale) as usize;
+            points.set(kept, [points.x[from], points.y[from], points.z[from]]);
+            weights[kept] = weights[from] * scale;
+        }
+        points.resize(most);
+        weights.truncate(most);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_subsample_is_even_and_keeps_the_weight() {
+        let mut all = WeightedPoints::default();
+        (0..1000).for_each(|index| all.push([index as f32, 0.0, 0.0], 2.0));
+        all.subsample(70);
+        assert_eq!(all.len(), 70);
+        assert!((all.total() - 2000.0).abs() < 1e-9);
+        for index in 1..70 {
+            let step = all.get(index).0.x - all.get(index - 1).0.x;
+            assert!((14.0..=15.0).contains(&step), "{step}");
+        }
+        let before = all.clone();
+        all.subsample(70);
+        assert_eq!(all, before);
+    }
+
+    #[test]
+    fn a_copy_of_candidates_is_exact() {
+        let mut points = Points::default();
+        points.push([0.1, 0.2, 0.3]);
+        let mut copy = WeightedPoints::default();
+        copy.assign(&points, &[0.7]);
+        copy.extend(&copy.clone());
+        assert_eq!(copy.len(), 2);
+        assert_eq!((copy.points.x[1], copy.weights[1]), (0.1, f64::from(0.7_f32)));
+    }
+}

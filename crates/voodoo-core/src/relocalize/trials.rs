@@ -1,0 +1,150 @@
+//! Whether a lost body stands at a segment: the best rough looks are refined and scored.
+
+use super::Place;
+use super::facing::facing_cost;
+use super::posture::Postures;
+use super::seeds::{RoughLook, Seed, find_seeds, put};
+use super::segment_motion::SegmentMotion;
+use crate::body::Model;
+use crate::fit::{Context, Fit};
+use crate::hypotheses::{body_landmark_cost, explain, limit_strain, overall_cost};
+use crate::math::{Pose, Vec3};
+use crate::observation::segments::Segment;
+
+/// The opposite facing explains a frame worse by this, in patches, or it is waited for so long for evidence, seconds.
+const DECIDED: f64 = 100.0;
+const WAIT: f64 = 0.5;
+/// Points that rough looks are taken at: costs time in proportion.
+const SEED_SAMPLE: usize = 300;
+/// ICP steps that refine a rough look.
+const STEPS: usize = 10;
+/// A segment of which a larger share lies farther than this (m) from the body is none.
+const MOST_STRAY: f64 = 0.15;
+const STRAY_DISTANCE: f64 = 0.07;
+/// Patches by which a place must be better than the present pose: an area of eight by eight centimetres.
+const PLACE_GAIN: f64 = 40.0;
+/// What cameras have against a place counts at most this many times the weight of its points: so much says that it is wrong.
+const MOST_COST: f64 = 4.0;
+
+/// What is known of a lost body.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known<'a> {
+    pub(super) postures: &'a Postures,
+    pub(super) motion: &'a SegmentMotion,
+    /// It is lost, not only looked at again.
+    pub(super) lost: bool,
+}
+
+/// What the trials at one segment gave.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outcome {
+    /// By how much the best place is better than the present pose, patches; none when nothing is better, or not yet decided.
+    pub(super) gain: Option<f64>,
+    /// The present pose explains the segment.
+    pub(super) explained: bool,
+}
+
+/// Working memory.
+#[derive(Debug, Default)]
+pub(super) struct Trials {
+    rough: RoughLook,
+    seeds: Vec<Seed>,
+    /// The pose that is tried, where it started, and the best so far.
+    poses: Place,
+    predicted: Place,
+    best: Place,
+}
+
+impl Trials {
+    /// The best poses that the last segment gave.
+    pub(super) fn best(&self) -> &Place {
+        &self.best
+    }
+
+    /// Tries the body at a segment, whose points are the candidates of `context`.
+    pub(super) fn at_segment(
+        &mut self,
+        context: Context,
+        known: Known,
+        fit: &mut Fit,
+        present: &[Pose],
+        segment: &Segment,
+    ) -> Outcome {
+        let candidates = context.seen.candidates;
+        let total: f64 = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+        fit.match_all(context, present, context.config.max_steps);
+        let present_score = place_score(context, known, fit, present, total);
+        self.rough.sample.assign(&candidates.points, &candidates.weight);
+        self.rough.sample.subsample(SEED_SAMPLE);
+        let explained = stray_share(&mut self.rough, context, present) < MOST_STRAY;
+        find_seeds(&mut self.rough, context, known, segment, &mut self.seeds);
+        let mut least = present_score - PLACE_GAIN;
+        let mut found = false;
+        let mut opposite = f64::INFINITY;
+        let stood = present[0].rotation * Vec3::X;
+        let mut ahead = stood;
+        for seed in 0..self.seeds.len() {
+            self.refine(context, known, fit, seed);
+            let score = place_score(context, known, fit, &self.poses, total);
+            let faces = self.poses[0].rotation * Vec3::X;
+            let turned = faces.dot(ahead) < 0.0;
+            let stray = stray_share(&mut self.rough, context, &self.poses);
+            // A body that is where it should be may only turn out to face the other way.
+            let allowed = !explained && known.lost || faces.dot(stood) < 0.0;
+            if allowed && score < least && stray < MOST_STRAY {
+                if turned {
+                    opposite = least;
+                }
+                least = score;
+                found = true;
+                ahead = faces;
+                self.best.clone_from(&self.poses);
+            } else if turned {
+                opposite = opposite.min(score);
+            }
+        }
+        let waited = context.seen.frame().stamp - known.motion.seen_since > WAIT;
+        let decided = opposite - least > DECIDED || waited;
+        Outcome { gain: (found && decided).then_some(present_score - least), explained }
+    }
+
+    /// Refines a rough look in some ICP steps, into `poses`; `fit` then holds its matches.
+    fn refine(&mut self, context: Context, known: Known, fit: &mut Fit, seed: usize) {
+        let Self { seeds, poses, predicted, .. } = self;
+        put(known.postures, &seeds[seed], poses);
+        predicted.clone_from(poses);
+        for step in 0..STEPS {
+            fit.step(context, predicted, poses, step);
+        }
+        fit.match_all(context, poses, context.config.max_steps);
+    }
+}
+
+/// Share of the points at the segment that lie farther than `STRAY_DISTANCE` from the body.
+fn stray_share(rough: &mut RoughLook, context: Context, poses: &[Pose]) -> f64 {
+    let RoughLook { sample, nearest, distances, .. } = rough;
+    nearest.clear();
+    nearest.resize(sample.len(), f32::INFINITY);
+    for limb in 0..poses.len() {
+        explain(&context.model.body, limb, poses, &sample.points, nearest, distances);
+    }
+    let stray = nearest.iter().zip(&sample.weights).filter(|(distance, _)| f64::from(**distance) > STRAY_DISTANCE);
+    stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
+}
+
+/// The score of all hypotheses, and what facing, named sites and the other joints say.
+fn place_score(context: Context, known: Known, fit: &Fit, poses: &[Pose], total: f64) -> f64 {
+    let matched = fit.matched(poses);
+    let score = overall_cost(context, matched).total;
+    score.min(MOST_COST * total)
+        + facing_cost(known.postures, known.motion, poses[0].rotation, context.seen.frame().stamp)
+        + body_landmark_cost(matched)
+        + other_joints_strain(context.model, poses)
+}
+
+/// Cost of the broken limits of joints that belong to no arm or leg, or end one: a foot that points backwards.
+fn other_joints_strain(model: &Model, poses: &[Pose]) -> f64 {
+    let inner = |limb: usize| model.extremities.iter().any(|chain| limb == chain.upper || limb == chain.lower);
+    let others = (1..poses.len()).filter(|limb| !inner(*limb));
+    others.map(|limb| limit_strain(&model.body, poses, limb)).sum()
+}

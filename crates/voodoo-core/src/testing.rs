@@ -1,0 +1,91 @@
+//! What unit tests of the tracker's parts share: a synthetic depth camera, and a part's view of one frame.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use crate::body::{Body, HumanModel, Model};
+use crate::config::Config;
+use crate::fit::{Context, Setting};
+use crate::math::{Pose, Quat, Vec3};
+use crate::observation::frame::{DepthImage, DepthPixels, Frame};
+use crate::observation::observer::{Expectation, Observer};
+use crate::visibility::render::{Rendering, Viewpoint};
+
+/// Size and lens of the camera, which stands in the world's origin and looks along z.
+const VIEW: Viewpoint<'static> = Viewpoint {
+    width: 160,
+    height: 124,
+    intrinsics: [145.0, 145.0, 79.5, 61.5],
+    rays: None,
+    world_from_sensor: Pose::IDENTITY,
+};
+
+/// A human who stands 2.6 m before the camera and faces it.
+pub(crate) fn standing() -> (Model, Vec<Pose>) {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    // The body's x looks forward and z up; the camera's y points down.
+    let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+    let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
+    let poses = body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces));
+    (Model::new(body), poses)
+}
+
+/// Depth in millimetres, as the camera sees a posed body before nothing.
+pub(crate) fn depth(body: &Body, poses: &[Pose]) -> Vec<u16> {
+    let mut rendering = Rendering::default();
+    rendering.render(body, poses, &VIEW, None).unwrap();
+    rendering.depth().iter().map(|depth| (depth * 1000.0) as u16).collect()
+}
+
+/// A frame of one depth image.
+pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, look: impl FnOnce(&Frame) -> R) -> R {
+    let images = [DepthImage {
+        pixels: DepthPixels::U16(pixels),
+        width: VIEW.width,
+        height: VIEW.height,
+        metres_per_unit: 0.001,
+        intrinsics: VIEW.intrinsics,
+        rays: None,
+        world_from_sensor: VIEW.world_from_sensor,
+        weight: 1.0,
+        source: 0,
+    }];
+    look(&Frame { images: &images, ..Frame::empty(stamp) })
+}
+
+/// What a frame of `pixels` is to a part of the tracker that expects the body at `poses`, as in the first frame after a reset.
+pub(crate) fn with_context<R>(
+    pixels: &[u16],
+    config: &Config,
+    model: &Model,
+    poses: &[Pose],
+    look: impl FnOnce(Context) -> R,
+) -> R {
+    with_setting(pixels, config, model, poses, |setting| look(setting.of(model)))
+}
+
+/// The same for a part that changes the model.
+pub(crate) fn with_setting<R>(
+    pixels: &[u16],
+    config: &Config,
+    model: &Model,
+    poses: &[Pose],
+    look: impl FnOnce(Setting) -> R,
+) -> R {
+    with_frame(pixels, 0.0, |frame| {
+        let mut observer = Observer::default();
+        let expected = Expectation { body: &model.body, poses, origin: Vec3::ZERO, first: true, searched: None };
+        observer.observe(frame, expected, config);
+        look(Setting { config, seen: observer.seen(frame, Vec3::ZERO), previous: poses, time_scale: 1.0 })
+    })
+}
+
+/// Poses turned about a line through `centre`.
+pub(crate) fn turned(poses: &[Pose], centre: Vec3, axis: Vec3, angle: f64) -> Vec<Pose> {
+    let turn = Quat::from_axis_angle(axis, angle);
+    let place = |pose: &Pose| Pose::from_parts(centre + turn * (pose.translation - centre), turn * pose.rotation);
+    poses.iter().map(place).collect()
+}
+
+/// Greatest distance between the limbs of two poses, metres.
+pub(crate) fn farthest(first: &[Pose], second: &[Pose]) -> f64 {
+    first.iter().zip(second).map(|(a, b)| a.translation.distance(b.translation)).fold(0.0, f64::max)
+}
