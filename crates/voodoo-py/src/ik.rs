@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::ik::{
-    self, Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Segment, Solver, Trunk,
+    self, Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, Trunk,
 };
 use voodoo_core::math::{Pose, Vec3};
 
@@ -113,16 +113,16 @@ impl PyChain {
             .collect()
     }
 
-    fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Segment>> {
+    fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Bone>> {
         parts
             .iter()
             .map(|(a, b, radius)| {
-                Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
+                Ok(Bone { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
             })
             .collect()
     }
 
-    fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Segment>> {
+    fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Bone>> {
         match parts {
             Some(parts) => self.segments(py, &parts),
             None => Ok(ik::bones(&self.body, &self.model, margin)),

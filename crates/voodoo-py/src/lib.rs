@@ -5,13 +5,14 @@
 )]
 
 mod arrays;
-mod beside;
+
 mod body;
 mod config;
 mod errors;
 mod estimate;
 mod frame;
 mod ik;
+mod registration;
 mod render;
 mod shape;
 mod tracker;
@@ -20,8 +21,6 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _core {
-    #[pymodule_export]
-    use super::beside::{nearest_surface, points_within, splat};
     #[pymodule_export]
     use super::body::PyBody;
     #[pymodule_export]
@@ -32,6 +31,8 @@ mod _core {
     use super::frame::PyFrame;
     #[pymodule_export]
     use super::ik::{PyChain, PyView};
+    #[pymodule_export]
+    use super::registration::{nearest_surface, points_within, splat};
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]

@@ -85,17 +85,17 @@ impl Assignment {
 
 /// Copies places and weights of a limb's sampled candidates.
 fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
-    let LimbMatches { candidate, measured, given, .. } = matches;
+    let LimbMatches { candidate, measured, base_weight, .. } = matches;
     measured.resize(candidate.len());
-    given.resize(candidate.len(), 0.0);
+    base_weight.resize(candidate.len(), 0.0);
     // Columns of one length: one check of the index serves them all.
     let count = candidates.len();
     let Points { x, y, z } = &candidates.points;
     let (x, y, z, weight) = (&x[..count], &y[..count], &z[..count], &candidates.weight[..count]);
-    let places = measured.x.iter_mut().zip(&mut measured.y).zip(&mut measured.z).zip(given);
-    for (index, (((to_x, to_y), to_z), given)) in candidate.iter().zip(places) {
+    let places = measured.x.iter_mut().zip(&mut measured.y).zip(&mut measured.z).zip(base_weight);
+    for (index, (((to_x, to_y), to_z), base_weight)) in candidate.iter().zip(places) {
         let index = *index as usize;
-        (*to_x, *to_y, *to_z, *given) = (x[index], y[index], z[index], weight[index]);
+        (*to_x, *to_y, *to_z, *base_weight) = (x[index], y[index], z[index], weight[index]);
     }
 }
 
@@ -104,15 +104,15 @@ fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
 pub fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, matches: &mut LimbMatches) {
     limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
     let (refused, limit) = (refused_regions(limb), max_distance as f32);
-    let LimbMatches { weight, given, surface, .. } = matches;
-    weight.resize(given.len(), 0.0);
+    let LimbMatches { weight, base_weight, surface, .. } = matches;
+    weight.resize(base_weight.len(), 0.0);
     widest(
         #[inline(always)]
         || {
-            let found = given.iter().zip(&surface.signed_distance).zip(&surface.region);
-            for (weight, ((given, distance), region)) in weight.iter_mut().zip(found) {
+            let found = base_weight.iter().zip(&surface.signed_distance).zip(&surface.region);
+            for (weight, ((base_weight, distance), region)) in weight.iter_mut().zip(found) {
                 let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
-                *weight = if kept { *given } else { 0.0 };
+                *weight = if kept { *base_weight } else { 0.0 };
             }
         },
     );

@@ -1,9 +1,9 @@
 //! The outline of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
 
-use crate::association::correspondence::EdgePair;
+use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3};
-use crate::observation::depth_view::{Pixel, View};
+use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Places along a limb that are looked at; the ends belong to the neighbours as well.
 pub const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
@@ -38,7 +38,7 @@ pub struct Edge {
 }
 
 /// Looks for the edges on both sides of a limb, and at its tip when it ends free.
-pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
+pub fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
@@ -94,7 +94,7 @@ struct ContourSearch {
 impl ContourSearch {
     /// How far from the start the body ends, and the last place seen on it; `None` when another thing stands before it, when
     /// the image does not tell, or when no edge comes within reach.
-    fn edge(&self, view: &View) -> Option<(f64, Vec3)> {
+    fn edge(&self, view: &DepthView) -> Option<(f64, Vec3)> {
         let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
         let step = 0.5 * self.start.z.max(0.1) / focal;
         let deep = self.thickness + DEPTH_REACH;
@@ -130,7 +130,7 @@ impl ContourSearch {
 
 /// The edges of all limbs in all depth images of a frame, and working memory.
 #[derive(Debug, Default)]
-pub struct Contour {
+pub struct Contours {
     edges: Vec<Found>,
     places: Points,
     distance: Vec<f32>,
@@ -149,14 +149,14 @@ struct Found {
     stranger: f32,
 }
 
-impl Contour {
+impl Contours {
     /// Forgets all edges.
     pub fn clear(&mut self) {
         self.edges.clear();
     }
 
     /// Looks for the edges at `poses`.
-    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>) {
+    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = DepthView<'a>>) {
         self.edges.clear();
         self.places.clear();
         for view in views {
@@ -210,11 +210,11 @@ impl Contour {
     }
 
     /// The rims at `poses` and the edges that were found, as pairs.
-    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<EdgePair>) {
+    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
         pairs.clear();
         pairs.extend(self.edges.iter().map(|Found { limb, edge, target, .. }| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
-            EdgePair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
+            ContourPair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
         }));
     }
 }

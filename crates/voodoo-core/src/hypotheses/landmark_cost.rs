@@ -25,5 +25,5 @@ impl Tracker {
 fn missed(pair: &SitePair, x: Vec3) -> f64 {
     // Across a ray alone, where only a ray is known.
     let apart = (pair.across * (x - pair.p)).length() - pair.bias;
-    pair.given * (apart.max(0.0) / APART).powi(2).min(1.0)
+    pair.base_weight * (apart.max(0.0) / APART).powi(2).min(1.0)
 }

@@ -29,14 +29,14 @@ pub struct Candidates {
 }
 
 /// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
-struct Gate {
+struct PointGate {
     low: [f32; 3],
     high: [f32; 3],
     up: [f32; 3],
     floor: f32,
 }
 
-impl Gate {
+impl PointGate {
     #[inline(always)]
     fn passes(&self, p: [f32; 3]) -> bool {
         let inside = |axis: usize| (p[axis] >= self.low[axis]) & (p[axis] <= self.high[axis]);
@@ -80,7 +80,8 @@ impl Candidates {
             None => (Vec3::ZERO, -1.0),
         };
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
-        let gate = Gate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
+        let gate =
+            PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
         for image in frame.images {
             let background = backgrounds.of(image).map_or(&[][..], Background::depth);
             self.gather_image(image, background, origin, bounds, &gate, config.max_points);
@@ -99,7 +100,7 @@ impl Candidates {
         self.source.push(source);
     }
 
-    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &Gate) {
+    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &PointGate) {
         let working_from_sensor = shifted(&cloud.world_from_sensor, origin);
         let (rotation, shift) = (Mat3::from_quat(working_from_sensor.rotation), working_from_sensor.translation);
         let limb = match cloud.scope {
@@ -124,7 +125,7 @@ impl Candidates {
         background: &[f32],
         origin: Vec3,
         bounds: &Aabb,
-        gate: &Gate,
+        gate: &PointGate,
         max_points: usize,
     ) {
         let working_from_sensor = shifted(&image.world_from_sensor, origin);
@@ -251,7 +252,7 @@ impl Stretch {
 
     /// Appends the points that returned and lie inside the gate, in order.
     #[inline(always)]
-    fn gather(&self, m: &[[f32; 3]; 4], gate: &Gate, points: &mut Points) {
+    fn gather(&self, m: &[[f32; 3]; 4], gate: &PointGate, points: &mut Points) {
         let mut p = [[0.0; STRETCH]; 3];
         let mut passes = [false; STRETCH];
         for i in 0..STRETCH {

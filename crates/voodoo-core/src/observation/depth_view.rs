@@ -6,7 +6,7 @@ use crate::observation::frame::{DepthImage, Frame};
 
 /// A depth image as a witness: what lies in a pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct DepthView<'a> {
     /// The image.
     pub image: &'a DepthImage<'a>,
     /// What is known of the scene behind the body.
@@ -46,9 +46,9 @@ pub struct DepthViews<'a> {
 
 impl<'a> DepthViews<'a> {
     /// One after the other.
-    pub fn iter(self) -> impl Iterator<Item = View<'a>> {
+    pub fn iter(self) -> impl Iterator<Item = DepthView<'a>> {
         let images = self.frame.images.iter().zip(self.segmented);
-        images.map(move |(image, segmented)| View {
+        images.map(move |(image, segmented)| DepthView {
             image,
             background: self.backgrounds.of(image),
             working_from_camera: shifted(&image.world_from_sensor, self.origin),
@@ -57,7 +57,7 @@ impl<'a> DepthViews<'a> {
     }
 }
 
-impl View<'_> {
+impl DepthView<'_> {
     /// What the pixel that a point (camera frame) falls in shows. Images of distorting lenses say nothing: their rays are
     /// known by the pixel, not the pixel by the ray.
     #[inline(always)]

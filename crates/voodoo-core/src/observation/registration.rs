@@ -160,7 +160,7 @@ impl ProjectedPoints {
 
 /// Places of a picture, and what was measured there.
 #[derive(Clone, Copy, Debug)]
-pub struct Measured<'a> {
+pub struct MeasuredPixels<'a> {
     /// Columns and rows.
     pub places: &'a [[f64; 2]],
     /// Depths, metres.
@@ -172,7 +172,7 @@ pub struct Measured<'a> {
 /// Surfaces farther behind the nearest one than this are others, metres.
 const ONE_SURFACE: f64 = 0.1;
 
-impl Measured<'_> {
+impl MeasuredPixels<'_> {
     /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
     /// three points there. Where three of the points `among` are there, only those count.
     ///

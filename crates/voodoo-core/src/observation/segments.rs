@@ -17,7 +17,7 @@ const HALF: f64 = (1_u64 << 20) as f64;
 
 /// What hangs together; working frame, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Blob {
+pub struct Segment {
     /// Mean of the samples.
     pub centre: Vec3,
     /// Corners of its box.
@@ -42,23 +42,23 @@ struct Sample {
 struct Cell {
     key: u64,
     samples: (u32, u32),
-    /// Another cell of its blob with a smaller index, or itself.
+    /// Another cell of its segment with a smaller index, or itself.
     parent: u32,
 }
 
-/// Working memory, and the blobs of the last frame, largest first.
+/// Working memory, and the segments of the last frame, largest first.
 #[derive(Debug, Default)]
-pub struct Blobs {
+pub struct Segments {
     samples: Vec<Sample>,
     cells: Vec<Cell>,
-    found: Vec<Blob>,
-    /// The blob of every first cell.
+    found: Vec<Segment>,
+    /// The segment of every first cell.
     of_cell: Vec<u32>,
 }
 
-impl Blobs {
-    /// The blobs, largest first.
-    pub fn found(&self) -> &[Blob] {
+impl Segments {
+    /// The segments, largest first.
+    pub fn found(&self) -> &[Segment] {
         &self.found
     }
 
@@ -153,7 +153,7 @@ impl Blobs {
         }
     }
 
-    /// The first cell of a cell's blob; the way there becomes shorter.
+    /// The first cell of a cell's segment; the way there becomes shorter.
     fn first(&mut self, mut cell: u32) -> u32 {
         loop {
             let parent = self.cells[cell as usize].parent;
@@ -175,26 +175,26 @@ impl Blobs {
             if first == index {
                 self.of_cell[index] = self.found.len() as u32;
                 let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-                self.found.push(Blob { centre: Vec3::ZERO, low, high, patches: 0.0, view: Vec3::ZERO });
+                self.found.push(Segment { centre: Vec3::ZERO, low, high, patches: 0.0, view: Vec3::ZERO });
             }
-            let blob = &mut self.found[self.of_cell[first] as usize];
+            let segment = &mut self.found[self.of_cell[first] as usize];
             let (start, end) = self.cells[index].samples;
             for sample in &self.samples[start as usize..end as usize] {
                 let weight = f64::from(sample.weight);
                 let [point, view] = [sample.point, sample.view].map(|v| Vec3::from_array(v.map(f64::from)));
-                blob.centre += weight * point;
-                blob.view += weight * view;
-                blob.low = blob.low.min(point);
-                blob.high = blob.high.max(point);
-                blob.patches += weight;
+                segment.centre += weight * point;
+                segment.view += weight * view;
+                segment.low = segment.low.min(point);
+                segment.high = segment.high.max(point);
+                segment.patches += weight;
             }
         }
-        for blob in &mut self.found {
-            blob.centre /= blob.patches;
-            blob.view = blob.view.normalize_or_zero();
+        for segment in &mut self.found {
+            segment.centre /= segment.patches;
+            segment.view = segment.view.normalize_or_zero();
         }
-        // No two blobs share a centre: the order is the same on every run.
-        let place = |blob: &Blob| blob.centre.to_array();
+        // No two segments share a centre: the order is the same on every run.
+        let place = |segment: &Segment| segment.centre.to_array();
         self.found.sort_unstable_by(|a, b| b.patches.total_cmp(&a.patches).then_with(|| order(&place(a), &place(b))));
     }
 }
@@ -228,10 +228,10 @@ mod tests {
                 source: 0,
             }];
             let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
-            let mut blobs = Blobs::default();
-            blobs.find(&frame, Vec3::ZERO, &Backgrounds::default(), &Config::default());
-            found.push(blobs.found().to_vec());
-            // Another order of the same points gives the same blobs, bit by bit.
+            let mut segments = Segments::default();
+            segments.find(&frame, Vec3::ZERO, &Backgrounds::default(), &Config::default());
+            found.push(segments.found().to_vec());
+            // Another order of the same points gives the same segments, bit by bit.
             points.reverse();
         }
         assert_eq!(found[0], found[1]);

@@ -12,7 +12,7 @@ use crate::hypotheses::score::limit_strain;
 use crate::math::{Aabb, Points, Pose, Quat, Vec3};
 use crate::observation::candidates::{REFERENCE_PATCH, body_box};
 use crate::observation::frame::Frame;
-use crate::observation::segments::{Blob, Blobs};
+use crate::observation::segments::{Segment, Segments};
 use crate::tracker::Tracker;
 use crate::tracker::estimate::{LimbStatus, Status};
 use seeds::{Trial, put};
@@ -32,7 +32,7 @@ const SHARE: f64 = 0.25;
 const EXTENT: [f64; 3] = [0.35, 1.4, 1.5];
 /// A person's box is enlarged by this, metres.
 const MARGIN: f64 = 0.20;
-/// Blobs that are tried.
+/// Segments that are tried.
 const BLOBS: usize = 2;
 /// Points that rough trials look at.
 const SAMPLE: usize = 300;
@@ -58,7 +58,7 @@ const JUMP: f64 = 0.4;
 /// Working memory, and what is remembered of the lost body.
 #[derive(Debug, Default)]
 pub(crate) struct Search {
-    blobs: Blobs,
+    blobs: Segments,
     sample: Points,
     weights: Vec<f64>,
     best: Vec<f32>,
@@ -152,7 +152,7 @@ impl Tracker {
     }
 
     /// Whether a blob may be the body.
-    fn fits(&self, work: &Search, blob: &Blob) -> bool {
+    fn fits(&self, work: &Search, blob: &Segment) -> bool {
         let extents = blob.high - blob.low;
         let [least, upright, across] = EXTENT.map(|share| share * work.height);
         let tall = extents.dot(work.up.abs());
@@ -231,7 +231,7 @@ impl Tracker {
     }
 
     /// The best pose at a blob, into `work.trial`, and how much better than the present one it is.
-    fn try_blob(&mut self, work: &mut Search, blob: &Blob, frame: &Frame) -> Option<f64> {
+    fn try_blob(&mut self, work: &mut Search, blob: &Segment, frame: &Frame) -> Option<f64> {
         let bounds = Aabb::new(blob.low - Vec3::splat(MARGIN), blob.high + Vec3::splat(MARGIN));
         self.candidates.gather(frame, self.origin, &bounds, &self.backgrounds, &self.config);
         let total: f64 = self.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();

@@ -4,7 +4,7 @@ use super::{REFINED, Search};
 use crate::math::{Pose, Quat, Vec3};
 use crate::observation::depth_view::DepthViews;
 use crate::observation::frame::Frame;
-use crate::observation::segments::Blob;
+use crate::observation::segments::Segment;
 use crate::tracker::Tracker;
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
@@ -27,7 +27,7 @@ pub(crate) struct Trial {
 
 impl Tracker {
     /// Puts the body at the blob in every way and keeps the best of different directions, the opposite of the best among them.
-    pub(crate) fn rough_trials(&self, work: &mut Search, blob: &Blob, frame: &Frame) {
+    pub(crate) fn rough_trials(&self, work: &mut Search, blob: &Segment, frame: &Frame) {
         let mut all = [const { None::<Trial> }; HEADINGS];
         for (number, slot) in all.iter_mut().enumerate() {
             let heading = std::f64::consts::TAU * number as f64 / HEADINGS as f64;
@@ -61,7 +61,7 @@ impl Tracker {
     fn place(
         &self,
         work: &Search,
-        blob: &Blob,
+        blob: &Segment,
         frame: &Frame,
         heading: f64,
         kept: bool,

@@ -254,7 +254,7 @@ pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &
         let ey = select(cap, 0.0, ey * sy);
         let ez = select(distal, -top, select(proximal, -z, ez));
 
-        // NormalEquations: P_θ × P_t on the side, the direction to the query on a rim.
+        // Normal: P_θ × P_t on the side, the direction to the query on a rim.
         let rim = (t <= 0.0) | (t >= 1.0);
         let nx = select(rim, -ex * sign, b * c * k.length * sx);
         let ny = select(rim, -ey * sign, a * s * k.length * sy);

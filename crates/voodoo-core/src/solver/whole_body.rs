@@ -134,10 +134,10 @@ impl WholeBody {
         self.normal.clear(poses.len());
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
         let terms: [&dyn Term; 4] = [
-            &Surface { correspondences, information, slide: config.slide, scale },
+            &Surface { correspondences, information, tangential_weight: config.slide, scale },
             &Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased },
-            &Contour { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale },
-            &Prior { predicted, root, joints: &self.joint_sigmas, calm },
+            &Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale },
+            &Prior { predicted, root, joints: &self.joint_sigmas, still_gain: calm },
         ];
         for term in terms {
             term.add(body, poses, &mut self.normal);

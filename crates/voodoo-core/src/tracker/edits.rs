@@ -73,7 +73,7 @@ impl Tracker {
         self.girths.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
-        self.correspondences.edges.clear();
+        self.correspondences.contour.clear();
         if !self.pairs.is_empty() {
             self.follow_lengths();
         }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::association::assignment::{Assignment, match_limb};
-use crate::association::contour::Contour;
+use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
 use crate::body::two_bone::TwoBone;
@@ -53,7 +53,7 @@ pub struct Tracker {
     pub(crate) candidates: Candidates,
     pub(crate) assignment: Assignment,
     pub(crate) correspondences: Correspondences,
-    pub(crate) contour: Contour,
+    pub(crate) contour: Contours,
     pub(crate) measured: Vec<f64>,
     pub(crate) hypotheses: Hypotheses,
     pub(crate) search: Search,
@@ -97,7 +97,7 @@ impl Tracker {
             candidates: Candidates::default(),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
-            contour: Contour::default(),
+            contour: Contours::default(),
             measured: Vec::new(),
             hypotheses: Hypotheses::default(),
             search: Search::default(),
@@ -172,7 +172,7 @@ impl Tracker {
         self.pairs.clear();
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
-        self.correspondences.edges.clear();
+        self.correspondences.contour.clear();
         self.candidates = Candidates::default();
         self.backgrounds.clear();
         self.report(f64::NAN, 0);
@@ -225,7 +225,7 @@ impl Tracker {
         if !(self.pairs.is_empty() && self.girths.is_empty()) && self.config.max_steps >= OUTLINE_FROM {
             // Sizes follow the outline.
             self.find_outline(frame);
-            self.contour.pairs(&self.poses, &mut self.correspondences.edges);
+            self.contour.pairs(&self.poses, &mut self.correspondences.contour);
         }
         if !self.pairs.is_empty() && self.estimate.status != Status::Lost {
             self.refine_lengths(pace);
@@ -294,7 +294,7 @@ impl Tracker {
         self.match_points(gate, assigned, self.config.facing && self.solver.faces_cameras());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.correspondences.add_sites(&self.body, &self.poses, frame, self.origin);
-        self.contour.pairs(&self.poses, &mut self.correspondences.edges);
+        self.contour.pairs(&self.poses, &mut self.correspondences.contour);
     }
 
     /// Lets the solver follow the named sites before the frame's steps.

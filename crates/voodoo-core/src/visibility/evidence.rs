@@ -7,7 +7,7 @@ use crate::association::correspondence::Correspondences;
 use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::depth_view::{DepthViews, Pixel, View};
+use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 
 /// A point this far from the model is not explained, metres.
 pub const EXPLAINED: f64 = 0.04;
@@ -112,7 +112,7 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
     found
 }
 
-fn sight(view: &View, point: Vec3) -> Option<Sight> {
+fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
     Some(match view.at(point) {
         Pixel::Unknown => return None,
         Pixel::Background(z) if z > point.z + 0.5 * PAST => Sight::FreeSpaceViolation,

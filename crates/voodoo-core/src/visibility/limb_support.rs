@@ -8,7 +8,7 @@
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::math::{Pose, Vec3};
-use crate::observation::depth_view::{DepthViews, Pixel, View};
+use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::render::LimbRaycaster;
 
@@ -37,8 +37,8 @@ const BEFORE: f64 = 0.01;
 pub struct LimbSupport {
     /// Seen where they are, and explained by no limb of another arm, leg or the trunk.
     pub own: [f64; 2],
-    /// A camera sees past them.
-    pub past: [f64; 2],
+    /// A camera sees past them: the space where they would be is free.
+    pub free_space: [f64; 2],
     /// Some image says something about the limb.
     pub known: bool,
 }
@@ -46,21 +46,21 @@ pub struct LimbSupport {
 impl LimbSupport {
     /// What speaks for the limb less what speaks against it.
     pub fn net(&self) -> [f64; 2] {
-        [self.own[0] - self.past[0], self.own[1] - self.past[1]]
+        [self.own[0] - self.free_space[0], self.own[1] - self.free_space[1]]
     }
 }
 
-/// Looks at the upper and lower limbs of all `chains`; `proofs` gets one entry a limb, `raycasters` is working memory.
+/// Looks at the upper and lower limbs of all `chains`; `supports` gets one entry a limb, `raycasters` is working memory.
 pub fn measure_support(
     views: DepthViews,
     body: &Body,
     poses: &[Pose],
     chains: &[TwoBone],
     raycasters: &mut Vec<LimbRaycaster>,
-    proofs: &mut Vec<LimbSupport>,
+    supports: &mut Vec<LimbSupport>,
 ) {
-    proofs.clear();
-    proofs.resize(poses.len(), LimbSupport::default());
+    supports.clear();
+    supports.resize(poses.len(), LimbSupport::default());
     for view in views.iter() {
         raycasters.clear();
         let limbs = body.limbs().iter().zip(poses);
@@ -69,12 +69,12 @@ pub fn measure_support(
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
                 let seen = support_seen_by(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);
-                let proof = &mut proofs[limb];
+                let support = &mut supports[limb];
                 for part in 0..2 {
-                    proof.own[part] = proof.own[part].max(seen.own[part]);
-                    proof.past[part] = proof.past[part].max(seen.past[part]);
+                    support.own[part] = support.own[part].max(seen.own[part]);
+                    support.free_space[part] = support.free_space[part].max(seen.free_space[part]);
                 }
-                proof.known |= seen.known;
+                support.known |= seen.known;
             }
         }
     }
@@ -82,7 +82,7 @@ pub fn measure_support(
 
 /// What one camera says of a limb of a chain.
 fn support_seen_by(
-    view: &View,
+    view: &DepthView,
     shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
     limb: usize,
@@ -90,7 +90,7 @@ fn support_seen_by(
     raycasters: &[LimbRaycaster],
 ) -> LimbSupport {
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-    let mut proof = LimbSupport::default();
+    let mut support = LimbSupport::default();
     for t in ALONG {
         let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
         let centre = camera_from_limb * Vec3::new(0.0, 0.0, t * shape.length());
@@ -110,24 +110,24 @@ fn support_seen_by(
             if pixel == Pixel::Unknown {
                 continue;
             }
-            proof.known = true;
+            support.known = true;
             let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
             let others = || raycasters.iter().enumerate().filter(|(other, _)| *other != limb);
             if others().any(|(_, other)| depth(other) < point.z - BEFORE) {
                 continue;
             }
             match pixel {
-                Pixel::Background(z) if z > point.z + PAST_SCENE => count(&mut proof.past),
-                Pixel::Foreground(z) if z > point.z + PAST => count(&mut proof.past),
+                Pixel::Background(z) if z > point.z + PAST_SCENE => count(&mut support.free_space),
+                Pixel::Foreground(z) if z > point.z + PAST => count(&mut support.free_space),
                 Pixel::Foreground(z) if (z - point.z).abs() < NEAR => {
                     let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
                     if !strangers.any(|(_, other)| (depth(other) - z).abs() < NEAR) {
-                        count(&mut proof.own);
+                        count(&mut support.own);
                     }
                 }
                 _ => {}
             }
         }
     }
-    proof
+    support
 }

@@ -1,9 +1,9 @@
 //! The depth image that a camera should see of a posed body, and which limb each pixel shows: geometry, no drawing.
 //!
-//! Every pixel's ray meets the limbs whose outline can cover it. Along a ray `o + u (x, y, 1)`, `u` the depth, the side is
+//! Every pixel's ray meets the limbs whose silhouette can cover it. Along a ray `o + u (x, y, 1)`, `u` the depth, the side is
 //! `(X / a)² + (Y / b)² = 1` with X, Y, a and b linear in u. With the aspect `a / b` held fixed that is a quadratic; two
 //! rounds of it, the aspect taken where the last one ended, and two Newton steps on the true equation give the root to a
-//! micrometre. Rays near an outline, along the axis of a limb, and limbs whose aspect changes much go through
+//! micrometre. Rays near a silhouette's border, along the axis of a limb, and limbs whose aspect changes much go through
 //! [`TaperedEllipticCylinder::cast_ray`], which is exact and fifty times slower.
 
 use rayon::prelude::*;
@@ -19,9 +19,9 @@ pub const NO_LIMB: u16 = u16::MAX;
 const LANES: usize = 8;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
 const BAND: usize = 16;
-/// Limbs nearer to the camera plane than this have no usable outline, metres; every ray is tried.
+/// Limbs nearer to the camera plane than this have no usable bounds in the image, metres; every ray is tried.
 const NEAR: f64 = 0.01;
-/// Outlines are widened by this, in units of `x / z`, against rounding.
+/// Bounds in the image are widened by this, in units of `x / z`, against rounding.
 const ROUNDING: f64 = 1e-9;
 /// Greatest `|ln(a0 b1 / (a1 b0))|` for which the aspect may be held fixed (method section 2).
 const PLAIN_ASPECT: f64 = 0.3;
@@ -91,7 +91,7 @@ pub struct Rendering {
     width: usize,
     depth: Vec<f32>,
     limb: Vec<u16>,
-    outlines: Vec<LimbRaycaster>,
+    raycasters: Vec<LimbRaycaster>,
 }
 
 impl Rendering {
@@ -130,27 +130,27 @@ impl Rendering {
             let found = format!("{} poses for {} limbs, or one not finite", world_from_limb.len(), limbs.len());
             return Err(TrackError::measurement("world_from_limb", "one finite pose a limb", found));
         }
-        let Self { width, depth, limb, outlines } = self;
+        let Self { width, depth, limb, raycasters } = self;
         *width = view.width;
         depth.clear();
         depth.resize(view.width * view.height, 0.0);
         limb.clear();
         limb.resize(view.width * view.height, NO_LIMB);
-        outlines.clear();
-        outlines.extend(
+        raycasters.clear();
+        raycasters.extend(
             limbs
                 .iter()
                 .zip(world_from_limb)
                 .map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.world_from_sensor))),
         );
-        let outlines = &*outlines;
+        let raycasters = &*raycasters;
         let size = view.width * BAND;
         let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
             widest(
                 #[inline(always)]
                 || {
-                    for (index, outline) in (0..).zip(outlines) {
-                        outline.fill(view, band * BAND, index, depth, limb);
+                    for (index, raycaster) in (0..).zip(raycasters) {
+                        raycaster.fill(view, band * BAND, index, depth, limb);
                     }
                 },
             );
@@ -182,7 +182,7 @@ pub struct LimbRaycaster {
 }
 
 impl LimbRaycaster {
-    /// The outline of a limb of this shape for a camera in this place.
+    /// The rays of one camera against a limb of this shape for a camera in this place.
     pub fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();
         let mut corners = Some([[0.0; 2]; 8]);
