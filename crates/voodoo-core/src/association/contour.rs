@@ -49,20 +49,15 @@ pub fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found:
         }
     };
     for t in STATIONS {
-        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
-        let axis = Vec3::new(0.0, 0.0, t * shape.length());
-        let centre = camera_from_limb * axis;
-        let sight = camera_from_limb.inverse_transform_vector(-centre);
-        let Some(ahead) = sight.with_z(0.0).try_normalize() else { continue };
+        let section = shape.section(t);
+        let Some(facing) = section.facing(&camera_from_limb) else { continue };
         // Seen nearly end on, a limb has no sides.
-        if sight.with_z(0.0).length() < ASLANT * sight.length() {
+        if facing.across.length() < ASLANT * facing.to_camera.length() {
             continue;
         }
-        let thickness = length(a * ahead.x, b * ahead.y);
-        for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
-            let rim = length(a * side.x, b * side.y);
-            let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
-            look(axis, side, rim, thickness, foot, EDGE_REACH);
+        let thickness = section.extent(facing.ahead);
+        for side in [facing.side, -facing.side] {
+            look(section.centre(), side, section.extent(side), thickness, section.farthest_point(side), EDGE_REACH);
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
@@ -76,10 +71,6 @@ pub fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found:
         let rim = shape.length() + radius * sight.z.abs() / across;
         look(Vec3::ZERO, Vec3::Z, rim, shape.a1().max(shape.b1()), foot, TIP_REACH);
     }
-}
-
-fn length(x: f64, y: f64) -> f64 {
-    (x * x + y * y).sqrt()
 }
 
 /// A way across an image: from a point along a direction (camera frame), metres.

@@ -8,16 +8,16 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
+use crate::visibility::{ALONG_LIMB, SEEN_PAST};
 
-/// A point this far from the model is not explained, metres.
+/// A point this far from the model's surface is not explained by it, metres.
 pub const EXPLAINED: f64 = 0.04;
-/// The camera sees past the model's surface when the return lies this much behind it, metres.
-const PAST: f64 = 0.08;
-/// Cost of a patch that hides behind what is seen.
-const HIDDEN: f64 = 0.3;
-/// Places along a limb and across it that are looked at.
-const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
+/// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
+const OCCLUDED_COST: f64 = 0.3;
+/// Where across a limb patches are looked at, in shares of its radius from the middle.
+const PATCHES_ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
+/// A camera nearer to a limb's axis than this, metres, looks along it and sees no patch of its side.
+const END_ON: f64 = 1e-6;
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +68,7 @@ impl std::ops::AddAssign for Visibility {
 impl Visibility {
     /// Cost in unexplained patches: to be seen past is as bad as to leave a patch unexplained, to hide is suspicious.
     pub fn cost(&self) -> f64 {
-        self.image.free_space + HIDDEN * self.side.occluded
+        self.image.free_space + OCCLUDED_COST * self.side.occluded
     }
 }
 
@@ -78,25 +78,19 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
     let mut found = Visibility::default();
     for view in views.iter() {
         let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-        for t in ALONG {
-            let z = t * shape.length();
-            let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
-            let centre = camera_from_limb * Vec3::new(0.0, 0.0, z);
-            // Direction to the camera, across the limb, in the limb frame.
-            let ahead = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0);
-            if ahead.length() < 1e-6 {
+        for t in ALONG_LIMB {
+            let section = shape.section(t);
+            let Some(facing) = section.facing(&camera_from_limb) else { continue };
+            if facing.across.length() < END_ON {
                 continue;
             }
+            let (a, b) = (section.a, section.b);
             // A limb seen aslant covers so much less of the image, as the points seen on it do.
-            let aslant = ahead.length() / centre.length();
-            let ahead = ahead.normalize();
-            let side = Vec3::new(-ahead.y, ahead.x, 0.0);
-            for s in ACROSS {
-                let forward = (1.0 - s * s).sqrt();
-                let place = ahead * forward + side * s;
-                let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
+            let aslant = facing.across.length() / (camera_from_limb * section.centre()).length();
+            for s in PATCHES_ACROSS {
+                let point = camera_from_limb * facing.point(s);
                 let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
-                    / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
+                    / (REFERENCE_PATCH * (ALONG_LIMB.len() * PATCHES_ACROSS.len()) as f64);
                 let Some(sight) = sight(&view, point) else { continue };
                 for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
                     match sight {
@@ -115,9 +109,9 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
 fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
     Some(match view.at(point) {
         Pixel::Unknown => return None,
-        Pixel::Background(z) if z > point.z + 0.5 * PAST => Sight::FreeSpaceViolation,
-        Pixel::Foreground(z) if z > point.z + PAST => Sight::FreeSpaceViolation,
-        Pixel::Background(z) | Pixel::Foreground(z) if z > point.z - PAST => Sight::Consistent,
+        Pixel::Background(z) if z > point.z + 0.5 * SEEN_PAST => Sight::FreeSpaceViolation,
+        Pixel::Foreground(z) if z > point.z + SEEN_PAST => Sight::FreeSpaceViolation,
+        Pixel::Background(z) | Pixel::Foreground(z) if z > point.z - SEEN_PAST => Sight::Consistent,
         _ => Sight::Occluded,
     })
 }

@@ -7,24 +7,25 @@
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::math::{Pose, Vec3};
+use crate::math::Pose;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::render::LimbRaycaster;
+use crate::visibility::{ALONG_LIMB, SEEN_PAST};
 
-/// Places along a limb and across it that are looked at; nearer to the rim, a pixel shows what lies beside it.
-const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const ACROSS: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
-/// The outer part of a limb begins here, with so many places.
+/// Where across a limb places are looked at, in shares of its radius from the middle; nearer to the rim, a pixel shows what
+/// lies beside it.
+const PLACES_ACROSS: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+/// The outer part of a limb begins at this share of its length.
 const OUTER: f64 = 0.6;
+/// So many places lie in the outer part: two along, five across.
 const OUTER_PLACES: f64 = 10.0;
 /// What a camera sees at a place this near is explained by it, and by any other surface this near, metres along the ray.
-const NEAR: f64 = 0.04;
-/// The camera sees past a place when what may be the body lies this much behind it, metres; what is known to be the scene
-/// behind the body less.
-const PAST: f64 = 0.08;
-const PAST_SCENE: f64 = 0.04;
-/// A limb stands before a place when it is nearer by this, metres.
+const SAME_DEPTH: f64 = 0.04;
+/// The camera sees past a place when the background lies this much behind it, metres: less than [`SEEN_PAST`], since what is
+/// known to be the scene is not the body.
+const SEEN_PAST_TO_SCENE: f64 = 0.04;
+/// A limb stands before a place when it is nearer to the camera by this, metres: limbs overlap at their joints.
 const BEFORE: f64 = 0.01;
 
 /// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
@@ -91,21 +92,14 @@ fn support_seen_by(
 ) -> LimbSupport {
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
-    for t in ALONG {
-        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
-        let centre = camera_from_limb * Vec3::new(0.0, 0.0, t * shape.length());
-        // Direction to the camera, across the limb, in the limb frame.
-        let Some(ahead) = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0).try_normalize() else {
-            continue;
-        };
-        let side = Vec3::new(-ahead.y, ahead.x, 0.0);
+    for t in ALONG_LIMB {
+        let Some(facing) = shape.section(t).facing(&camera_from_limb) else { continue };
         // The weights of all places add up to one, in the whole and in the outer part.
-        let lever = t / (ALONG.iter().sum::<f64>() * ACROSS.len() as f64);
+        let lever = t / (ALONG_LIMB.iter().sum::<f64>() * PLACES_ACROSS.len() as f64);
         let outer = if t > OUTER { 1.0 / OUTER_PLACES } else { 0.0 };
         let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
-        for s in ACROSS {
-            let place = ahead * (1.0 - s * s).sqrt() + side * s;
-            let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, t * shape.length());
+        for s in PLACES_ACROSS {
+            let point = camera_from_limb * facing.point(s);
             let pixel = view.at(point);
             if pixel == Pixel::Unknown {
                 continue;
@@ -117,11 +111,11 @@ fn support_seen_by(
                 continue;
             }
             match pixel {
-                Pixel::Background(z) if z > point.z + PAST_SCENE => count(&mut support.free_space),
-                Pixel::Foreground(z) if z > point.z + PAST => count(&mut support.free_space),
-                Pixel::Foreground(z) if (z - point.z).abs() < NEAR => {
+                Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => count(&mut support.free_space),
+                Pixel::Foreground(z) if z > point.z + SEEN_PAST => count(&mut support.free_space),
+                Pixel::Foreground(z) if (z - point.z).abs() < SAME_DEPTH => {
                     let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
-                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < NEAR) {
+                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < SAME_DEPTH) {
                         count(&mut support.own);
                     }
                 }
