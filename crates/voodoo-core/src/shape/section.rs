@@ -107,7 +107,7 @@ mod tests {
             // The camera stands where the pose says: the origin of its frame, seen from the limb.
             let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
             prop_assert!((section.centre() + facing.to_camera - camera).length() < 1e-9);
-            prop_assert!((point - section.centre()).dot(facing.ahead) > 0.0);
+            prop_assert!((facing.point(0.0) - section.centre()).dot(facing.ahead) > 0.0, "the middle faces the camera");
             prop_assert!(facing.ahead.dot(facing.side).abs() < 1e-12 && facing.side.z == 0.0);
         }
 
