@@ -1,25 +1,33 @@
-//! The outline of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
+//! The contour of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3};
 use crate::observation::depth_view::{DepthView, Pixel};
 
-/// Places along a limb that are looked at; the ends belong to the neighbours as well.
-pub const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+/// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbours as well.
+const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
 /// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
 const DEPTH_REACH: f64 = 0.12;
-/// A limb seen more nearly end on than this (sine) shows no outline.
+/// A limb whose axis makes an angle with the line of sight of less than this sine (30 degrees) shows no sides: what ends there
+/// is the next limb.
 const ASLANT: f64 = 0.5;
-/// How far beyond the limb's rim its edge is looked for, metres.
+/// How far beyond the limb's rim its edge is looked for, metres: clothes, and the error of a predicted pose.
 const EDGE_REACH: f64 = 0.08;
-/// The same beyond a free limb's tip.
+/// The same beyond a free limb's tip, metres: along its axis a limb slides farther than across.
 const TIP_REACH: f64 = 0.20;
-/// An edge with another limb this near may be that limb's, metres: it tells nothing of girths.
-const APART: f32 = 0.03;
-/// Edges are approached in strides of about this length, metres, of so many half pixels at most.
+/// An edge with the surface of another limb this near, metres, may be that limb's: it tells nothing of girths.
+const OTHERS_EDGE: f32 = 0.03;
+/// Edges are approached in strides of about this length, metres: a fraction of what is fitted, for speed.
 const STRIDE: f64 = 0.008;
+/// A stride is so many steps of half a pixel at most: in a coarse image it would pass over a thin limb.
 const MOST_STEPS: f64 = 4.0;
+/// The first look after the axis is at this share of the rim's distance: what lies well inside the limb is no edge.
+const FIRST_LOOK: f64 = 0.4;
+/// The edge lies between the two last looks: this share of a step before the last one, which saw past the body.
+const EDGE_BEFORE: f64 = 0.25;
+/// Steps are no shorter than those of half a pixel at this depth, metres.
+const NEAREST_STEP: f64 = 0.1;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +95,7 @@ impl ContourSearch {
     /// the image does not tell, or when no edge comes within reach.
     fn edge(&self, view: &DepthView) -> Option<(f64, Vec3)> {
         let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
-        let step = 0.5 * self.start.z.max(0.1) / focal;
+        let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
         let deep = self.thickness + DEPTH_REACH;
         let mut last: Option<(Vec3, f64)> = None;
         let mut r = 0.0;
@@ -107,19 +115,18 @@ impl ContourSearch {
                     let (last, z) = last?;
                     if stride <= step || r - from <= step {
                         // The edge lies between the two last looks.
-                        return Some((r - 0.25 * step, last * (z / last.z)));
+                        return Some((r - EDGE_BEFORE * step, last * (z / last.z)));
                     }
                     (r, stride) = (from, step);
                 }
             }
-            // What lies well inside the limb is no edge: one look on the way out will do.
-            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + stride };
+            r = if r == 0.0 { (FIRST_LOOK * self.rim).max(step) } else { r + stride };
         }
         None
     }
 }
 
-/// The edges of all limbs in all depth images of a frame, and working memory.
+/// The contours of all limbs in all depth images of a frame, and working memory.
 #[derive(Debug, Default)]
 pub struct Contours {
     edges: Vec<Found>,
@@ -196,7 +203,8 @@ impl Contours {
 
     /// The edges on the sides of a limb that were found apart from other limbs.
     pub fn sides(&self, limb: usize) -> impl Iterator<Item = Edge> {
-        let own = move |found: &&Found| found.limb == limb && found.stranger >= APART && found.edge.side != Vec3::Z;
+        let own =
+            move |found: &&Found| found.limb == limb && found.stranger >= OTHERS_EDGE && found.edge.side != Vec3::Z;
         self.edges.iter().filter(own).map(|found| found.edge)
     }
 

@@ -80,7 +80,7 @@ pub struct Correspondences {
     pub limbs: Vec<LimbMatches>,
     /// Sites with positions and rays.
     pub sites: Vec<SitePair>,
-    /// Rims of limbs and the outline of the body in depth images.
+    /// Rims of limbs and the contour of the body in depth images.
     pub contour: Vec<ContourPair>,
     /// Elastic bands.
     pub bands: Vec<Band>,
@@ -126,6 +126,7 @@ impl LimbMatches {
 /// Sums of `values` over two columns in several lanes: no addition waits for the one before, and the order is always the same.
 #[inline(always)]
 fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, f32) -> [f64; N]) -> [f64; N] {
+    /// Sums side by side: one SIMD register of single precision.
     const LANES: usize = 8;
     let mut sums = [[0.0; LANES]; N];
     let ((first, first_rest), (second, second_rest)) = (first.as_chunks::<LANES>(), second.as_chunks::<LANES>());

@@ -5,7 +5,7 @@ use crate::body::Body;
 use crate::math::{Mat3, Pose, Vec3};
 use crate::observation::frame::Frame;
 
-/// Weight of the bands of a limb that nothing measures; only their proportions matter there.
+/// Weight of the bands of a limb that nothing measures, in points; only their proportions matter there.
 const UNMEASURED: f64 = 1.0;
 
 /// Share of a weight that is left when a datum at this distance may always be `bias` off: the force on the site is then

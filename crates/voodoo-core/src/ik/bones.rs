@@ -6,6 +6,9 @@ use super::trunk::{Carrier, Trunk};
 use crate::body::Body;
 use crate::math::Vec3;
 
+/// A limb that the trunk carries starts in it: from this share of its length on it must lie outside.
+const FREE_OF_TRUNK: f64 = 0.5;
+
 /// One segment from the joint of every limb to each joint of its children in the chain, or to the end of a last limb: its
 /// farthest site, else its distal end. A root limb without a joint has none. Radius: the smaller semi-axes
 /// times `margin`, since a limb is at least as wide as they are, however it is turned about itself; with 0 the criterion is J10's.
@@ -29,7 +32,7 @@ pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Bone> {
         let apart = if branches(body, part.limb) {
             1.0
         } else if branches(body, parent) {
-            0.5
+            FREE_OF_TRUNK
         } else {
             0.0
         };

@@ -1,10 +1,11 @@
-//! Step 1: free points inside the enlarged whole-body box, joined by the points known to be on the body (K06 IV-B.1).
+//! Step 1 (K06 IV-B.1): free points inside the enlarged whole-body box, joined by the points known to be on the body.
 
 use crate::body::Body;
 use crate::config::Config;
 use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, widest};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::clusters::Clusters;
+use crate::observation::depth_view::NEAREST_SEEN;
 use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
 
 /// Mark of a point that may belong to any limb.
@@ -67,8 +68,7 @@ impl Candidates {
     }
 
     /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
-    /// whole-body box in the working frame, and pixels of the learnt
-    /// backgrounds are left out.
+    /// whole-body box in the working frame; pixels of the learnt backgrounds are left out.
     pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, backgrounds: &Backgrounds, config: &Config) {
         self.points.clear();
         self.weight.clear();
@@ -133,7 +133,7 @@ impl Candidates {
         let m = columns_f32(&working_from_sensor);
         let points = &mut self.points;
         // A pixel stands for a patch of surface: its size follows from the distance of the body.
-        let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(0.3);
+        let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(NEAREST_BODY);
         let patch = distance * distance / (image.intrinsics[0] * image.intrinsics[1]);
         let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
         let weight = image.weight * patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
@@ -158,6 +158,8 @@ impl Candidates {
     }
 }
 
+/// A body is taken to be no nearer to its camera than this, metres, when a pixel's share of its surface is computed.
+const NEAREST_BODY: f64 = 0.3;
 /// Area of a person that a camera sees, about, m^2; what stands beside counts as well.
 const VISIBLE_AREA: f64 = 0.6;
 /// A depth pixel that stands for this much surface has weight one: 12 mm squared, that of a 160x124 time-of-flight camera
@@ -185,7 +187,7 @@ impl Grid {
     }
 }
 
-/// Pixels of a row that are looked at together.
+/// Pixels of a row that are looked at together: a whole number of SIMD lanes.
 const STRETCH: usize = 32;
 
 /// Visits every `stride`th value with its place in `to`; neighbours fill whole registers.
@@ -295,7 +297,7 @@ pub fn image_window(
     let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
     for corner in bounds.vertices() {
         let corner = working_from_sensor.inverse_transform_point(corner);
-        if corner.z < 0.05 {
+        if corner.z < NEAREST_SEEN {
             return whole;
         }
         for (axis, pixel) in [fx * corner.x / corner.z + cx, fy * corner.y / corner.z + cy].into_iter().enumerate() {

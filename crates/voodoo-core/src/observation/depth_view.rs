@@ -13,7 +13,7 @@ pub struct DepthView<'a> {
     pub background: Option<&'a Background>,
     /// Pose of the camera in the working frame.
     pub working_from_camera: Pose,
-    /// The body was segmented: a pixel without return shows that nothing is there.
+    /// Whoever made the image had the body segmented (cut out): a pixel without return shows that nothing is there.
     pub segmented: bool,
 }
 
@@ -28,8 +28,12 @@ pub enum Pixel {
     Foreground(f64),
 }
 
-/// An image with more pixels without return than this share was segmented.
+/// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
+pub(crate) const NEAREST_SEEN: f64 = 0.05;
+/// An image with more pixels without return than this share was segmented: a sensor alone loses less of a room.
 const SEGMENTED_SHARE: f64 = 0.5;
+/// Every so manyth pixel is asked for that; a prime, so that all columns take part.
+const SEGMENTED_STEP: usize = 97;
 
 /// The depth images of a frame as witnesses.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +68,7 @@ impl DepthView<'_> {
     pub fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
         let [fx, fy, cx, cy] = image.intrinsics;
-        if point.z < 0.05 || image.rays.is_some() {
+        if point.z < NEAREST_SEEN || image.rays.is_some() {
             return Pixel::Unknown;
         }
         let near = 1.0 / point.z;
@@ -93,7 +97,7 @@ pub fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
     found.clear();
     found.extend(frame.images.iter().map(|image| {
         let (mut none, mut all) = (0_u32, 0_u32);
-        for index in (0..image.pixels.len()).step_by(97) {
+        for index in (0..image.pixels.len()).step_by(SEGMENTED_STEP) {
             all += 1;
             none += u32::from(image.pixels.get(index) <= 0.0);
         }

@@ -169,8 +169,10 @@ pub struct MeasuredPixels<'a> {
     pub still: Option<&'a [bool]>,
 }
 
-/// Surfaces farther behind the nearest one than this are others, metres.
+/// Depths within this of the nearest fifth, metres, belong to one surface: a limb is no deeper.
 const ONE_SURFACE: f64 = 0.1;
+/// Fewer points around a place than this are no surface: one or two may be stray returns.
+const FEWEST_POINTS: usize = 3;
 
 impl MeasuredPixels<'_> {
     /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
@@ -200,10 +202,10 @@ impl MeasuredPixels<'_> {
                 }
             }
         }
-        if chosen.len() >= 3 {
+        if chosen.len() >= FEWEST_POINTS {
             near = chosen;
         }
-        if near.len() < 3 {
+        if near.len() < FEWEST_POINTS {
             return Ok(None);
         }
         near.sort_unstable_by(|a, b| self.depths[*a].total_cmp(&self.depths[*b]));

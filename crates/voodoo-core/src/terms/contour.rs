@@ -1,4 +1,4 @@
-//! The body's outline in depth images: no limb stands out of it, and none keeps from an edge that is its own.
+//! The body's contour in depth images: no limb stands out of it, and none keeps from an edge that is its own.
 
 use super::{Term, surface::geman_mcclure};
 use crate::association::correspondence::ContourPair;

@@ -10,10 +10,10 @@ use crate::body::Body;
 use crate::math::{Pose, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 
-/// Width of the inner well in standard deviations of the outer one.
+/// Width of the inner well in standard deviations of the outer one: what is smaller than expected motion counts as noise.
 const WELL: f64 = 0.6;
 /// Share of it that holds the root: what all limbs agree on is less likely noise.
-const ROOT: f64 = 0.2;
+const ROOT_SHARE: f64 = 0.2;
 
 /// Deviation from a predicted pose.
 #[derive(Debug)]
@@ -40,8 +40,8 @@ impl Term for Prior<'_> {
         // Root: rotation and position apart, so that the lever to the working origin does not matter.
         let r = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
         let d = poses[0].translation - self.predicted[0].translation;
-        let (turn_cost, turn) = hold(ROOT * self.still_gain, r.length(), self.root[0]);
-        let (shift_cost, shift) = hold(ROOT * self.still_gain, d.length(), self.root[1]);
+        let (turn_cost, turn) = hold(ROOT_SHARE * self.still_gain, r.length(), self.root[0]);
+        let (shift_cost, shift) = hold(ROOT_SHARE * self.still_gain, d.length(), self.root[1]);
         normal.cost += turn_cost + shift_cost;
         let block = &mut normal.limbs[0];
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {

@@ -8,7 +8,7 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ALONG_LIMB, SEEN_PAST};
+use crate::visibility::{ALONG_LIMB, SEEN_PAST, SEEN_PAST_TO_SCENE};
 
 /// A point this far from the model's surface is not explained by it, metres.
 pub const EXPLAINED: f64 = 0.04;
@@ -109,7 +109,7 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
 fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
     Some(match view.at(point) {
         Pixel::Unknown => return None,
-        Pixel::Background(z) if z > point.z + 0.5 * SEEN_PAST => Sight::FreeSpaceViolation,
+        Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => Sight::FreeSpaceViolation,
         Pixel::Foreground(z) if z > point.z + SEEN_PAST => Sight::FreeSpaceViolation,
         Pixel::Background(z) | Pixel::Foreground(z) if z > point.z - SEEN_PAST => Sight::Consistent,
         _ => Sight::Occluded,

@@ -11,7 +11,7 @@ use crate::math::Pose;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::{ALONG_LIMB, SEEN_PAST};
+use crate::visibility::{ALONG_LIMB, SEEN_PAST, SEEN_PAST_TO_SCENE};
 
 /// Where across a limb places are looked at, in shares of its radius from the middle; nearer to the rim, a pixel shows what
 /// lies beside it.
@@ -22,9 +22,6 @@ const OUTER: f64 = 0.6;
 const OUTER_PLACES: f64 = 10.0;
 /// What a camera sees at a place this near is explained by it, and by any other surface this near, metres along the ray.
 const SAME_DEPTH: f64 = 0.04;
-/// The camera sees past a place when the background lies this much behind it, metres: less than [`SEEN_PAST`], since what is
-/// known to be the scene is not the body.
-const SEEN_PAST_TO_SCENE: f64 = 0.04;
 /// A limb stands before a place when it is nearer to the camera by this, metres: limbs overlap at their joints.
 const BEFORE: f64 = 0.01;
 

@@ -13,3 +13,5 @@ pub mod roundness;
 pub(crate) const ALONG_LIMB: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// A camera sees past the model's surface when what may be the body lies this much behind it, metres.
 pub(crate) const SEEN_PAST: f64 = 0.08;
+/// The same when what lies behind is known to be the background, metres: half, since that is not the body.
+pub(crate) const SEEN_PAST_TO_SCENE: f64 = 0.04;
