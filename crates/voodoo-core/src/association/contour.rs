@@ -217,3 +217,77 @@ impl Contours {
         }));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::observation::background::Backgrounds;
+    use crate::observation::depth_view::DepthViews;
+    use crate::observation::frame::{DepthImage, Frame};
+    use crate::observation::synthetic::image;
+    use crate::shape::TaperedEllipticCylinder;
+
+    const WIDTH: usize = 120;
+    const FOCAL: f64 = 400.0;
+
+    /// What the camera sees of one limb before nothing: the exact ray of every pixel.
+    fn shoot(shape: &TaperedEllipticCylinder, pose: &Pose) -> Vec<f32> {
+        let empty = vec![0.0; WIDTH * WIDTH];
+        let camera: DepthImage = image(&empty, WIDTH, FOCAL);
+        let limb_from_camera = pose.inverse();
+        let depth = |index: usize| {
+            let ray = camera.back_project(index, 1.0);
+            let hit = shape.cast_ray(limb_from_camera.translation, limb_from_camera.rotation * ray, f64::INFINITY);
+            hit.map_or(0.0, |hit| (hit.distance / ray.length()) as f32)
+        };
+        (0..WIDTH * WIDTH).map(depth).collect()
+    }
+
+    /// Runs `ask` with the view of a segmented image.
+    fn with_view<T>(pixels: &[f32], ask: impl FnOnce(DepthView) -> T) -> T {
+        let images = [image(pixels, WIDTH, FOCAL)];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let backgrounds = Backgrounds::default();
+        let views = DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &[true], origin: Vec3::ZERO };
+        ask(views.iter().next().unwrap())
+    }
+
+    /// A forearm across the picture, two metres away, at right angles to the line of sight.
+    fn forearm() -> (Limb, Pose) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let mut limb = body.limbs()[body.limb_index("l_forearm").unwrap()].clone();
+        limb.shape = TaperedEllipticCylinder::new(0.3, 0.05, 0.045, 0.035, 0.03).unwrap();
+        limb.match_caps = [false, true];
+        (limb, Pose::new(Vec3::new(-0.15, 0.0, 2.0), Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0)))
+    }
+
+    #[test]
+    fn the_contour_is_found_where_the_limb_ends() {
+        let (limb, pose) = forearm();
+        let pixel = 2.0 / FOCAL;
+        // The limb in the image is wider and longer than the model by as much.
+        for wider in [-0.01, 0.0, 0.015] {
+            let [a0, b0, a1, b1] =
+                [limb.shape.a0(), limb.shape.b0(), limb.shape.a1(), limb.shape.b1()].map(|axis| axis + wider);
+            let seen = TaperedEllipticCylinder::new(limb.shape.length() + wider, a0, b0, a1, b1).unwrap();
+            let mut found = Vec::new();
+            with_view(&shoot(&seen, &pose), |view| edges(&view, &limb, &pose, |edge| found.push(edge)));
+            assert_eq!(found.len(), 2 * STATIONS.len() + 1, "both sides, and the tip");
+            for edge in found {
+                let off = edge.seen - edge.rim - wider;
+                assert!(off.abs() < pixel, "{wider} wider: off by {off} m at {edge:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_stands_before_a_limb_hides_its_contour_and_an_aslant_limb_has_none() {
+        let (limb, pose) = forearm();
+        let before = vec![1.5_f32; WIDTH * WIDTH];
+        with_view(&before, |view| edges(&view, &limb, &pose, |edge| panic!("{edge:?} before the limb")));
+        // Nearly end on: the far end lies behind the near one.
+        let aslant = Pose::new(Vec3::new(0.0, 0.0, 2.0), Vec3::new(0.0, 0.3, 0.0));
+        with_view(&shoot(&limb.shape, &aslant), |view| edges(&view, &limb, &aslant, |edge| panic!("{edge:?} end on")));
+    }
+}

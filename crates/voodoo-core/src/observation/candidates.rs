@@ -321,7 +321,69 @@ fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::Grid;
+    use super::*;
+    use crate::math::Quat;
+    use crate::observation::frame::Ground;
+    use crate::observation::synthetic::image;
+
+    #[test]
+    fn candidates_are_the_returns_in_the_box_above_the_floor_and_before_the_scene() {
+        let wave = |index: usize| 2.0 + 0.8 * ((index * 37 % 101) as f32 / 101.0);
+        let mut pixels: Vec<f32> = (0..40 * 30).map(wave).collect();
+        pixels.iter_mut().step_by(7).for_each(|depth| *depth = 0.0);
+        pixels[11] = f32::NAN;
+        // The optical axis is the world's x axis, up is z.
+        let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Y, -Vec3::Z, Vec3::X));
+        let world_from_sensor = Pose::from_parts(Vec3::new(0.0, 0.3, 1.0), rotation);
+        let images = [DepthImage { world_from_sensor, source: 3, ..image(&pixels, 40, 60.0) }];
+        let ground = Some(Ground { normal: Vec3::Z, offset: 0.5 });
+        let frame = Frame { images: &images, ground, ..Frame::empty(0.0) };
+        let mut backgrounds = Backgrounds::default();
+        // What is farther than 2.6 m is scene.
+        backgrounds.start(&frame, |_, depths| depths.iter_mut().for_each(|depth| *depth = 2.6 + 1e-6 * *depth));
+        let origin = Vec3::new(2.3, 0.0, 1.0);
+        let bounds = Aabb::new(Vec3::new(-0.4, -0.3, -0.6), Vec3::new(0.4, 0.5, 0.4));
+        let config = Config { max_points: 1_000_000, ..Config::default() };
+        let mut found = Candidates::default();
+        found.gather(&frame, origin, &bounds, &backgrounds, &config);
+        // One pixel after the other, in double precision.
+        let expected: Vec<Vec3> = (0..pixels.len())
+            .filter(|index| pixels[*index] > 0.0)
+            .filter(|index| !Background::holds(2.6 + 1e-6 * pixels[*index], pixels[*index]))
+            .map(|index| world_from_sensor * images[0].back_project(index, pixels[index]))
+            .filter(|point| point.z >= 0.5 + config.ground_clearance)
+            .map(|point| point - origin)
+            .filter(|point| bounds.contains_local_point(*point))
+            .collect();
+        assert!(expected.len() > 100 && expected.len() < 700, "{}", expected.len());
+        assert_eq!(found.len(), expected.len());
+        for (index, point) in expected.iter().enumerate() {
+            assert!((found.points.get(index) - *point).length() < 1e-5, "{index}: {point}");
+        }
+        assert!(found.limb.iter().all(|limb| *limb == ANY_LIMB) && found.source.iter().all(|source| *source == 3));
+        assert_eq!(found.cameras, [(expected.len() as u32, world_from_sensor.translation - origin)]);
+    }
+
+    #[test]
+    fn what_is_known_to_be_on_the_body_passes_every_box() {
+        let points = [[9.0, 9.0, 9.0], [0.1, 0.0, 0.0]];
+        let cloud = |scope| Cloud {
+            points: PointSlice::F64(&points),
+            world_from_sensor: Pose::identity(),
+            weight: 2.0,
+            scope,
+            source: 0,
+        };
+        let bounds = Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0));
+        for (scope, count, limb) in [(Scope::Free, 1, ANY_LIMB), (Scope::Body, 2, ANY_LIMB), (Scope::Limb(4), 2, 4)] {
+            let clouds = [cloud(scope)];
+            let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
+            let mut found = Candidates::default();
+            found.gather(&frame, Vec3::ZERO, &bounds, &Backgrounds::default(), &Config::default());
+            assert_eq!((found.len(), &found.limb[..]), (count, &vec![limb; count][..]), "{scope:?}");
+            assert_eq!(found.weight, vec![2.0; count]);
+        }
+    }
 
     #[test]
     fn a_grid_keeps_the_share_asked_for_and_spreads_it() {

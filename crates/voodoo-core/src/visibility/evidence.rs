@@ -131,10 +131,98 @@ pub fn unexplained(correspondences: &Correspondences, total_weight: f64) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::association::correspondence::LimbMatches;
     use crate::body::{Body, HumanModel};
     use crate::math::Quat;
     use crate::observation::background::Backgrounds;
     use crate::observation::frame::{DepthImage, DepthPixels, Frame};
+    use crate::visibility::render::{Rendering, Viewpoint};
+
+    const WIDTH: usize = 160;
+    const HEIGHT: usize = 120;
+    const INTRINSICS: [f64; 4] = [140.0, 140.0, 79.5, 59.5];
+
+    /// What a camera at the origin sees of a body, and `behind` where it sees none of it, millimetres.
+    fn shoot(body: &Body, poses: &[Pose], behind: u16) -> Vec<u16> {
+        let world_from_sensor = Pose::identity();
+        let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
+        let mut image = Rendering::default();
+        image.render(body, poses, &view, None).unwrap();
+        let millimetres = |depth: &f32| if *depth > 0.0 { (depth * 1000.0).round() as u16 } else { behind };
+        image.depth().iter().map(millimetres).collect()
+    }
+
+    /// What is seen of every limb together.
+    fn seen(pixels: &[u16], body: &Body, poses: &[Pose]) -> Visibility {
+        let images = [DepthImage {
+            pixels: DepthPixels::U16(pixels),
+            width: WIDTH,
+            height: HEIGHT,
+            metres_per_unit: 0.001,
+            intrinsics: INTRINSICS,
+            rays: None,
+            world_from_sensor: Pose::identity(),
+            weight: 1.0,
+            source: 0,
+        }];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let views =
+            DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
+        let mut all = Visibility::default();
+        body.limbs().iter().zip(poses).for_each(|(limb, pose)| all += limb_visibility(views, limb, pose));
+        all
+    }
+
+    /// A person who faces the camera, 2.5 m before it, arms hanging.
+    fn standing(body: &Body) -> Vec<Pose> {
+        let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+        body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.0, 2.5), upright))
+    }
+
+    #[test]
+    fn a_body_where_it_is_seen_costs_little_and_elsewhere_much() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = standing(&body);
+        let pixels = shoot(&body, &poses, 4000);
+        let right = seen(&pixels, &body, &poses);
+        assert!(
+            right.image.front_facing > 500.0 && right.image.free_space < 0.05 * right.image.front_facing,
+            "{right:?}"
+        );
+        // The farther aside, the more of it stands where the camera sees the wall.
+        let mut last = right.cost();
+        for shift in [0.1, 0.2, 0.4] {
+            let aside: Vec<Pose> =
+                poses.iter().map(|pose| Pose::from_parts(pose.translation + shift * Vec3::X, pose.rotation)).collect();
+            let cost = seen(&pixels, &body, &aside).cost();
+            assert!(cost > last + 50.0, "{cost} at {shift} m after {last}");
+            last = cost;
+        }
+    }
+
+    #[test]
+    fn a_body_behind_a_wall_is_hidden_and_before_it_contradicted() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = standing(&body);
+        let wall = |millimetres: u16| seen(&vec![millimetres; WIDTH * HEIGHT], &body, &poses);
+        let (before, behind, nothing) = (wall(1500), wall(4000), wall(0));
+        assert!(before.image.front_facing > 0.0 && before.image.occluded == before.image.front_facing, "{before:?}");
+        assert!(before.image.free_space == 0.0 && behind.image.occluded == 0.0);
+        assert_eq!(behind.image.free_space, behind.image.front_facing);
+        assert!(before.cost() < behind.cost(), "to be hidden is possible, to be seen through is not");
+        assert_eq!(nothing, Visibility::default(), "no return says nothing");
+    }
+
+    #[test]
+    fn points_cost_what_the_surface_leaves_of_them() {
+        let mut all = Correspondences::default();
+        let mut matches = LimbMatches { weight: vec![2.0, 0.0, 1.0, 3.0], ..LimbMatches::default() };
+        matches.surface.signed_distance = vec![0.0, 0.0, -0.02, 0.5];
+        all.limbs.push(matches);
+        // Five points of weight one are matched to nothing at all: `w min(d^2 / c^2, 1)` one by one.
+        let expected = 5.0 + 2.0 * 0.0 + 1.0 * (0.02_f64 / EXPLAINED).powi(2) + 3.0;
+        assert!((unexplained(&all, 5.0 + 2.0 + 1.0 + 3.0) - expected).abs() < 1e-6);
+    }
 
     #[test]
     fn a_limb_seen_aslant_shows_as_much_less_as_its_image_is_shorter() {
