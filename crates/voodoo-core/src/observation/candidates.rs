@@ -6,7 +6,8 @@ use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, widest};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::clusters::Clusters;
 use crate::observation::depth_view::NEAREST_SEEN;
-use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
+use crate::observation::frame::{Cloud, DepthImage, Frame, PointSlice, Scope};
+use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
 
 /// Mark of a point that may belong to any limb.
 pub const ANY_LIMB: u16 = u16::MAX;
@@ -27,22 +28,6 @@ pub struct Candidates {
     pub cameras: Vec<(u32, Vec3)>,
     /// The points once more, neighbours together.
     pub(crate) clusters: Clusters,
-}
-
-/// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
-struct PointGate {
-    low: [f32; 3],
-    high: [f32; 3],
-    up: [f32; 3],
-    floor: f32,
-}
-
-impl PointGate {
-    #[inline(always)]
-    fn passes(&self, p: [f32; 3]) -> bool {
-        let inside = |axis: usize| (p[axis] >= self.low[axis]) & (p[axis] <= self.high[axis]);
-        inside(0) & inside(1) & inside(2) & (p[0] * self.up[0] + p[1] * self.up[1] + p[2] * self.up[2] >= self.floor)
-    }
 }
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
@@ -166,122 +151,6 @@ const VISIBLE_AREA: f64 = 0.6;
 /// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
 pub const REFERENCE_PATCH: f64 = 0.012 * 0.012;
 
-/// Which pixels of an image are used: every so manyth row, and in it every so manyth column.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Grid {
-    rows: usize,
-    columns: usize,
-}
-
-impl Grid {
-    /// About one pixel in `share`, as evenly as whole numbers allow.
-    fn new(share: f64) -> Self {
-        let rows = share.sqrt().floor().max(1.0);
-        let columns = (share / rows).round().max(1.0);
-        Self { rows: rows as usize, columns: columns as usize }
-    }
-
-    /// First column of a row: where columns are wider than rows, those of one row stand between those of the next.
-    fn offset(self, row: usize) -> usize {
-        if self.columns == self.rows { 0 } else { row / self.rows * (self.columns / 2) % self.columns }
-    }
-}
-
-/// Pixels of a row that are looked at together: a whole number of SIMD lanes.
-const STRETCH: usize = 32;
-
-/// Visits every `stride`th value with its place in `to`; neighbours fill whole registers.
-#[inline(always)]
-fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, &T)) {
-    if stride == 1 {
-        to.iter_mut().zip(from).for_each(|(to, value)| visit(to, value));
-    } else {
-        to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, value)| visit(to, value));
-    }
-}
-
-/// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
-struct Stretch {
-    x: [f32; STRETCH],
-    y: [f32; STRETCH],
-    z: [f32; STRETCH],
-}
-
-impl Stretch {
-    #[inline(always)]
-    fn load(image: &DepthImage, background: &[f32], row: usize, start: usize, end: usize, stride: usize) -> Self {
-        let count = STRETCH.min((end - start).div_ceil(stride));
-        let first = row * image.width + start;
-        let scale = image.metres_per_unit as f32;
-        let mut z = [0.0; STRETCH];
-        match image.pixels {
-            DepthPixels::U16(pixels) => {
-                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = f32::from(*pixel) * scale);
-            }
-            DepthPixels::F32(pixels) => {
-                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = *pixel * scale);
-            }
-        }
-        if !background.is_empty() {
-            every(&background[first..], stride, &mut z[..count], |z, depth| {
-                *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
-            });
-        }
-        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
-        let mut x = [0.0; STRETCH];
-        let mut y = [(row as f32 - cy) * (1.0 / fy); STRETCH];
-        match image.rays {
-            Some(rays) => {
-                for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(rays[first..].iter().step_by(stride)).take(count) {
-                    (*x, *y) = (ray[0], ray[1]);
-                }
-            }
-            None => {
-                let inverse = 1.0 / fx;
-                for (x, offset) in x.iter_mut().zip(0_i32..) {
-                    *x = ((start as i32 + offset * stride as i32) as f32 - cx) * inverse;
-                }
-            }
-        }
-        Self { x, y, z }
-    }
-
-    /// Whether any pixel returned anything that is not the background.
-    #[inline(always)]
-    fn returned(&self) -> bool {
-        self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
-    }
-
-    /// Appends the points that returned and lie inside the gate, in order.
-    #[inline(always)]
-    fn gather(&self, m: &[[f32; 3]; 4], gate: &PointGate, points: &mut Points) {
-        let mut p = [[0.0; STRETCH]; 3];
-        let mut passes = [false; STRETCH];
-        for i in 0..STRETCH {
-            let z = self.z[i];
-            let (x, y) = (self.x[i] * z, self.y[i] * z);
-            let place = |axis: usize| m[0][axis] * x + (m[1][axis] * y + (m[2][axis] * z + m[3][axis]));
-            let point = [place(0), place(1), place(2)];
-            // A NaN fails the first comparison.
-            passes[i] = (z > 0.0) & (z < f32::INFINITY) & gate.passes(point);
-            (p[0][i], p[1][i], p[2][i]) = (point[0], point[1], point[2]);
-        }
-        if passes.iter().fold(0, |any, pass| any | u8::from(*pass)) == 0 {
-            return;
-        }
-        let mut kept = 0;
-        for i in 0..STRETCH {
-            // `kept` is at most `i`; the mask only spares the bounds checks.
-            let to = kept % STRETCH;
-            (p[0][to], p[1][to], p[2][to]) = (p[0][i], p[1][i], p[2][i]);
-            kept += usize::from(passes[i]);
-        }
-        points.x.extend_from_slice(&p[0][..kept]);
-        points.y.extend_from_slice(&p[1][..kept]);
-        points.z.extend_from_slice(&p[2][..kept]);
-    }
-}
-
 /// The pixels that can show anything inside the box: the bounds of its projected corners, the whole image when a corner
 /// lies behind the camera or the lens distorts.
 pub fn image_window(
@@ -383,21 +252,5 @@ mod tests {
             assert_eq!((found.len(), &found.limb[..]), (count, &vec![limb; count][..]), "{scope:?}");
             assert_eq!(found.weight, vec![2.0; count]);
         }
-    }
-
-    #[test]
-    fn a_grid_keeps_the_share_asked_for_and_spreads_it() {
-        for tenths in 1..400 {
-            let share = f64::from(tenths) / 10.0;
-            let grid = Grid::new(share);
-            let kept = (grid.rows * grid.columns) as f64 / share.max(1.0);
-            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {share}");
-            assert!((0..50).all(|row| grid.offset(row) < grid.columns));
-        }
-        let columns = |share: f64| [0, 1, 2, 3].map(|row| Grid::new(share).offset(row));
-        assert_eq!((Grid::new(0.3), columns(0.3)), (Grid { rows: 1, columns: 1 }, [0; 4]));
-        assert_eq!((Grid::new(2.0), columns(2.0)), (Grid { rows: 1, columns: 2 }, [0, 1, 0, 1]));
-        assert_eq!((Grid::new(4.0), columns(4.0)), (Grid { rows: 2, columns: 2 }, [0; 4]));
-        assert_eq!((Grid::new(8.0), columns(8.0)), (Grid { rows: 2, columns: 4 }, [0, 0, 2, 2]));
     }
 }

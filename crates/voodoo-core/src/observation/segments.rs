@@ -211,11 +211,11 @@ mod tests {
     use crate::observation::frame::{Cloud, PointSlice, Scope};
 
     #[test]
-    fn heaps_apart_are_blobs_largest_first_and_strays_are_none() {
-        let heap = |at: [f64; 3], count: usize| {
+    fn points_apart_are_segments_largest_first_and_strays_are_none() {
+        let patch = |at: [f64; 3], count: usize| {
             (0..count).map(move |i| [at[0] + 0.01 * (i % 30) as f64, at[1] + 0.01 * (i / 30) as f64, at[2]])
         };
-        let mut points: Vec<[f64; 3]> = heap([1.0, 0.0, 0.0], 600).chain(heap([3.0, 0.0, 0.0], 900)).collect();
+        let mut points: Vec<[f64; 3]> = patch([1.0, 0.0, 0.0], 600).chain(patch([3.0, 0.0, 0.0], 900)).collect();
         // Single returns, half a metre apart, make no bridge between the two.
         points.extend((0..40).map(|i| [0.5 * f64::from(i), 0.5, 1.0]));
         let mut found = Vec::new();

@@ -26,7 +26,7 @@ impl<const N: usize> Block<N> {
 }
 
 /// The results of one block, in the frame of the queries.
-pub(super) struct Surface<const N: usize> {
+pub(super) struct BlockResult<const N: usize> {
     pub points: Block<N>,
     pub normals: Block<N>,
     pub signed_distance: [f32; N],
@@ -35,7 +35,7 @@ pub(super) struct Surface<const N: usize> {
     pub doubtful: [u8; N],
 }
 
-impl<const N: usize> Surface<N> {
+impl<const N: usize> BlockResult<N> {
     pub const ZERO: Self =
         Self { points: Block::ZERO, normals: Block::ZERO, signed_distance: [0.0; N], region: [0; N], doubtful: [0; N] };
 }
@@ -281,7 +281,7 @@ fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f3
 ///
 /// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
 #[inline(always)]
-pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
     let mut limb = Block::<N>::ZERO;
     let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
     for i in 0..N {
