@@ -7,11 +7,13 @@
 mod arrays;
 
 mod body;
+mod borrowed;
 mod config;
 mod errors;
 mod estimate;
 mod frame;
 mod ik;
+mod ik_view;
 mod registration;
 mod render;
 mod shape;
@@ -30,7 +32,9 @@ mod _core {
     #[pymodule_export]
     use super::frame::PyFrame;
     #[pymodule_export]
-    use super::ik::{PyChain, PyView};
+    use super::ik::PyChain;
+    #[pymodule_export]
+    use super::ik_view::PyView;
     #[pymodule_export]
     use super::registration::{nearest_surface, points_within, splat};
     #[pymodule_export]
