@@ -7,8 +7,8 @@ use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::ik::{
-    Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Segment, Solver, Trunk, View, bones, level_rows,
-    log, project, trunk,
+    Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Solver, Trunk, View, bones, level_rows, log,
+    project, trunk,
 };
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::terms::normal_equations::{LimbBlock, line};
@@ -115,7 +115,7 @@ proptest! {
         let view = View { pixels: &pixels, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
         let deep = View { depth: &depth, ..view };
         let mut segments = bones(&body, &model, 0.0);
-        segments.iter_mut().for_each(|segment: &mut Segment| segment.radius = [radius, 0.5 * radius]);
+        segments.iter_mut().for_each(|segment: &mut Bone| segment.radius = [radius, 0.5 * radius]);
         let mut trunk = trunk(&body, &model);
         prop_assert_eq!(trunk.len(), 2);
         // A limb beside the chain, through the body's middle.
@@ -157,7 +157,7 @@ proptest! {
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
         let view = View { pixels: &image, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
         // One short bone beside the shoulder, moved into the trunk by its base.
-        let segment = Segment { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
+        let segment = Bone { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
         let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };
         let mut at = Kinematics::default();
         model.place(&Pose::identity(), &vec![0.0; model.freedoms()], &mut at);

@@ -128,7 +128,7 @@ fn what_one_camera_cannot_prove_another_can() {
     let poses = poses.min_by(|a, b| seen(a).own[1].total_cmp(&seen(b).own[1])).unwrap();
     let (alone, both) = (seen(&poses), proofs(&body, &poses, &shots(&poses))[arm.lower]);
     assert!(alone.known && alone.own[1] < 0.05, "{alone:?}");
-    assert!(both.own[1] > 0.5 && both.past[1] < 0.05, "{both:?}");
+    assert!(both.own[1] > 0.5 && both.free_space[1] < 0.05, "{both:?}");
     // No image, no word.
     assert_eq!(proofs(&body, &poses, &[])[arm.lower], LimbSupport::default());
 }

@@ -4,7 +4,7 @@
 use nalgebra::Vector6;
 use proptest::prelude::*;
 use voodoo_core::Body;
-use voodoo_core::association::correspondence::{Correspondences, EdgePair, LimbMatches, SitePair};
+use voodoo_core::association::correspondence::{ContourPair, Correspondences, LimbMatches, SitePair};
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Vec3};
@@ -67,7 +67,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
-    fn prior(angles in angles(), other in angles(), calm in prop::sample::select(vec![0.0, 30.0])) {
+    fn prior(angles in angles(), other in angles(), still_gain in prop::sample::select(vec![0.0, 30.0])) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let predicted = random_pose(&body, &other);
         // The deviations below reach from the middle of the inner well to beyond its rim.
@@ -76,7 +76,7 @@ proptest! {
         let near: Vec<Pose> = predicted.iter().zip(random_pose(&body, &angles)).map(|(pose, push)| {
             *pose * Pose::new(0.02 * push.translation, 0.01 * push.translation)
         }).collect();
-        check(&body, &near, &|poses, normal| Prior { predicted: &predicted, root: [0.02, 0.04], joints: &sigmas, calm }.add(&body, poses, normal))?;
+        check(&body, &near, &|poses, normal| Prior { predicted: &predicted, root: [0.02, 0.04], joints: &sigmas, still_gain }.add(&body, poses, normal))?;
     }
 
     #[test]
@@ -98,7 +98,7 @@ proptest! {
                 let information = if index % 2 == 0 { Mat3::IDENTITY } else { Mat3::IDENTITY - Mat3::from_cols(d * d.x, d * d.y, d * d.z) };
                 // A ray's target is the closest point on it.
                 let p = if index % 2 == 0 { p } else { p + d * (x - p).dot(d) };
-                SitePair { limb: site.limb, x, p, weight: 1.0, given: 1.0, bias: 0.0, across: Mat3::IDENTITY, information, source: 0 }
+                SitePair { limb: site.limb, x, p, weight: 1.0, base_weight: 1.0, bias: 0.0, across: Mat3::IDENTITY, information, source: 0 }
             }).collect();
             let correspondences = Correspondences { sites: pairs, ..Default::default() };
             Sites { correspondences: &correspondences, information: 1.0, scale: 0.5, biased: true }.add(&body, poses, normal);
@@ -114,11 +114,11 @@ proptest! {
         let normal = Vec3::new(0.6, 0.0, 0.8);
         let targets: Vec<Vec3> = poses.iter().zip(&feet).zip(&offsets).map(|((pose, foot), offset)| *pose * *foot + normal * *offset).collect();
         check(&body, &poses, &|poses, system| {
-            let edges: Vec<EdgePair> = (0..poses.len()).map(|limb| {
+            let edges: Vec<ContourPair> = (0..poses.len()).map(|limb| {
                 let x = poses[limb] * feet[limb];
-                EdgePair { limb, x, normal, distance: normal.dot(targets[limb] - x) }
+                ContourPair { limb, x, normal, distance: normal.dot(targets[limb] - x) }
             }).collect();
-            Contour { edges: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
+            Contour { pairs: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
         })?;
     }
 
@@ -166,7 +166,7 @@ proptest! {
                 matches
             }).collect();
             let correspondences = Correspondences { limbs, ..Default::default() };
-            Surface { correspondences: &correspondences, information: 1.0, slide: 0.07, scale: 0.05 }.add(&body, poses, normal);
+            Surface { correspondences: &correspondences, information: 1.0, tangential_weight: 0.07, scale: 0.05 }.add(&body, poses, normal);
         })?;
     }
 }

@@ -1,54 +1,12 @@
 //! `Frame`: holds references to the caller's arrays until the step reads them.
 
-use numpy::{
-    PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{PyArray2, PyArray3, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::Body;
-use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::observation::frame::Ground;
 
-use crate::arrays::{PointArray, PointView, contiguous, pose, unmasked, vector};
-use crate::errors::{IntoPy, exception};
-
-struct CloudData {
-    points: PointArray,
-    world_from_sensor: Pose,
-    weight: f64,
-    limb: Option<String>,
-    on_body: bool,
-    source: u16,
-}
-
-enum DepthArray {
-    U16(Py<PyArray2<u16>>),
-    F32(Py<PyArray2<f32>>),
-}
-
-enum DepthView<'py> {
-    U16(PyReadonlyArray2<'py, u16>),
-    F32(PyReadonlyArray2<'py, f32>),
-}
-
-struct ImageData {
-    pixels: DepthArray,
-    size: [usize; 2],
-    metres_per_unit: f64,
-    intrinsics: [f64; 4],
-    rays: Option<Py<PyArray3<f32>>>,
-    world_from_sensor: Pose,
-    weight: f64,
-    source: u16,
-}
-
-struct SiteData {
-    site: String,
-    position: Vec3,
-    direction: Option<Vec3>,
-    weight: f64,
-    bias: f64,
-    source: u16,
-}
+use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
+use crate::borrowed::{CloudData, DepthArray, ImageData, SiteData};
+use crate::errors::exception;
 
 /// All measurements of one instant, from any number of sensors.
 ///
@@ -62,57 +20,11 @@ pub struct PyFrame {
     /// Time [s].
     #[pyo3(get)]
     pub stamp: f64,
-    clouds: Vec<CloudData>,
-    images: Vec<ImageData>,
-    sites: Vec<SiteData>,
-    ground: Option<Ground>,
+    pub(crate) clouds: Vec<CloudData>,
+    pub(crate) images: Vec<ImageData>,
+    pub(crate) sites: Vec<SiteData>,
+    pub(crate) ground: Option<Ground>,
     pub sources: Vec<String>,
-}
-
-/// Everything a step borrows: the views keep the arrays alive and readable.
-pub struct Borrowed<'py> {
-    clouds: Vec<(PointView<'py>, Pose, f64, Scope, u16)>,
-    images: Vec<ImageView<'py>>,
-    pub positions: Vec<PositionRelation>,
-    pub rays: Vec<RayRelation>,
-    pub ground: Option<Ground>,
-}
-
-/// Pixels, rays, and the image with everything that is no array.
-type ImageView<'py> = (DepthView<'py>, Option<PyReadonlyArray3<'py, f32>>, DepthImage<'static>);
-
-impl Borrowed<'_> {
-    pub fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
-        self.clouds
-            .iter()
-            .map(|(view, world_from_sensor, weight, scope, source)| {
-                Ok(Cloud {
-                    points: view.slice()?,
-                    world_from_sensor: *world_from_sensor,
-                    weight: *weight,
-                    scope: *scope,
-                    source: *source,
-                })
-            })
-            .collect()
-    }
-
-    pub fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
-        self.images
-            .iter()
-            .map(|(pixels, rays, image)| {
-                let pixels = match pixels {
-                    DepthView::U16(view) => DepthPixels::U16(view.as_slice()?),
-                    DepthView::F32(view) => DepthPixels::F32(view.as_slice()?),
-                };
-                let rays = match rays {
-                    Some(view) => Some(view.as_slice()?.as_chunks().0),
-                    None => None,
-                };
-                Ok(DepthImage { pixels, rays, ..*image })
-            })
-            .collect()
-    }
 }
 
 impl PyFrame {
@@ -122,68 +34,6 @@ impl PyFrame {
             self.sources.len() - 1
         });
         index as u16
-    }
-
-    /// Borrows the arrays and looks the names up in `body`.
-    pub fn borrow_for<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
-        let clouds = self
-            .clouds
-            .iter()
-            .map(|cloud| {
-                let scope = match &cloud.limb {
-                    Some(name) => Scope::Limb(body.limb_index(name).map_err(|error| error.into_py(py))?),
-                    None if cloud.on_body => Scope::Body,
-                    None => Scope::Free,
-                };
-                Ok((cloud.points.view(py), cloud.world_from_sensor, cloud.weight, scope, cloud.source))
-            })
-            .collect::<PyResult<_>>()?;
-        let images = self
-            .images
-            .iter()
-            .map(|image| {
-                let pixels = match &image.pixels {
-                    DepthArray::U16(array) => DepthView::U16(array.bind(py).readonly()),
-                    DepthArray::F32(array) => DepthView::F32(array.bind(py).readonly()),
-                };
-                let rays = image.rays.as_ref().map(|rays| rays.bind(py).readonly());
-                let [height, width] = image.size;
-                let plain = DepthImage {
-                    pixels: DepthPixels::U16(&[]),
-                    width,
-                    height,
-                    metres_per_unit: image.metres_per_unit,
-                    intrinsics: image.intrinsics,
-                    rays: None,
-                    world_from_sensor: image.world_from_sensor,
-                    weight: image.weight,
-                    source: image.source,
-                };
-                (pixels, rays, plain)
-            })
-            .collect();
-        let (mut positions, mut rays) = (Vec::new(), Vec::new());
-        for data in &self.sites {
-            let site = body.site_index(&data.site).map_err(|error| error.into_py(py))?;
-            match data.direction {
-                None => positions.push(PositionRelation {
-                    site,
-                    position: data.position,
-                    weight: data.weight,
-                    bias: data.bias,
-                    source: data.source,
-                }),
-                Some(direction) => rays.push(RayRelation {
-                    site,
-                    origin: data.position,
-                    direction,
-                    weight: data.weight,
-                    bias: data.bias,
-                    source: data.source,
-                }),
-            }
-        }
-        Ok(Borrowed { clouds, images, positions, rays, ground: self.ground })
     }
 }
 

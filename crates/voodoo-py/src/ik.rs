@@ -1,17 +1,18 @@
-//! `Chain` and `View` of inverse kinematics; voodoo.ik validates and names what goes in and out.
+//! `Chain` of inverse kinematics; voodoo.ik validates and names what goes in and out.
 
 use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::ik::{
-    self, Aim, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Segment, Solver, Trunk,
+    self, Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, Trunk,
 };
-use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::math::Vec3;
 
 use crate::arrays::{frozen, limb_poses, matrix, pose};
 use crate::body::PyBody;
 use crate::errors::{IntoPy, exception};
+use crate::ik_view::PyView;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 /// angles, poses, sites, residuals, steps, converged, h
@@ -22,59 +23,6 @@ type GoalParts = (String, String, [f64; 6], f64, usize);
 type SegmentParts = (String, String, f64);
 /// steps, tolerance, still, gain, caution, largest turn
 type OptionParts = (usize, f64, f64, f64, f64, f64);
-
-#[pyclass(name = "View", module = "voodoo._core", frozen)]
-pub struct PyView {
-    pixels: Vec<[f32; 2]>,
-    depth: Vec<f32>,
-    border: f64,
-    width: usize,
-    height: usize,
-    intrinsics: [f64; 4],
-    camera_from_world: Pose,
-}
-
-#[pymethods]
-impl PyView {
-    #[new]
-    fn new(
-        distance: PyReadonlyArray2<'_, f32>,
-        thickness: PyReadonlyArray2<'_, f32>,
-        depth: Option<PyReadonlyArray2<'_, f32>>,
-        border: f64,
-        intrinsics: [f64; 4],
-        camera_from_world: &Bound<'_, PyAny>,
-    ) -> PyResult<Self> {
-        let [height, width] = [distance.shape()[0], distance.shape()[1]];
-        if width < 2 || height < 2 {
-            let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
-            return Err(exception(camera_from_world.py(), "MeasurementError", message));
-        }
-        Ok(Self {
-            pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
-            depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,
-            border,
-            width,
-            height,
-            intrinsics,
-            camera_from_world: pose("camera_from_world", Some(camera_from_world))?,
-        })
-    }
-}
-
-impl PyView {
-    fn view(&self) -> ik::View<'_> {
-        ik::View {
-            pixels: &self.pixels,
-            depth: &self.depth,
-            border: self.border,
-            width: self.width,
-            height: self.height,
-            intrinsics: self.intrinsics,
-            camera_from_world: self.camera_from_world,
-        }
-    }
-}
 
 #[pyclass(name = "Chain", module = "voodoo._core", frozen)]
 pub struct PyChain {
@@ -113,16 +61,16 @@ impl PyChain {
             .collect()
     }
 
-    fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Segment>> {
+    fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Bone>> {
         parts
             .iter()
             .map(|(a, b, radius)| {
-                Ok(Segment { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
+                Ok(Bone { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
             })
             .collect()
     }
 
-    fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Segment>> {
+    fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Bone>> {
         match parts {
             Some(parts) => self.segments(py, &parts),
             None => Ok(ik::bones(&self.body, &self.model, margin)),

@@ -5,13 +5,16 @@
 )]
 
 mod arrays;
-mod beside;
+
 mod body;
+mod borrowed;
 mod config;
 mod errors;
 mod estimate;
 mod frame;
 mod ik;
+mod ik_view;
+mod registration;
 mod render;
 mod shape;
 mod tracker;
@@ -21,8 +24,6 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::beside::{nearest_surface, points_within, splat};
-    #[pymodule_export]
     use super::body::PyBody;
     #[pymodule_export]
     use super::config::config_fields;
@@ -31,7 +32,11 @@ mod _core {
     #[pymodule_export]
     use super::frame::PyFrame;
     #[pymodule_export]
-    use super::ik::{PyChain, PyView};
+    use super::ik::PyChain;
+    #[pymodule_export]
+    use super::ik_view::PyView;
+    #[pymodule_export]
+    use super::registration::{nearest_surface, points_within, splat};
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]

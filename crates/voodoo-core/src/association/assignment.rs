@@ -85,17 +85,17 @@ impl Assignment {
 
 /// Copies places and weights of a limb's sampled candidates.
 fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
-    let LimbMatches { candidate, measured, given, .. } = matches;
+    let LimbMatches { candidate, measured, base_weight, .. } = matches;
     measured.resize(candidate.len());
-    given.resize(candidate.len(), 0.0);
+    base_weight.resize(candidate.len(), 0.0);
     // Columns of one length: one check of the index serves them all.
     let count = candidates.len();
     let Points { x, y, z } = &candidates.points;
     let (x, y, z, weight) = (&x[..count], &y[..count], &z[..count], &candidates.weight[..count]);
-    let places = measured.x.iter_mut().zip(&mut measured.y).zip(&mut measured.z).zip(given);
-    for (index, (((to_x, to_y), to_z), given)) in candidate.iter().zip(places) {
+    let places = measured.x.iter_mut().zip(&mut measured.y).zip(&mut measured.z).zip(base_weight);
+    for (index, (((to_x, to_y), to_z), base_weight)) in candidate.iter().zip(places) {
         let index = *index as usize;
-        (*to_x, *to_y, *to_z, *given) = (x[index], y[index], z[index], weight[index]);
+        (*to_x, *to_y, *to_z, *base_weight) = (x[index], y[index], z[index], weight[index]);
     }
 }
 
@@ -104,15 +104,15 @@ fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
 pub fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, matches: &mut LimbMatches) {
     limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
     let (refused, limit) = (refused_regions(limb), max_distance as f32);
-    let LimbMatches { weight, given, surface, .. } = matches;
-    weight.resize(given.len(), 0.0);
+    let LimbMatches { weight, base_weight, surface, .. } = matches;
+    weight.resize(base_weight.len(), 0.0);
     widest(
         #[inline(always)]
         || {
-            let found = given.iter().zip(&surface.signed_distance).zip(&surface.region);
-            for (weight, ((given, distance), region)) in weight.iter_mut().zip(found) {
+            let found = base_weight.iter().zip(&surface.signed_distance).zip(&surface.region);
+            for (weight, ((base_weight, distance), region)) in weight.iter_mut().zip(found) {
                 let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
-                *weight = if kept { *given } else { 0.0 };
+                *weight = if kept { *base_weight } else { 0.0 };
             }
         },
     );
@@ -128,4 +128,119 @@ fn refused_regions(limb: &Limb) -> u32 {
     let [proximal, distal] = limb.match_caps;
     let both = |cap: Region, rim: Region, matched: bool| if matched { 0 } else { 1 << cap as u32 | 1 << rim as u32 };
     both(Region::ProximalCap, Region::ProximalRim, proximal) | both(Region::DistalCap, Region::DistalRim, distal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::math::Vec3;
+    use crate::observation::background::Backgrounds;
+    use crate::observation::candidates::body_box;
+    use crate::observation::frame::{Cloud, Frame, PointSlice, Scope};
+
+    const MARGIN: f64 = 0.1;
+
+    /// A body, and points around it, the last ten known to lie on limb 3.
+    fn scene() -> (Body, Vec<Pose>, Candidates) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = body.rest_pose(Pose::identity());
+        let points: Vec<[f64; 3]> = (0..3000_usize)
+            .map(|n| [0.4, 0.9, 2.4].map(|size| size * 1e-3 * ((n * 7919 + (size * 1e3) as usize * n) % 1000) as f64))
+            .map(|[x, y, z]| [x - 0.2, y - 0.45, z - 1.2])
+            .collect();
+        let cloud = |points, scope| Cloud {
+            points: PointSlice::F64(points),
+            world_from_sensor: Pose::identity(),
+            weight: 1.0,
+            scope,
+            source: 0,
+        };
+        let clouds = [cloud(&points, Scope::Free), cloud(&points[..10], Scope::Limb(3))];
+        let mut candidates = Candidates::default();
+        let bounds = body_box(&body, &poses, 0.3);
+        let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
+        candidates.gather(&frame, Vec3::ZERO, &bounds, &Backgrounds::default(), &Config::default());
+        assert!(candidates.len() > 1500);
+        (body, poses, candidates)
+    }
+
+    /// The limbs that hold each candidate after an assignment.
+    fn holders(overlap: Overlap) -> (Body, Vec<Pose>, Candidates, Vec<Vec<usize>>) {
+        let (body, poses, candidates) = scene();
+        let mut assignment = Assignment::default();
+        assignment.assign(&body, &poses, &candidates, overlap, MARGIN);
+        let mut holders = vec![Vec::new(); candidates.len()];
+        for (limb, members) in assignment.members[..poses.len()].iter().enumerate() {
+            assert!(members.is_sorted_by(|a, b| a < b), "ascending, none twice");
+            members.iter().for_each(|index| holders[*index as usize].push(limb));
+        }
+        (body, poses, candidates, holders)
+    }
+
+    /// Whether a limb's enlarged box holds a candidate; `None` within rounding of its border.
+    fn in_box(body: &Body, poses: &[Pose], limb: usize, point: Vec3) -> Option<bool> {
+        let (bounds, local) = (body.limbs()[limb].shape.local_aabb(), poses[limb].inverse_transform_point(point));
+        let outside = (bounds.mins - local).max(local - bounds.maxs).max_element() - MARGIN;
+        (outside.abs() > 1e-5).then_some(outside < 0.0)
+    }
+
+    #[test]
+    fn shared_gives_a_point_to_every_limb_whose_box_holds_it() {
+        let (body, poses, candidates, holders) = holders(Overlap::Shared);
+        for (index, holders) in holders.iter().enumerate().filter(|(index, _)| candidates.limb[*index] == ANY_LIMB) {
+            for limb in 0..poses.len() {
+                if let Some(inside) = in_box(&body, &poses, limb, candidates.points.get(index)) {
+                    assert_eq!(holders.contains(&limb), inside, "point {index}, limb {limb}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn exclusive_gives_a_point_to_one_limb_and_known_points_to_theirs() {
+        let (body, poses, candidates, holders) = holders(Overlap::Exclusive);
+        let mut near = 0;
+        for (index, holders) in holders.iter().enumerate() {
+            if candidates.limb[index] != ANY_LIMB {
+                assert_eq!(*holders, [3]);
+                continue;
+            }
+            assert!(holders.len() <= 1);
+            let point = candidates.points.get(index);
+            let distance = |limb: usize| {
+                body.limbs()[limb].shape.closest_point(poses[limb].inverse_transform_point(point)).signed_distance
+            };
+            let Some(limb) = holders.first() else { continue };
+            let least = (0..poses.len()).map(distance).fold(f64::INFINITY, f64::min);
+            // By a distance that is rough away from the surface: right wherever it is near and outside.
+            if least > 0.0 && least < 0.03 {
+                assert!(distance(*limb) < least + 0.01, "point {index}: {} m, not {least} m", distance(*limb));
+                near += 1;
+            }
+        }
+        assert!(near > 50, "{near}");
+    }
+
+    #[test]
+    fn sampling_keeps_what_the_configuration_says() {
+        let config = Config { sampling_factor: 4, min_limb_points: 20, max_limb_points: 60, ..Config::default() };
+        for (members, kept) in [(0, 0), (10, 10), (40, 20), (100, 25), (1000, 60)] {
+            assert_eq!(sampled_count(members, &config), kept, "of {members}");
+        }
+    }
+
+    #[test]
+    fn far_points_and_caps_at_joints_weigh_nothing() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let limb = &body.limbs()[body.limb_index("l_forearm").unwrap()];
+        let (length, radius) = (limb.shape.length(), limb.shape.a0());
+        let mut matches = LimbMatches::default();
+        for place in [[radius + 0.01, 0.0, 0.4 * length], [0.5, 0.0, 0.4 * length], [0.0, 0.0, -0.02]] {
+            matches.measured.push(place.map(|value| value as f32));
+            matches.base_weight.push(0.7);
+        }
+        match_limb(limb, &Pose::identity(), 0.15, &mut matches);
+        assert_eq!(matches.weight, [0.7, 0.0, 0.0], "beside the limb, too far, beyond the elbow");
+    }
 }

@@ -1,25 +1,33 @@
-//! The outline of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
+//! The contour of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
 
-use crate::association::correspondence::EdgePair;
+use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3};
-use crate::observation::depth_view::{Pixel, View};
+use crate::observation::depth_view::{DepthView, Pixel};
 
-/// Places along a limb that are looked at; the ends belong to the neighbours as well.
-pub const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+/// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbours as well.
+const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
 /// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
 const DEPTH_REACH: f64 = 0.12;
-/// A limb seen more nearly end on than this (sine) shows no outline.
+/// A limb whose axis makes an angle with the line of sight of less than this sine (30 degrees) shows no sides: what ends there
+/// is the next limb.
 const ASLANT: f64 = 0.5;
-/// How far beyond the limb's rim its edge is looked for, metres.
+/// How far beyond the limb's rim its edge is looked for, metres: clothes, and the error of a predicted pose.
 const EDGE_REACH: f64 = 0.08;
-/// The same beyond a free limb's tip.
+/// The same beyond a free limb's tip, metres: along its axis a limb slides farther than across.
 const TIP_REACH: f64 = 0.20;
-/// An edge with another limb this near may be that limb's, metres: it tells nothing of girths.
-const APART: f32 = 0.03;
-/// Edges are approached in strides of about this length, metres, of so many half pixels at most.
+/// An edge with the surface of another limb this near, metres, may be that limb's: it tells nothing of girths.
+const OTHERS_EDGE: f32 = 0.03;
+/// Edges are approached in strides of about this length, metres: a fraction of what is fitted, for speed.
 const STRIDE: f64 = 0.008;
+/// A stride is so many steps of half a pixel at most: in a coarse image it would pass over a thin limb.
 const MOST_STEPS: f64 = 4.0;
+/// The first look after the axis is at this share of the rim's distance: what lies well inside the limb is no edge.
+const FIRST_LOOK: f64 = 0.4;
+/// The edge lies between the two last looks: this share of a step before the last one, which saw past the body.
+const EDGE_BEFORE: f64 = 0.25;
+/// Steps are no shorter than those of half a pixel at this depth, metres.
+const NEAREST_STEP: f64 = 0.1;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +46,7 @@ pub struct Edge {
 }
 
 /// Looks for the edges on both sides of a limb, and at its tip when it ends free.
-pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
+pub fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
@@ -49,20 +57,15 @@ pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl
         }
     };
     for t in STATIONS {
-        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
-        let axis = Vec3::new(0.0, 0.0, t * shape.length());
-        let centre = camera_from_limb * axis;
-        let sight = camera_from_limb.inverse_transform_vector(-centre);
-        let Some(ahead) = sight.with_z(0.0).try_normalize() else { continue };
+        let section = shape.section(t);
+        let Some(facing) = section.facing(&camera_from_limb) else { continue };
         // Seen nearly end on, a limb has no sides.
-        if sight.with_z(0.0).length() < ASLANT * sight.length() {
+        if facing.across.length() < ASLANT * facing.to_camera.length() {
             continue;
         }
-        let thickness = length(a * ahead.x, b * ahead.y);
-        for side in [Vec3::new(-ahead.y, ahead.x, 0.0), Vec3::new(ahead.y, -ahead.x, 0.0)] {
-            let rim = length(a * side.x, b * side.y);
-            let foot = Vec3::new(a * a * side.x / rim, b * b * side.y / rim, axis.z);
-            look(axis, side, rim, thickness, foot, EDGE_REACH);
+        let thickness = section.extent(facing.ahead);
+        for side in [facing.side, -facing.side] {
+            look(section.centre(), side, section.extent(side), thickness, section.farthest_point(side), EDGE_REACH);
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
@@ -78,10 +81,6 @@ pub fn edges(view: &View, limb: &Limb, working_from_limb: &Pose, mut found: impl
     }
 }
 
-fn length(x: f64, y: f64) -> f64 {
-    (x * x + y * y).sqrt()
-}
-
 /// A way across an image: from a point along a direction (camera frame), metres.
 struct ContourSearch {
     start: Vec3,
@@ -94,9 +93,9 @@ struct ContourSearch {
 impl ContourSearch {
     /// How far from the start the body ends, and the last place seen on it; `None` when another thing stands before it, when
     /// the image does not tell, or when no edge comes within reach.
-    fn edge(&self, view: &View) -> Option<(f64, Vec3)> {
+    fn edge(&self, view: &DepthView) -> Option<(f64, Vec3)> {
         let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
-        let step = 0.5 * self.start.z.max(0.1) / focal;
+        let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
         let deep = self.thickness + DEPTH_REACH;
         let mut last: Option<(Vec3, f64)> = None;
         let mut r = 0.0;
@@ -116,21 +115,20 @@ impl ContourSearch {
                     let (last, z) = last?;
                     if stride <= step || r - from <= step {
                         // The edge lies between the two last looks.
-                        return Some((r - 0.25 * step, last * (z / last.z)));
+                        return Some((r - EDGE_BEFORE * step, last * (z / last.z)));
                     }
                     (r, stride) = (from, step);
                 }
             }
-            // What lies well inside the limb is no edge: one look on the way out will do.
-            r = if r == 0.0 { (0.4 * self.rim).max(step) } else { r + stride };
+            r = if r == 0.0 { (FIRST_LOOK * self.rim).max(step) } else { r + stride };
         }
         None
     }
 }
 
-/// The edges of all limbs in all depth images of a frame, and working memory.
+/// The contours of all limbs in all depth images of a frame, and working memory.
 #[derive(Debug, Default)]
-pub struct Contour {
+pub struct Contours {
     edges: Vec<Found>,
     places: Points,
     distance: Vec<f32>,
@@ -149,14 +147,14 @@ struct Found {
     stranger: f32,
 }
 
-impl Contour {
+impl Contours {
     /// Forgets all edges.
     pub fn clear(&mut self) {
         self.edges.clear();
     }
 
     /// Looks for the edges at `poses`.
-    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = View<'a>>) {
+    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = DepthView<'a>>) {
         self.edges.clear();
         self.places.clear();
         for view in views {
@@ -205,16 +203,91 @@ impl Contour {
 
     /// The edges on the sides of a limb that were found apart from other limbs.
     pub fn sides(&self, limb: usize) -> impl Iterator<Item = Edge> {
-        let own = move |found: &&Found| found.limb == limb && found.stranger >= APART && found.edge.side != Vec3::Z;
+        let own =
+            move |found: &&Found| found.limb == limb && found.stranger >= OTHERS_EDGE && found.edge.side != Vec3::Z;
         self.edges.iter().filter(own).map(|found| found.edge)
     }
 
     /// The rims at `poses` and the edges that were found, as pairs.
-    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<EdgePair>) {
+    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
         pairs.clear();
         pairs.extend(self.edges.iter().map(|Found { limb, edge, target, .. }| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
-            EdgePair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
+            ContourPair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
         }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::observation::background::Backgrounds;
+    use crate::observation::depth_view::DepthViews;
+    use crate::observation::frame::{DepthImage, Frame};
+    use crate::observation::synthetic::image;
+    use crate::shape::TaperedEllipticCylinder;
+
+    const WIDTH: usize = 120;
+    const FOCAL: f64 = 400.0;
+
+    /// What the camera sees of one limb before nothing: the exact ray of every pixel.
+    fn shoot(shape: &TaperedEllipticCylinder, pose: &Pose) -> Vec<f32> {
+        let empty = vec![0.0; WIDTH * WIDTH];
+        let camera: DepthImage = image(&empty, WIDTH, FOCAL);
+        let limb_from_camera = pose.inverse();
+        let depth = |index: usize| {
+            let ray = camera.back_project(index, 1.0);
+            let hit = shape.cast_ray(limb_from_camera.translation, limb_from_camera.rotation * ray, f64::INFINITY);
+            hit.map_or(0.0, |hit| (hit.distance / ray.length()) as f32)
+        };
+        (0..WIDTH * WIDTH).map(depth).collect()
+    }
+
+    /// Runs `ask` with the view of a segmented image.
+    fn with_view<T>(pixels: &[f32], ask: impl FnOnce(DepthView) -> T) -> T {
+        let images = [image(pixels, WIDTH, FOCAL)];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let backgrounds = Backgrounds::default();
+        let views = DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &[true], origin: Vec3::ZERO };
+        ask(views.iter().next().unwrap())
+    }
+
+    /// A forearm across the picture, two metres away, at right angles to the line of sight.
+    fn forearm() -> (Limb, Pose) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let mut limb = body.limbs()[body.limb_index("l_forearm").unwrap()].clone();
+        limb.shape = TaperedEllipticCylinder::new(0.3, 0.05, 0.045, 0.035, 0.03).unwrap();
+        limb.match_caps = [false, true];
+        (limb, Pose::new(Vec3::new(-0.15, 0.0, 2.0), Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0)))
+    }
+
+    #[test]
+    fn the_contour_is_found_where_the_limb_ends() {
+        let (limb, pose) = forearm();
+        let pixel = 2.0 / FOCAL;
+        // The limb in the image is wider and longer than the model by as much.
+        for wider in [-0.01, 0.0, 0.015] {
+            let [a0, b0, a1, b1] =
+                [limb.shape.a0(), limb.shape.b0(), limb.shape.a1(), limb.shape.b1()].map(|axis| axis + wider);
+            let seen = TaperedEllipticCylinder::new(limb.shape.length() + wider, a0, b0, a1, b1).unwrap();
+            let mut found = Vec::new();
+            with_view(&shoot(&seen, &pose), |view| edges(&view, &limb, &pose, |edge| found.push(edge)));
+            assert_eq!(found.len(), 2 * STATIONS.len() + 1, "both sides, and the tip");
+            for edge in found {
+                let off = edge.seen - edge.rim - wider;
+                assert!(off.abs() < pixel, "{wider} wider: off by {off} m at {edge:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_stands_before_a_limb_hides_its_contour_and_an_aslant_limb_has_none() {
+        let (limb, pose) = forearm();
+        let before = vec![1.5_f32; WIDTH * WIDTH];
+        with_view(&before, |view| edges(&view, &limb, &pose, |edge| panic!("{edge:?} before the limb")));
+        // Nearly end on: the far end lies behind the near one.
+        let aslant = Pose::new(Vec3::new(0.0, 0.0, 2.0), Vec3::new(0.0, 0.3, 0.0));
+        with_view(&shoot(&limb.shape, &aslant), |view| edges(&view, &limb, &aslant, |edge| panic!("{edge:?} end on")));
     }
 }

@@ -12,8 +12,8 @@ pub struct LimbMatches {
     pub candidate: Vec<u32>,
     /// Measured points.
     pub measured: Points,
-    /// Weights as they were given.
-    pub given: Vec<f32>,
+    /// Weights of the measurements, before any pair is rejected.
+    pub base_weight: Vec<f32>,
     /// Weights.
     pub weight: Vec<f32>,
     /// Closest points, normals, signed distances.
@@ -31,8 +31,8 @@ pub struct SitePair {
     pub p: Vec3,
     /// Scalar weight, as the papers use it, of what is beyond the bias.
     pub weight: f64,
-    /// Scalar weight as it was given.
-    pub given: f64,
+    /// Scalar weight of the measurement, before its bias is taken off.
+    pub base_weight: f64,
     /// The measurement may always be this far off, metres.
     pub bias: f64,
     /// What of a difference counts: the identity for a position, `I - d d^T` for a ray along `d`.
@@ -45,7 +45,7 @@ pub struct SitePair {
 
 /// A point of a limb's rim and the edge that an image shows there: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EdgePair {
+pub struct ContourPair {
     /// The limb.
     pub limb: usize,
     /// The rim's point.
@@ -80,8 +80,8 @@ pub struct Correspondences {
     pub limbs: Vec<LimbMatches>,
     /// Sites with positions and rays.
     pub sites: Vec<SitePair>,
-    /// Rims of limbs and the outline of the body in depth images.
-    pub edges: Vec<EdgePair>,
+    /// Rims of limbs and the contour of the body in depth images.
+    pub contour: Vec<ContourPair>,
     /// Elastic bands.
     pub bands: Vec<Band>,
 }
@@ -91,7 +91,7 @@ impl LimbMatches {
     pub(crate) fn reserve(&mut self, len: usize) {
         self.candidate.reserve(len.saturating_sub(self.candidate.len()));
         self.measured.reserve(len);
-        self.given.reserve(len.saturating_sub(self.given.len()));
+        self.base_weight.reserve(len.saturating_sub(self.base_weight.len()));
         self.weight.reserve(len.saturating_sub(self.weight.len()));
         self.surface.reserve(len);
     }
@@ -126,6 +126,7 @@ impl LimbMatches {
 /// Sums of `values` over two columns in several lanes: no addition waits for the one before, and the order is always the same.
 #[inline(always)]
 fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, f32) -> [f64; N]) -> [f64; N] {
+    /// Sums side by side: one SIMD register of single precision.
     const LANES: usize = 8;
     let mut sums = [[0.0; LANES]; N];
     let ((first, first_rest), (second, second_rest)) = (first.as_chunks::<LANES>(), second.as_chunks::<LANES>());

@@ -5,7 +5,7 @@ use crate::body::Body;
 use crate::math::{Mat3, Pose, Vec3};
 use crate::observation::frame::Frame;
 
-/// Weight of the bands of a limb that nothing measures; only their proportions matter there.
+/// Weight of the bands of a limb that nothing measures, in points; only their proportions matter there.
 const UNMEASURED: f64 = 1.0;
 
 /// Share of a weight that is left when a datum at this distance may always be `bias` off: the force on the site is then
@@ -32,7 +32,7 @@ impl Correspondences {
                 x,
                 p,
                 weight,
-                given: relation.weight,
+                base_weight: relation.weight,
                 bias: relation.bias,
                 across: Mat3::IDENTITY,
                 information: Mat3::IDENTITY * weight,
@@ -53,7 +53,7 @@ impl Correspondences {
                 x,
                 p,
                 weight,
-                given: relation.weight,
+                base_weight: relation.weight,
                 bias: relation.bias,
                 across,
                 information: across * weight,
@@ -91,5 +91,85 @@ impl Correspondences {
                 });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::association::correspondence::LimbMatches;
+    use crate::body::HumanModel;
+    use crate::observation::frame::{PositionRelation, RayRelation};
+
+    #[test]
+    fn the_bands_of_a_limb_weigh_a_fixed_share_of_its_measurements() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = body.rest_pose(Pose::identity());
+        let mut all = Correspondences::default();
+        all.limbs.resize_with(poses.len(), LimbMatches::default);
+        for (limb, matches) in all.limbs.iter_mut().enumerate() {
+            matches.weight = vec![0.5; 3 * limb];
+        }
+        all.add_bands(&body, &poses, 0.4, &mut Vec::new());
+        let joints: usize =
+            body.limbs().iter().flat_map(|limb| &limb.parent).map(|(_, joint)| joint.band_count()).sum();
+        assert_eq!(all.bands.len(), joints);
+        for limb in 0..poses.len() {
+            // Every band counts at both of its ends.
+            let on_parent = all.bands.iter().filter(|band| band.parent == limb).map(|band| band.parent_weight);
+            let on_child = all.bands.iter().filter(|band| band.child == limb).map(|band| band.child_weight);
+            let total: f64 = on_parent.chain(on_child).sum();
+            let measured = 0.5 * (3 * limb) as f64;
+            let expected = if measured > 0.0 { 0.4 * measured } else { UNMEASURED };
+            assert!((total - expected).abs() < 1e-9, "limb {limb}: {total} of {measured}");
+        }
+        for band in &all.bands {
+            assert!((band.on_parent - band.on_child).length() < 1e-9, "closed joints have bands of length zero");
+        }
+    }
+
+    #[test]
+    fn a_ray_draws_its_site_to_its_nearest_point() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = body.rest_pose(Pose::from_translation(Vec3::new(0.0, 0.0, 1.0)));
+        let site = body.site_index("l_wrist").unwrap();
+        let x = poses[body.sites()[site].limb] * body.sites()[site].position;
+        let ray =
+            |origin: Vec3, direction: Vec3, bias| RayRelation { site, origin, direction, weight: 2.0, bias, source: 1 };
+        let rays = [
+            ray(Vec3::new(2.0, 0.5, 1.2), Vec3::new(-1.0, 0.1, -0.2), 0.0),
+            // The site lies behind this one: its start is the nearest point.
+            ray(x + Vec3::new(0.3, 0.0, 0.0), Vec3::X, 0.1),
+        ];
+        let origin = Vec3::new(0.1, -0.2, 0.3);
+        let working: Vec<Pose> =
+            poses.iter().map(|pose| Pose::from_parts(pose.translation - origin, pose.rotation)).collect();
+        let mut all = Correspondences::default();
+        all.add_sites(&body, &working, &Frame { rays: &rays, ..Frame::empty(0.0) }, origin);
+        for (pair, ray) in all.sites.iter().zip(&rays) {
+            // A dense search along the ray.
+            let steps = (0..400_000).map(|k| ray.origin - origin + ray.direction * (1e-5 * f64::from(k)));
+            let nearest = steps.map(|place| place.distance(pair.x)).fold(f64::INFINITY, f64::min);
+            assert!((pair.x.distance(pair.p) - nearest).abs() < 1e-5, "{pair:?}");
+            assert!((pair.across * ray.direction).length() < 1e-9, "nothing holds along the ray");
+        }
+        // A third of 0.3 m may be bias.
+        assert!((all.sites[1].weight - 2.0 * (1.0 - 0.1 / 0.3)).abs() < 1e-9 && all.sites[1].base_weight == 2.0);
+    }
+
+    #[test]
+    fn a_position_within_its_bias_says_nothing() {
+        let body = Body::human(1.75, HumanModel::Papers).unwrap();
+        let poses = body.rest_pose(Pose::identity());
+        let site = body.site_index("r_hip").unwrap();
+        let x = poses[body.sites()[site].limb] * body.sites()[site].position;
+        let position =
+            |off: f64| PositionRelation { site, position: x + off * Vec3::Y, weight: 4.0, bias: 0.05, source: 0 };
+        let positions = [position(0.04), position(0.2)];
+        let mut all = Correspondences::default();
+        all.add_sites(&body, &poses, &Frame { positions: &positions, ..Frame::empty(0.0) }, Vec3::ZERO);
+        assert_eq!(all.sites[0].weight, 0.0);
+        // The force, weight times distance, is that of what is beyond the bias.
+        assert!((all.sites[1].weight * 0.2 - 4.0 * 0.15).abs() < 1e-9);
     }
 }

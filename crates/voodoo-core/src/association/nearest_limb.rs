@@ -1,4 +1,4 @@
-//! Step 2's question, for many points at once: which limb is nearest, of those whose enlarged boxes hold a point.
+//! Step 2's question (K06 IV-B.2), for many points at once: which limb is nearest, of those whose enlarged boxes hold a point.
 //!
 //! The bounds of a cluster of points give every limb a distance that none of them can come nearer. Only limbs that can still be
 //! the nearest of one of them are looked at point by point.
@@ -15,7 +15,10 @@ const OUTSIDE: f32 = f32::INFINITY;
 const LANES: usize = 8;
 /// What single precision may err in the place of a box, metres, and as a share of the coordinates it was computed from; bounds
 /// are that much wider.
-const ROUNDING: (f32, f32) = (1e-4, 1e-6);
+const SINGLE_PRECISION: (f32, f32) = (1e-4, 1e-6);
+
+/// Semi-axes are taken for no less than this, metres, near a tip: their product divides.
+const THINNEST: f32 = 1e-4;
 
 type Lanes = [f32; LANES];
 type Squares = [f32; CLUSTER];
@@ -173,7 +176,8 @@ impl Group {
     #[inline(always)]
     fn least_squares(&self, bounds: &Bounds) -> Lanes {
         let (c, h) = (bounds.centre, bounds.half);
-        let slack = ROUNDING.0 + ROUNDING.1 * [c, h].as_flattened().iter().map(|value| value.abs()).sum::<f32>();
+        let slack = SINGLE_PRECISION.0
+            + SINGLE_PRECISION.1 * [c, h].as_flattened().iter().map(|value| value.abs()).sum::<f32>();
         let at_least = |value: f32, least: f32| if value > least { value } else { least };
         let mut found = [OUTSIDE; LANES];
         for l in 0..LANES {
@@ -266,8 +270,8 @@ impl LimbBox {
         let along = if local[2] > 0.0 { local[2] } else { 0.0 };
         let along = if along < self.length { along } else { self.length };
         let at_least = |value: f32, least: f32| if value > least { value } else { least };
-        let a = at_least(self.a[0] + self.a[1] * along, 1e-4);
-        let b = at_least(self.b[0] + self.b[1] * along, 1e-4);
+        let a = at_least(self.a[0] + self.a[1] * along, THINNEST);
+        let b = at_least(self.b[0] + self.b[1] * along, THINNEST);
         let over = 1.0 / (a * b);
         let (over_a, over_b) = (b * over, a * over);
         let (u, v) = (local[0] * over_a, local[1] * over_b);

@@ -2,7 +2,7 @@
 //!
 //! The closest point of the surface is on the far side as soon as a limb is its radius too near to the camera. Matched there, the
 //! points would hold the limb where it is. They are matched to the point that the camera sees before it in the same slice
-//! instead, and draw the limb back to them. At the outline the two coincide: nothing jumps. Points behind a limb keep their
+//! instead, and draw the limb back to them. At the contour the two coincide: nothing jumps. Points behind a limb keep their
 //! closest point: they may belong to what lies behind it.
 
 use std::ops::Range;
@@ -41,7 +41,7 @@ pub fn match_visible_side(
     }
 }
 
-/// Matches looked at together.
+/// Matches looked at together: a whole number of SIMD lanes.
 const LANES: usize = 32;
 
 /// Which matches, of points inside, are on the side that faces away from a camera.

@@ -5,11 +5,11 @@ use crate::body::kinematics::joint_turn;
 use crate::error::TrackError;
 use crate::math::{Mat3, Moments, Pose, Quat, Vec3};
 
-/// A hinge bent by less than this does not tell its axis; radians.
+/// A hinge bent by less than this does not tell its axis: sine of the angle between its limbs.
 const BENT: f64 = 0.3;
 /// Squares of coordinates up to these metres leave enough digits for a body; those of a map (UTM) do not.
-const NEAR: f64 = 1e4;
-/// Nobody means a body so many times larger or smaller than the one that was given: the positions are not in metres.
+const NEAR_ORIGIN: f64 = 1e4;
+/// Nobody means a body so many times larger or smaller than the reference body: the positions are not in metres.
 const LARGEST: f64 = 10.0;
 /// A landmark this share of a limb's length from its joint shows where the limb points.
 const FAR_END: f64 = 0.5;
@@ -21,9 +21,20 @@ const RIGID: f64 = 1.0;
 const UNLIKE: f64 = 0.75;
 /// Limbs whose axes are no farther apart than 30 degrees (cosine) are in line: where their joint is along it is hard to see.
 const STRAIGHT: f64 = 0.866;
-/// Weight and lever (metres) of the prior orientation against landmarks of weight one.
+/// Weight of the prior orientation against landmarks of weight one: it decides only what they leave open.
 const PRIOR_WEIGHT: f64 = 0.01;
+/// Lever of the prior orientation, metres: about the distance of landmarks on a limb.
 const PRIOR_LEVER: f64 = 0.1;
+
+/// Landmarks that lie this share of a limb's length apart along it tell how long it is.
+const SPREAD_ALONG: f64 = 0.3;
+/// No limb is stretched by more than this factor, or shrunk by more: it would be another person's, or a wrong landmark.
+const MOST_STRETCH: f64 = 2.0;
+/// Points lie on a line when the products of pairs of their scatter's eigenvalues are this share of its squared trace: as broad
+/// as a hundredth of their length.
+const ON_A_LINE: f64 = 1e-4;
+/// Points whose scatter has no larger trace than this, square metres, are one point.
+const ON_A_POINT: f64 = 1e-8;
 
 impl Body {
     /// World poses of all limbs, and the body itself in the sizes that the positions tell, from positions of sites.
@@ -44,7 +55,7 @@ impl Body {
             }
         }
         let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
-        if farthest <= NEAR {
+        if farthest <= NEAR_ORIGIN {
             return self.fit_near(positions, fit_sizes);
         }
         let origin = positions[0].1;
@@ -207,7 +218,7 @@ impl Body {
         for axis in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
             moments.add(PRIOR_WEIGHT, middle + PRIOR_LEVER * axis, mean + PRIOR_LEVER * axis);
         }
-        let turn = moments.absolute_orientation(0.1).map_or(Quat::IDENTITY, |pose| pose.rotation);
+        let turn = moments.absolute_orientation(PRIOR_LEVER).map_or(Quat::IDENTITY, |pose| pose.rotation);
         let mut rotation = turn * prior.rotation;
         if let Some((axis, hinge)) = self.hinge_axis(limb, positions) {
             rotation = twist_towards(rotation, axis, hinge);
@@ -263,9 +274,13 @@ impl Body {
         let shape = self.limbs[limb].shape;
         let ratio = |axis: usize, enough: f64| {
             let (modelled, measured) = (spread(axis, |pair| pair.0), spread(axis, |pair| pair.1));
-            if modelled > enough && measured > 0.0 { (measured / modelled).clamp(0.5, 2.0) } else { 1.0 }
+            if modelled > enough && measured > 0.0 {
+                (measured / modelled).clamp(1.0 / MOST_STRETCH, MOST_STRETCH)
+            } else {
+                1.0
+            }
         };
-        let stretch = Vec3::new(1.0, ratio(1, shape.b0().max(shape.b1())), ratio(2, 0.3 * shape.length()));
+        let stretch = Vec3::new(1.0, ratio(1, shape.b0().max(shape.b1())), ratio(2, SPREAD_ALONG * shape.length()));
         let stretched = crate::shape::TaperedEllipticCylinder::new(
             shape.length() * stretch.z,
             shape.a0(),
@@ -285,9 +300,9 @@ impl Body {
     }
 
     /// A limb far shorter than its pair becomes as long. If the limb that it hangs on or carries is longer than its own pair
-    /// instead, a joint was set along the line of both: on the side that is less like `given`, if it is straight, they keep
+    /// instead, a joint was set along the line of both: on the side that is less like `reference`, if it is straight, they keep
     /// their length together, in the proportion of the other side.
-    fn even_out(&mut self, given: &Self, poses: &[Pose]) {
+    fn even_out(&mut self, reference: &Self, poses: &[Pose]) {
         let pairs = self.pairs();
         let length = |limb: usize| self.limbs[limb].shape.length();
         let twin = |limb: usize| {
@@ -296,7 +311,7 @@ impl Body {
         };
         let sum = |bones: [usize; 2]| bones.map(length).iter().sum::<f64>();
         let unlike = |bones: [usize; 2]| {
-            let [first, second] = bones.map(|limb| (length(limb) / given.limbs[limb].shape.length()).ln());
+            let [first, second] = bones.map(|limb| (length(limb) / reference.limbs[limb].shape.length()).ln());
             (first - second).abs()
         };
         let straight = |bones: [usize; 2]| {
@@ -371,5 +386,5 @@ fn spans_a_plane(points: impl Iterator<Item = Vec3> + Clone) -> bool {
     let square = scatter * scatter;
     // Sum of the products of pairs of eigenvalues: zero exactly on a line.
     let pairs = 0.5 * (trace * trace - (square.x_axis.x + square.y_axis.y + square.z_axis.z));
-    pairs > 1e-4 * trace * trace && trace > 1e-8
+    pairs > ON_A_LINE * trace * trace && trace > ON_A_POINT
 }

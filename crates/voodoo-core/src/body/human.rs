@@ -30,6 +30,8 @@ const UPPER_ARM: f64 = 0.186;
 const DELTOID: f64 = 0.022;
 const FOREARM: f64 = 0.146;
 const HAND: f64 = 0.095;
+/// From the wrist to the knuckles.
+const KNUCKLES: f64 = 0.075;
 const HAND_CENTRE: f64 = 0.045;
 const WAIST: f64 = 0.630;
 const VC7: f64 = 0.860;
@@ -153,18 +155,7 @@ impl Builder {
     }
 
     fn arm(&mut self, model: HumanModel, prefix: &str, side: f64, thorax: usize) {
-        // x stays forward: limbs that hang are turned about it.
-        let down = Quat::from_axis_angle(Vec3::X, std::f64::consts::PI);
         let named = |name: &str| format!("{prefix}_{name}");
-        let link = |name: &str, centre, semi_axes, limits, motion| Link {
-            name: named(name),
-            centre,
-            flexion: -Vec3::Y,
-            along: -Vec3::Z,
-            semi_axes,
-            limits,
-            motion,
-        };
         let shoulder = Vec3::new(0.0, side * SHOULDER[0], SHOULDER[1]);
         let elbow = shoulder - Vec3::Z * UPPER_ARM;
         let wrist = elbow - Vec3::Z * FOREARM;
@@ -177,51 +168,31 @@ impl Builder {
         let upper = self.limb(
             named("upperarm"),
             shoulder + Vec3::Z * DELTOID,
-            down,
+            hanging(),
             UPPER_ARM + DELTOID,
             UPPER_ARM_AXES,
-            Some((carrier, link("shoulder", shoulder, [0.0; 2], shoulder_limits, 0.35))),
+            Some((carrier, arm_link(named("shoulder"), shoulder, [0.0; 2], shoulder_limits, 0.35))),
             [false; 2],
         );
-        let elbow_limits = [[-0.1, 2.7], [0.0; 2], [0.0; 2]];
-        let link_elbow = link("elbow", elbow, [0.02, 0.0], elbow_limits, 0.45);
         self.site(named("shoulder"), upper, shoulder);
-        let carrier = match model {
+        let (length, caps) = match model {
             // The ten-limb model has no hand: its forearm ends at the knuckles.
-            HumanModel::Papers => self.limb(
-                named("forearm"),
-                elbow,
-                down,
-                FOREARM + 0.075,
-                FOREARM_AXES,
-                Some((upper, link_elbow)),
-                [false, true],
-            ),
+            HumanModel::Papers => (FOREARM + KNUCKLES, [false, true]),
+            HumanModel::Full => (FOREARM, [false; 2]),
+        };
+        let link = arm_link(named("elbow"), elbow, [0.02, 0.0], [[-0.1, 2.7], [0.0; 2], [0.0; 2]], 0.45);
+        let forearm = self.limb(named("forearm"), elbow, hanging(), length, FOREARM_AXES, Some((upper, link)), caps);
+        let last = match model {
+            HumanModel::Papers => forearm,
             HumanModel::Full => {
-                let forearm = self.limb(
-                    named("forearm"),
-                    elbow,
-                    down,
-                    FOREARM,
-                    FOREARM_AXES,
-                    Some((upper, link_elbow)),
-                    [false; 2],
-                );
-                let wrist_limits = [[-1.2, 1.2], [-0.5, 0.5], [-1.5, 1.5]];
-                self.limb(
-                    named("hand"),
-                    wrist,
-                    down,
-                    HAND,
-                    HAND_AXES,
-                    Some((forearm, link("wrist", wrist, [0.012; 2], wrist_limits, 0.3))),
-                    [false, true],
-                )
+                let limits = [[-1.2, 1.2], [-0.5, 0.5], [-1.5, 1.5]];
+                let link = arm_link(named("wrist"), wrist, [0.012; 2], limits, 0.3);
+                self.limb(named("hand"), wrist, hanging(), HAND, HAND_AXES, Some((forearm, link)), [false, true])
             }
         };
-        self.site(named("elbow"), upper + 1, elbow);
-        self.site(named("wrist"), carrier, wrist);
-        self.site(named("hand"), carrier, wrist - Vec3::Z * HAND_CENTRE);
+        self.site(named("elbow"), forearm, elbow);
+        self.site(named("wrist"), last, wrist);
+        self.site(named("hand"), last, wrist - Vec3::Z * HAND_CENTRE);
     }
 
     /// Carries the arm and moves a little on the chest: a raised arm raises its shoulder.
@@ -247,7 +218,7 @@ impl Builder {
     }
 
     fn leg(&mut self, model: HumanModel, prefix: &str, side: f64, pelvis: usize) {
-        let down = Quat::from_axis_angle(Vec3::X, std::f64::consts::PI);
+        let down = hanging();
         let named = |name: &str| format!("{prefix}_{name}");
         let hip = Vec3::new(0.0, side * HIP[0], HIP[1]);
         let knee = Vec3::new(0.0, hip.y, KNEE);
@@ -331,6 +302,16 @@ impl Builder {
             .collect();
         Body::new(name, limbs, sites)
     }
+}
+
+/// Rotation of a limb that hangs: x stays forward, it is turned about it.
+fn hanging() -> Quat {
+    Quat::from_axis_angle(Vec3::X, std::f64::consts::PI)
+}
+
+/// A joint of a hanging arm.
+fn arm_link(name: String, centre: Vec3, semi_axes: [f64; 2], limits: [[f64; 2]; 3], motion: f64) -> Link {
+    Link { name, centre, flexion: -Vec3::Y, along: -Vec3::Z, semi_axes, limits, motion }
 }
 
 /// A range for the left side (`side` = 1), mirrored for the right one.

@@ -38,6 +38,9 @@ impl Chain {
     }
 }
 
+/// Below this angle, radians, the series stand in for quotients whose numerators lose all digits.
+const SMALL_ANGLE: f64 = 1e-4;
+
 /// Axis of a hinge in its joint frame.
 pub fn hinge_axis(joint: &Joint) -> Vec3 {
     if joint.semi_axes[0] > 0.0 { Vec3::X } else { Vec3::Y }
@@ -85,7 +88,7 @@ pub fn exp(twist: &Vector6<f64>) -> Pose {
     let angle = omega.length();
     let rotation = Quat::from_scaled_axis(omega);
     // Left Jacobian: I + b [w] + c [w]^2 with b = (1 - cos)/t^2, c = (t - sin)/t^3.
-    let (b, c) = if angle < 1e-4 {
+    let (b, c) = if angle < SMALL_ANGLE {
         (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0)
     } else {
         ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / (angle * angle * angle))

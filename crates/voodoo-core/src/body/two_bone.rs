@@ -4,6 +4,15 @@ use crate::body::kinematics::{hinge_axis, place};
 use crate::body::{Body, JointKind};
 use crate::math::{Mat3, Pose, Quat, Vec3};
 
+/// The chain ends at this share of what hangs on its lower limb: in the middle of a fist.
+const GRASP: f64 = 0.6;
+/// A chain is stretched and folded to within this, metres: at the limit its bend has no direction.
+const SLACK: f64 = 1e-3;
+/// The same as a share of the shorter bone, where that is less: a toy body may be smaller.
+const SLACK_SHARE: f64 = 0.1;
+/// A chain bent by less than this (sine) is straight and keeps its hinge axis.
+const STRETCHED: f64 = 0.05;
+
 /// A ball joint with a hinge behind it: an arm or a leg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TwoBone {
@@ -41,7 +50,7 @@ impl TwoBone {
                     .parent
                     .as_ref()
                     .map_or(Vec3::Z, |(_, joint)| joint.parent_from_limb_at_rest().rotation * Vec3::Z);
-                0.6 * shape.length() * along.z.max(0.0)
+                GRASP * shape.length() * along.z.max(0.0)
             };
             let second = limb.shape.length() + ends.iter().map(reach).fold(0.0, f64::max);
             let leg = *trunk == 0 && ball.parent_from_joint.translation.z < 0.5 * limbs[0].shape.length();
@@ -74,8 +83,7 @@ impl TwoBone {
         let root = self.root(body, poses);
         let [first, second] = self.lengths;
         let line = target - root;
-        // Neither stretched nor folded to the last millimetre; a toy body may be smaller than that.
-        let slack = 1e-3_f64.min(0.1 * first.min(second));
+        let slack = SLACK.min(SLACK_SHARE * first.min(second));
         let distance = line.length().max((first - second).abs() + slack).min(first + second - slack);
         let direction = line.try_normalize().unwrap_or(-Vec3::Z);
         let along = (first * first - second * second + distance * distance) / (2.0 * distance);
@@ -101,7 +109,7 @@ impl TwoBone {
         let axis = u.cross(f);
         // A straight limb keeps the hinge axis it has.
         let current = poses[self.upper].rotation * (hinge.parent_from_joint.rotation * hinge_axis(hinge));
-        let axis = if axis.length() > 0.05 { axis } else { current - u * current.dot(u) };
+        let axis = if axis.length() > STRETCHED { axis } else { current - u * current.dot(u) };
         let local_u = (hinge.parent_from_joint.translation - ball.limb_from_joint.translation).normalize_or_zero();
         let local_axis = hinge.parent_from_joint.rotation * hinge_axis(hinge);
         let (Some(world), Some(local)) = (basis(u, axis), basis(local_u, local_axis)) else { return };

@@ -10,7 +10,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::association::assignment::{Assignment, match_limb};
-use crate::association::contour::Contour;
+use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
 use crate::body::Pair;
@@ -28,7 +28,7 @@ pub struct Fit {
     solver: Box<dyn Solver>,
     assignment: Assignment,
     correspondences: Correspondences,
-    contour: Contour,
+    contours: Contours,
     band_weights: Vec<f64>,
     threads: Option<ThreadPool>,
 }
@@ -46,7 +46,7 @@ impl Fit {
             solver: solver(config.solver),
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
-            contour: Contour::default(),
+            contours: Contours::default(),
             band_weights: Vec::new(),
             threads,
         })
@@ -76,7 +76,7 @@ impl Fit {
     pub fn clear(&mut self) {
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
-        self.correspondences.edges.clear();
+        self.correspondences.contour.clear();
     }
 
     /// Warm start, then steps 2 to 7 until they settle; the matches at the end are those of the found poses. Returns the
@@ -118,7 +118,7 @@ impl Fit {
         if step >= CONTOUR_FROM {
             self.find_contour(context, poses);
         } else {
-            self.contour.clear();
+            self.contours.clear();
         }
         self.match_assigned(context, poses, &gate, true);
     }
@@ -127,7 +127,7 @@ impl Fit {
     pub fn match_last(&mut self, context: Context, poses: &[Pose]) {
         let gate = self.schedule(context.config).gate(context.config.max_steps);
         self.assign(context, poses, &gate);
-        self.contour.clear();
+        self.contours.clear();
         self.match_assigned(context, poses, &gate, true);
     }
 
@@ -140,12 +140,12 @@ impl Fit {
     /// Looks for the edges of limbs in depth images, as pairs at `poses`.
     pub fn match_contour(&mut self, context: Context, poses: &[Pose]) {
         self.find_contour(context, poses);
-        self.contour.pairs(poses, &mut self.correspondences.edges);
+        self.contours.pairs(poses, &mut self.correspondences.contour);
     }
 
     /// The edges that were looked for last.
-    pub fn contour(&self) -> &Contour {
-        &self.contour
+    pub fn contours(&self) -> &Contours {
+        &self.contours
     }
 
     /// Relative changes of length, one a pair of limbs, that the matches ask for; see [`Solver::lengths`].
@@ -192,7 +192,7 @@ impl Fit {
         self.match_surface(context, poses, gate, anew, self.schedule(context.config).visible_side);
         // 4 Point-to-point relations, 5 closest points on rays.
         self.match_sites(context, poses);
-        self.contour.pairs(poses, &mut self.correspondences.edges);
+        self.contours.pairs(poses, &mut self.correspondences.contour);
     }
 
     fn match_sites(&mut self, context: Context, poses: &[Pose]) {
@@ -207,7 +207,7 @@ impl Fit {
 
     fn find_contour(&mut self, context: Context, poses: &[Pose]) {
         if context.config.outline {
-            self.contour.find(&context.model.body, poses, context.seen.views.iter());
+            self.contours.find(&context.model.body, poses, context.seen.views.iter());
         }
     }
 

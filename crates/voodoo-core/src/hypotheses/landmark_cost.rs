@@ -26,5 +26,5 @@ pub fn body_landmark_cost(matched: Matched) -> f64 {
 fn landmark_cost(pair: &SitePair, x: Vec3) -> f64 {
     // Across a ray alone, where only a ray is known.
     let apart = (pair.across * (x - pair.p)).length() - pair.bias;
-    pair.given * (apart.max(0.0) / APART).powi(2).min(1.0)
+    pair.base_weight * (apart.max(0.0) / APART).powi(2).min(1.0)
 }

@@ -1,15 +1,18 @@
 //! The segments that stand for a chain in the images, joint to joint (J10 eq. 6), and the trunk they cannot be in.
 
-use super::image::Segment;
+use super::image::Bone;
 use super::model::Model;
 use super::trunk::{Carrier, Trunk};
 use crate::body::Body;
 use crate::math::Vec3;
 
+/// A limb that the trunk carries starts in it: from this share of its length on it must lie outside.
+const FREE_OF_TRUNK: f64 = 0.5;
+
 /// One segment from the joint of every limb to each joint of its children in the chain, or to the end of a last limb: its
 /// farthest site, else its distal end. A root limb without a joint has none. Radius: the smaller semi-axes
 /// times `margin`, since a limb is at least as wide as they are, however it is turned about itself; with 0 the criterion is J10's.
-pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Segment> {
+pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Bone> {
     let mut segments = Vec::new();
     for (index, part) in model.parts().iter().enumerate() {
         let limb = &body.limbs()[part.limb];
@@ -29,11 +32,11 @@ pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Segment> {
         let apart = if branches(body, part.limb) {
             1.0
         } else if branches(body, parent) {
-            0.5
+            FREE_OF_TRUNK
         } else {
             0.0
         };
-        segments.extend(ends.into_iter().map(|end| Segment { ends: [(index, start), (index, end)], radius, apart }));
+        segments.extend(ends.into_iter().map(|end| Bone { ends: [(index, start), (index, end)], radius, apart }));
     }
     segments
 }

@@ -10,7 +10,7 @@ pub const SAMPLES: usize = 8;
 
 /// A bone that shall lie inside the silhouettes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
+pub struct Bone {
     /// Part and point in its frame of both ends.
     pub ends: [(usize, Vec3); 2],
     /// How deep inside it shall lie at both ends, and in proportion between: the limb's radius, metres; 0 is J10's criterion.
@@ -21,13 +21,13 @@ pub struct Segment {
 
 /// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less
 /// what the border is uncertain by or, where the silhouette is about as thin as the limb, half the silhouette's width less half
-/// of that. DepthViews with depths add how far the bone's flesh lies before what they see, see [`View::depth`].
+/// of that. Views with depths add how far the bone's flesh lies before what they see, see [`View::depth`].
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
     pub views: &'a [View<'a>],
     /// The bones.
-    pub segments: &'a [Segment],
+    pub segments: &'a [Bone],
     /// Up to how many radii the silhouette is the limb itself, in whose middle the bone shall lie; 0: nowhere.
     pub thin: f64,
     /// What the bones cannot lie in: the trunk, and limbs beside the chain.
@@ -101,7 +101,7 @@ impl Criterion<'_> {
         &self,
         model: &Model,
         at: &Kinematics,
-        segment: &Segment,
+        segment: &Bone,
         ends: &[Vec3; 2],
         forces: &mut [Vec3; 2],
         gradient: &mut [f64],

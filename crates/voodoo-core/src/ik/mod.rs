@@ -17,7 +17,7 @@ mod view;
 
 pub use bones::{bones, trunk};
 pub use goal::{Aim, Goal, level_cost, level_rows};
-pub use image::{Criterion, SAMPLES, Segment};
+pub use image::{Bone, Criterion, SAMPLES};
 pub use model::{Column, Kinematics, Model, Part, Root, Turn};
 pub use project::{project, read};
 pub use solver::{Options, Report, Rest, Solver};

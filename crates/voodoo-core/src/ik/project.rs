@@ -8,7 +8,7 @@ use crate::body::kinematics::joint_turn;
 use crate::body::{Body, Joint};
 use crate::math::{Pose, Vec3};
 
-/// Lever of a limb's turns about its axis against its position, metres.
+/// Lever of a limb's turns about its axis against its position, metres: about the radius of an arm.
 const GIRTH: f64 = 0.05;
 
 /// Angles as the joints of `poses` (one a limb of the body, world) stand; gaps are not looked at. Within the limits.

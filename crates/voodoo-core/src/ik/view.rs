@@ -6,10 +6,11 @@ use crate::math::{Pose, Vec3};
 pub(super) const NEAREST: f64 = 0.05;
 /// Four depths that differ by more than this share do not belong to one surface.
 const EDGE: f64 = 0.03;
-/// So many radii behind what is seen of a limb its bone is: one across the line of sight, more along it, and less where the
-/// person is slimmer than the body.
-const NEAREST_SHARE: f64 = 0.5;
-const FARTHEST: f64 = 2.0;
+/// So many radii behind what is seen of a limb its bone is at least: one across the line of sight, less where the person is
+/// slimmer than the body.
+const LEAST_RADII: f64 = 0.5;
+/// And at most: more than one where the limb is seen along its axis.
+const MOST_RADII: f64 = 2.0;
 
 /// One calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +88,7 @@ impl View<'_> {
             return nothing;
         }
         let [seen, du, dv] = Corners(corners).at(at);
-        let (before, behind) = (seen + NEAREST_SHARE * radius - x.z, x.z - seen - FARTHEST * radius);
+        let (before, behind) = (seen + LEAST_RADII * radius - x.z, x.z - seen - MOST_RADII * radius);
         let (gap, sign) = if before > 0.0 { (before, 1.0) } else { (behind, -1.0) };
         if sign < 0.0 && !itself {
             return nothing;

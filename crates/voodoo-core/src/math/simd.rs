@@ -17,12 +17,18 @@ pub fn widest<R>(work: impl FnOnce() -> R) -> R {
         }
         if has_avx512() {
             // SAFETY: `wider` is safe code that only needs these parts of AVX-512, and this processor was found to have them.
-            #[allow(unsafe_code)]
+            #[allow(
+                unsafe_code,
+                reason = "a function compiled for an instruction set is called where the processor has it"
+            )]
             return unsafe { wider(work) };
         }
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: `wide` is safe code that only needs AVX2, and this processor was found to have it.
-            #[allow(unsafe_code)]
+            #[allow(
+                unsafe_code,
+                reason = "a function compiled for an instruction set is called where the processor has it"
+            )]
             return unsafe { wide(work) };
         }
     }

@@ -5,15 +5,16 @@ use std::ops::Range;
 use crate::math::{Pose, widest};
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 
-/// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth.
-const MARGIN: (f32, f32) = (0.04, 0.012);
+/// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth, which the noise
+/// of depth cameras grows with.
+const SCENE_MARGIN: (f32, f32) = (0.04, 0.012);
 /// A deeper return by more than this replaces what was learnt (something stood before it), metres.
 const DEEPER: f32 = 0.15;
-/// Two sides of a gap that differ by less belong to one surface, metres.
-const SAME: f32 = 0.30;
-/// Share of a new return in what was learnt.
+/// Two sides of a gap that differ by less, metres, belong to one surface: a wall seen aslant.
+const ONE_WALL: f32 = 0.30;
+/// Share of a new return in what was learnt: about ten looks at a pixel average its noise.
 const LEARNING: f32 = 0.1;
-/// One row of this many is learnt in a frame.
+/// One row of this many is learnt in a frame, for speed: the scene stands still.
 const ROW_STEP: usize = 8;
 
 /// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
@@ -40,7 +41,7 @@ impl Background {
     /// Whether a return at `z` metres in pixel `index` belongs to the background.
     #[inline(always)]
     pub fn holds(depth: f32, z: f32) -> bool {
-        depth > 0.0 && z > depth - MARGIN.0 - MARGIN.1 * depth
+        depth > 0.0 && z > depth - SCENE_MARGIN.0 - SCENE_MARGIN.1 * depth
     }
 
     fn fits(&self, image: &DepthImage) -> bool {
@@ -169,7 +170,7 @@ fn fill_row(row: &mut [f32]) {
         for index in first..end {
             let t = (index - first + 1) as f32 / count;
             row[index] = match (left, right) {
-                (Some(a), Some(b)) if (a - b).abs() < SAME => a + t * (b - a),
+                (Some(a), Some(b)) if (a - b).abs() < ONE_WALL => a + t * (b - a),
                 (Some(a), Some(b)) => a.max(b),
                 (a, b) => a.or(b).unwrap_or(0.0),
             };

@@ -1,11 +1,13 @@
-//! Step 1: free points inside the enlarged whole-body box, joined by the points known to be on the body (K06 IV-B.1).
+//! Step 1 (K06 IV-B.1): free points inside the enlarged whole-body box, joined by the points known to be on the body.
 
 use crate::body::Body;
 use crate::config::Config;
 use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, widest};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::clusters::Clusters;
-use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
+use crate::observation::depth_view::NEAREST_SEEN;
+use crate::observation::frame::{Cloud, DepthImage, Frame, PointSlice, Scope};
+use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
 
 /// Mark of a point that may belong to any limb.
 pub const ANY_LIMB: u16 = u16::MAX;
@@ -26,22 +28,6 @@ pub struct Candidates {
     pub cameras: Vec<(u32, Vec3)>,
     /// The points once more, neighbours together.
     pub(crate) clusters: Clusters,
-}
-
-/// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
-struct Gate {
-    low: [f32; 3],
-    high: [f32; 3],
-    up: [f32; 3],
-    floor: f32,
-}
-
-impl Gate {
-    #[inline(always)]
-    fn passes(&self, p: [f32; 3]) -> bool {
-        let inside = |axis: usize| (p[axis] >= self.low[axis]) & (p[axis] <= self.high[axis]);
-        inside(0) & inside(1) & inside(2) & (p[0] * self.up[0] + p[1] * self.up[1] + p[2] * self.up[2] >= self.floor)
-    }
 }
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
@@ -67,8 +53,7 @@ impl Candidates {
     }
 
     /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
-    /// whole-body box in the working frame, and pixels of the learnt
-    /// backgrounds are left out.
+    /// whole-body box in the working frame; pixels of the learnt backgrounds are left out.
     pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, backgrounds: &Backgrounds, config: &Config) {
         self.points.clear();
         self.weight.clear();
@@ -80,7 +65,8 @@ impl Candidates {
             None => (Vec3::ZERO, -1.0),
         };
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
-        let gate = Gate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
+        let gate =
+            PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
         for image in frame.images {
             let background = backgrounds.of(image).map_or(&[][..], Background::depth);
             self.gather_image(image, background, origin, bounds, &gate, config.max_points);
@@ -99,7 +85,7 @@ impl Candidates {
         self.source.push(source);
     }
 
-    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &Gate) {
+    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &PointGate) {
         let working_from_sensor = shifted(&cloud.world_from_sensor, origin);
         let (rotation, shift) = (Mat3::from_quat(working_from_sensor.rotation), working_from_sensor.translation);
         let limb = match cloud.scope {
@@ -124,7 +110,7 @@ impl Candidates {
         background: &[f32],
         origin: Vec3,
         bounds: &Aabb,
-        gate: &Gate,
+        gate: &PointGate,
         max_points: usize,
     ) {
         let working_from_sensor = shifted(&image.world_from_sensor, origin);
@@ -132,7 +118,7 @@ impl Candidates {
         let m = columns_f32(&working_from_sensor);
         let points = &mut self.points;
         // A pixel stands for a patch of surface: its size follows from the distance of the body.
-        let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(0.3);
+        let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(NEAREST_BODY);
         let patch = distance * distance / (image.intrinsics[0] * image.intrinsics[1]);
         let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
         let weight = image.weight * patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
@@ -157,127 +143,13 @@ impl Candidates {
     }
 }
 
+/// A body is taken to be no nearer to its camera than this, metres, when a pixel's share of its surface is computed.
+const NEAREST_BODY: f64 = 0.3;
 /// Area of a person that a camera sees, about, m^2; what stands beside counts as well.
 const VISIBLE_AREA: f64 = 0.6;
 /// A depth pixel that stands for this much surface has weight one: 12 mm squared, that of a 160x124 time-of-flight camera
 /// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
 pub const REFERENCE_PATCH: f64 = 0.012 * 0.012;
-
-/// Which pixels of an image are used: every so manyth row, and in it every so manyth column.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Grid {
-    rows: usize,
-    columns: usize,
-}
-
-impl Grid {
-    /// About one pixel in `share`, as evenly as whole numbers allow.
-    fn new(share: f64) -> Self {
-        let rows = share.sqrt().floor().max(1.0);
-        let columns = (share / rows).round().max(1.0);
-        Self { rows: rows as usize, columns: columns as usize }
-    }
-
-    /// First column of a row: where columns are wider than rows, those of one row stand between those of the next.
-    fn offset(self, row: usize) -> usize {
-        if self.columns == self.rows { 0 } else { row / self.rows * (self.columns / 2) % self.columns }
-    }
-}
-
-/// Pixels of a row that are looked at together.
-const STRETCH: usize = 32;
-
-/// Visits every `stride`th value with its place in `to`; neighbours fill whole registers.
-#[inline(always)]
-fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, &T)) {
-    if stride == 1 {
-        to.iter_mut().zip(from).for_each(|(to, value)| visit(to, value));
-    } else {
-        to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, value)| visit(to, value));
-    }
-}
-
-/// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
-struct Stretch {
-    x: [f32; STRETCH],
-    y: [f32; STRETCH],
-    z: [f32; STRETCH],
-}
-
-impl Stretch {
-    #[inline(always)]
-    fn load(image: &DepthImage, background: &[f32], row: usize, start: usize, end: usize, stride: usize) -> Self {
-        let count = STRETCH.min((end - start).div_ceil(stride));
-        let first = row * image.width + start;
-        let scale = image.metres_per_unit as f32;
-        let mut z = [0.0; STRETCH];
-        match image.pixels {
-            DepthPixels::U16(pixels) => {
-                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = f32::from(*pixel) * scale);
-            }
-            DepthPixels::F32(pixels) => {
-                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = *pixel * scale);
-            }
-        }
-        if !background.is_empty() {
-            every(&background[first..], stride, &mut z[..count], |z, depth| {
-                *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
-            });
-        }
-        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
-        let mut x = [0.0; STRETCH];
-        let mut y = [(row as f32 - cy) * (1.0 / fy); STRETCH];
-        match image.rays {
-            Some(rays) => {
-                for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(rays[first..].iter().step_by(stride)).take(count) {
-                    (*x, *y) = (ray[0], ray[1]);
-                }
-            }
-            None => {
-                let inverse = 1.0 / fx;
-                for (x, offset) in x.iter_mut().zip(0_i32..) {
-                    *x = ((start as i32 + offset * stride as i32) as f32 - cx) * inverse;
-                }
-            }
-        }
-        Self { x, y, z }
-    }
-
-    /// Whether any pixel returned anything that is not the background.
-    #[inline(always)]
-    fn returned(&self) -> bool {
-        self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
-    }
-
-    /// Appends the points that returned and lie inside the gate, in order.
-    #[inline(always)]
-    fn gather(&self, m: &[[f32; 3]; 4], gate: &Gate, points: &mut Points) {
-        let mut p = [[0.0; STRETCH]; 3];
-        let mut passes = [false; STRETCH];
-        for i in 0..STRETCH {
-            let z = self.z[i];
-            let (x, y) = (self.x[i] * z, self.y[i] * z);
-            let place = |axis: usize| m[0][axis] * x + (m[1][axis] * y + (m[2][axis] * z + m[3][axis]));
-            let point = [place(0), place(1), place(2)];
-            // A NaN fails the first comparison.
-            passes[i] = (z > 0.0) & (z < f32::INFINITY) & gate.passes(point);
-            (p[0][i], p[1][i], p[2][i]) = (point[0], point[1], point[2]);
-        }
-        if passes.iter().fold(0, |any, pass| any | u8::from(*pass)) == 0 {
-            return;
-        }
-        let mut kept = 0;
-        for i in 0..STRETCH {
-            // `kept` is at most `i`; the mask only spares the bounds checks.
-            let to = kept % STRETCH;
-            (p[0][to], p[1][to], p[2][to]) = (p[0][i], p[1][i], p[2][i]);
-            kept += usize::from(passes[i]);
-        }
-        points.x.extend_from_slice(&p[0][..kept]);
-        points.y.extend_from_slice(&p[1][..kept]);
-        points.z.extend_from_slice(&p[2][..kept]);
-    }
-}
 
 /// The pixels that can show anything inside the box: the bounds of its projected corners, the whole image when a corner
 /// lies behind the camera or the lens distorts.
@@ -294,7 +166,7 @@ pub fn image_window(
     let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
     for corner in bounds.vertices() {
         let corner = working_from_sensor.inverse_transform_point(corner);
-        if corner.z < 0.05 {
+        if corner.z < NEAREST_SEEN {
             return whole;
         }
         for (axis, pixel) in [fx * corner.x / corner.z + cx, fy * corner.y / corner.z + cy].into_iter().enumerate() {
@@ -318,21 +190,67 @@ fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::Grid;
+    use super::*;
+    use crate::math::Quat;
+    use crate::observation::frame::Ground;
+    use crate::observation::synthetic::image;
 
     #[test]
-    fn a_grid_keeps_the_share_asked_for_and_spreads_it() {
-        for tenths in 1..400 {
-            let share = f64::from(tenths) / 10.0;
-            let grid = Grid::new(share);
-            let kept = (grid.rows * grid.columns) as f64 / share.max(1.0);
-            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {share}");
-            assert!((0..50).all(|row| grid.offset(row) < grid.columns));
+    fn candidates_are_the_returns_in_the_box_above_the_floor_and_before_the_scene() {
+        let wave = |index: usize| 2.0 + 0.8 * ((index * 37 % 101) as f32 / 101.0);
+        let mut pixels: Vec<f32> = (0..40 * 30).map(wave).collect();
+        pixels.iter_mut().step_by(7).for_each(|depth| *depth = 0.0);
+        pixels[11] = f32::NAN;
+        // The optical axis is the world's x axis, up is z.
+        let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Y, -Vec3::Z, Vec3::X));
+        let world_from_sensor = Pose::from_parts(Vec3::new(0.0, 0.3, 1.0), rotation);
+        let images = [DepthImage { world_from_sensor, source: 3, ..image(&pixels, 40, 60.0) }];
+        let ground = Some(Ground { normal: Vec3::Z, offset: 0.5 });
+        let frame = Frame { images: &images, ground, ..Frame::empty(0.0) };
+        let mut backgrounds = Backgrounds::default();
+        // What is farther than 2.6 m is scene.
+        backgrounds.start(&frame, |_, depths| depths.iter_mut().for_each(|depth| *depth = 2.6 + 1e-6 * *depth));
+        let origin = Vec3::new(2.3, 0.0, 1.0);
+        let bounds = Aabb::new(Vec3::new(-0.4, -0.3, -0.6), Vec3::new(0.4, 0.5, 0.4));
+        let config = Config { max_points: 1_000_000, ..Config::default() };
+        let mut found = Candidates::default();
+        found.gather(&frame, origin, &bounds, &backgrounds, &config);
+        // One pixel after the other, in double precision.
+        let expected: Vec<Vec3> = (0..pixels.len())
+            .filter(|index| pixels[*index] > 0.0)
+            .filter(|index| !Background::holds(2.6 + 1e-6 * pixels[*index], pixels[*index]))
+            .map(|index| world_from_sensor * images[0].back_project(index, pixels[index]))
+            .filter(|point| point.z >= 0.5 + config.ground_clearance)
+            .map(|point| point - origin)
+            .filter(|point| bounds.contains_local_point(*point))
+            .collect();
+        assert!(expected.len() > 100 && expected.len() < 700, "{}", expected.len());
+        assert_eq!(found.len(), expected.len());
+        for (index, point) in expected.iter().enumerate() {
+            assert!((found.points.get(index) - *point).length() < 1e-5, "{index}: {point}");
         }
-        let columns = |share: f64| [0, 1, 2, 3].map(|row| Grid::new(share).offset(row));
-        assert_eq!((Grid::new(0.3), columns(0.3)), (Grid { rows: 1, columns: 1 }, [0; 4]));
-        assert_eq!((Grid::new(2.0), columns(2.0)), (Grid { rows: 1, columns: 2 }, [0, 1, 0, 1]));
-        assert_eq!((Grid::new(4.0), columns(4.0)), (Grid { rows: 2, columns: 2 }, [0; 4]));
-        assert_eq!((Grid::new(8.0), columns(8.0)), (Grid { rows: 2, columns: 4 }, [0, 0, 2, 2]));
+        assert!(found.limb.iter().all(|limb| *limb == ANY_LIMB) && found.source.iter().all(|source| *source == 3));
+        assert_eq!(found.cameras, [(expected.len() as u32, world_from_sensor.translation - origin)]);
+    }
+
+    #[test]
+    fn what_is_known_to_be_on_the_body_passes_every_box() {
+        let points = [[9.0, 9.0, 9.0], [0.1, 0.0, 0.0]];
+        let cloud = |scope| Cloud {
+            points: PointSlice::F64(&points),
+            world_from_sensor: Pose::identity(),
+            weight: 2.0,
+            scope,
+            source: 0,
+        };
+        let bounds = Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0));
+        for (scope, count, limb) in [(Scope::Free, 1, ANY_LIMB), (Scope::Body, 2, ANY_LIMB), (Scope::Limb(4), 2, 4)] {
+            let clouds = [cloud(scope)];
+            let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
+            let mut found = Candidates::default();
+            found.gather(&frame, Vec3::ZERO, &bounds, &Backgrounds::default(), &Config::default());
+            assert_eq!((found.len(), &found.limb[..]), (count, &vec![limb; count][..]), "{scope:?}");
+            assert_eq!(found.weight, vec![2.0; count]);
+        }
     }
 }

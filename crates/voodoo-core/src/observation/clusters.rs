@@ -4,13 +4,14 @@ use crate::math::{Points, widest};
 
 /// Points of a cluster: a whole number of SIMD lanes.
 pub const CLUSTER: usize = 32;
-/// Cells along each axis of the grid that sorts the points: a power of two.
+/// Cells along each axis of the grid that sorts the points: a power of two, so that a mask keeps a cell inside.
 const CELLS: usize = 16;
+/// The last cell along an axis.
 const LAST: u32 = CELLS as u32 - 1;
 /// Single precision has no fractions from here on, and the bits after the leading one are zero.
 const WHOLE: f32 = (1 << 23) as f32;
 /// A cell is no smaller than this, metres: about as large as a cluster of a depth image's points.
-const LEAST_CELL: f32 = 0.08;
+const SMALLEST_CELL: f32 = 0.08;
 
 /// Points in an order in which neighbours stand together, cut into clusters.
 #[derive(Debug, Default)]
@@ -146,7 +147,7 @@ impl Axis {
     #[inline(always)]
     fn of(values: &[f32]) -> Self {
         let [low, high] = range(values);
-        Self { low, scale: 1.0 / ((high - low) / CELLS as f32).max(LEAST_CELL) }
+        Self { low, scale: 1.0 / ((high - low) / CELLS as f32).max(SMALLEST_CELL) }
     }
 
     /// The cell of a value; a NaN counts as the least.
@@ -163,6 +164,7 @@ impl Axis {
 /// Least and greatest of some values, in lanes.
 #[inline(always)]
 fn range(values: &[f32]) -> [f32; 2] {
+    /// Values side by side: one SIMD register of single precision.
     const LANES: usize = 8;
     let (mut low, mut high) = ([f32::MAX; LANES], [f32::MIN; LANES]);
     let (whole, rest) = values.as_chunks::<LANES>();

@@ -6,14 +6,14 @@ use crate::observation::frame::{DepthImage, Frame};
 
 /// A depth image as a witness: what lies in a pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct DepthView<'a> {
     /// The image.
     pub image: &'a DepthImage<'a>,
     /// What is known of the scene behind the body.
     pub background: Option<&'a Background>,
     /// Pose of the camera in the working frame.
     pub working_from_camera: Pose,
-    /// The body was segmented: a pixel without return shows that nothing is there.
+    /// Whoever made the image had the body segmented (cut out): a pixel without return shows that nothing is there.
     pub segmented: bool,
 }
 
@@ -28,8 +28,12 @@ pub enum Pixel {
     Foreground(f64),
 }
 
-/// An image with more pixels without return than this share was segmented.
+/// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
+pub(crate) const NEAREST_SEEN: f64 = 0.05;
+/// An image with more pixels without return than this share was segmented: a sensor alone loses less of a room.
 const SEGMENTED_SHARE: f64 = 0.5;
+/// Every so manyth pixel is asked for that; a prime, so that all columns take part.
+const SEGMENTED_STEP: usize = 97;
 
 /// The depth images of a frame as witnesses.
 #[derive(Clone, Copy, Debug)]
@@ -46,9 +50,9 @@ pub struct DepthViews<'a> {
 
 impl<'a> DepthViews<'a> {
     /// One after the other.
-    pub fn iter(self) -> impl Iterator<Item = View<'a>> {
+    pub fn iter(self) -> impl Iterator<Item = DepthView<'a>> {
         let images = self.frame.images.iter().zip(self.segmented);
-        images.map(move |(image, segmented)| View {
+        images.map(move |(image, segmented)| DepthView {
             image,
             background: self.backgrounds.of(image),
             working_from_camera: shifted(&image.world_from_sensor, self.origin),
@@ -57,14 +61,14 @@ impl<'a> DepthViews<'a> {
     }
 }
 
-impl View<'_> {
+impl DepthView<'_> {
     /// What the pixel that a point (camera frame) falls in shows. Images of distorting lenses say nothing: their rays are
     /// known by the pixel, not the pixel by the ray.
     #[inline(always)]
     pub fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
         let [fx, fy, cx, cy] = image.intrinsics;
-        if point.z < 0.05 || image.rays.is_some() {
+        if point.z < NEAREST_SEEN || image.rays.is_some() {
             return Pixel::Unknown;
         }
         let near = 1.0 / point.z;
@@ -93,10 +97,80 @@ pub fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
     found.clear();
     found.extend(frame.images.iter().map(|image| {
         let (mut none, mut all) = (0_u32, 0_u32);
-        for index in (0..image.pixels.len()).step_by(97) {
+        for index in (0..image.pixels.len()).step_by(SEGMENTED_STEP) {
             all += 1;
             none += u32::from(image.pixels.get(index) <= 0.0);
         }
         f64::from(none) > SEGMENTED_SHARE * f64::from(all)
     }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::synthetic::image;
+
+    /// Every pixel of this image has a depth of its own, metres.
+    fn distinct(count: usize) -> Vec<f32> {
+        (0..count).map(|index| 1.0 + 0.01 * index as f32).collect()
+    }
+
+    #[test]
+    fn a_place_is_seen_in_the_pixel_whose_ray_passes_nearest() {
+        let pixels = distinct(24 * 16);
+        let image = image(&pixels, 24, 20.0);
+        let view =
+            DepthView { image: &image, background: None, working_from_camera: Pose::identity(), segmented: false };
+        for (index, depth) in pixels.iter().enumerate() {
+            // Anywhere on the pixel, and at any depth: its edges are half a pixel from its centre.
+            for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
+                let aside = Vec3::new(u, v, 0.0) * (f64::from(z) / 20.0);
+                let found = view.at(image.back_project(index, z) + aside);
+                assert_eq!(found, Pixel::Foreground(f64::from(*depth)), "pixel {index}");
+            }
+        }
+        for outside in [Vec3::new(0.7, 0.0, 1.0), Vec3::new(0.0, -0.5, 1.0), Vec3::new(0.0, 0.0, -1.0)] {
+            assert_eq!(view.at(outside), Pixel::Unknown, "{outside}");
+        }
+    }
+
+    #[test]
+    fn no_return_means_nothing_unless_the_body_was_segmented() {
+        let mut pixels = vec![0.0_f32; 40 * 30];
+        pixels[..400].fill(2.0);
+        let image = image(&pixels, 40, 30.0);
+        let images = [image];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let mut segmented = Vec::new();
+        find_segmented(&frame, &mut segmented);
+        assert_eq!(segmented, [true], "two thirds returned nothing");
+        let backgrounds = Backgrounds::default();
+        let empty = image.back_project(1000, 2.0);
+        for (segmented, expected) in [([true], Pixel::Background(f64::INFINITY)), ([false], Pixel::Unknown)] {
+            let views =
+                DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &segmented, origin: Vec3::ZERO };
+            assert!(views.iter().all(|view| view.at(empty) == expected));
+        }
+        let rays = vec![[0.0_f32; 2]; pixels.len()];
+        let distorted = DepthImage { rays: Some(&rays), ..image };
+        let view =
+            DepthView { image: &distorted, background: None, working_from_camera: Pose::identity(), segmented: true };
+        assert_eq!(view.at(Vec3::Z), Pixel::Unknown, "a distorted image does not know the pixel of a place");
+    }
+
+    #[test]
+    fn what_was_learnt_as_scene_is_background() {
+        let scene = vec![3.0_f32; 12 * 10];
+        let mut backgrounds = Backgrounds::default();
+        let learnt = image(&scene, 12, 10.0);
+        backgrounds.start(&Frame { images: &[learnt], ..Frame::empty(0.0) }, |_, _| {});
+        let mut pixels = scene.clone();
+        pixels[55] = 2.0;
+        let images = [image(&pixels, 12, 10.0)];
+        let frame = Frame { images: &images, ..Frame::empty(0.1) };
+        let views = DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &[false], origin: Vec3::ZERO };
+        let view = views.iter().next().unwrap();
+        assert_eq!(view.at(images[0].back_project(54, 1.0)), Pixel::Background(3.0));
+        assert_eq!(view.at(images[0].back_project(55, 1.0)), Pixel::Foreground(2.0));
+    }
 }

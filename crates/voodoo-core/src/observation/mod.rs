@@ -1,4 +1,8 @@
 //! What was measured: the frame, what of it may be the body, and what its images say about places in space.
+//!
+//! `frame` is what goes in (K06 IV-A). Step 1 of the method, the choice of points that may lie on the body (K06 IV-B.1), is
+//! `candidates`, with `pixels` and `background`; `clusters` sorts them for the next step. `depth_view` asks the images about places in
+//! space, `segments` looks for a lost body, and `registration` brings depths into the picture of another camera.
 
 pub mod background;
 mod background_update;
@@ -7,5 +11,8 @@ pub(crate) mod clusters;
 pub mod depth_view;
 pub mod frame;
 pub mod observer;
+pub(crate) mod pixels;
 pub mod registration;
 pub(crate) mod segments;
+#[cfg(test)]
+pub(crate) mod synthetic;

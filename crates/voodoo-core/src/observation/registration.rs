@@ -160,7 +160,7 @@ impl ProjectedPoints {
 
 /// Places of a picture, and what was measured there.
 #[derive(Clone, Copy, Debug)]
-pub struct Measured<'a> {
+pub struct MeasuredPixels<'a> {
     /// Columns and rows.
     pub places: &'a [[f64; 2]],
     /// Depths, metres.
@@ -169,10 +169,12 @@ pub struct Measured<'a> {
     pub still: Option<&'a [bool]>,
 }
 
-/// Surfaces farther behind the nearest one than this are others, metres.
+/// Depths within this of the nearest fifth, metres, belong to one surface: a limb is no deeper.
 const ONE_SURFACE: f64 = 0.1;
+/// Fewer points around a place than this are no surface: one or two may be stray returns.
+const FEWEST_POINTS: usize = 3;
 
-impl Measured<'_> {
+impl MeasuredPixels<'_> {
     /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
     /// three points there. Where three of the points `among` are there, only those count.
     ///
@@ -200,10 +202,10 @@ impl Measured<'_> {
                 }
             }
         }
-        if chosen.len() >= 3 {
+        if chosen.len() >= FEWEST_POINTS {
             near = chosen;
         }
-        if near.len() < 3 {
+        if near.len() < FEWEST_POINTS {
             return Ok(None);
         }
         near.sort_unstable_by(|a, b| self.depths[*a].total_cmp(&self.depths[*b]));

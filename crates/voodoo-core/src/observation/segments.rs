@@ -1,4 +1,4 @@
-//! Heaps of points that may be a lost body: everything in a frame that is not background, sorted by what hangs together.
+//! The foreground of a frame cut into segments: what hangs together and is not background may be a lost body.
 
 use crate::config::Config;
 use crate::math::Vec3;
@@ -6,14 +6,14 @@ use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::{DepthPixels, Frame};
 
-/// Samples of one source, about.
-const SAMPLES: usize = 5000;
+/// Samples taken of one source, about: a search runs while the body is lost, and must keep up with the frames.
+const SAMPLES_PER_SOURCE: usize = 5000;
 /// Edge of a cell of space, metres: samples in cells that touch hang together.
 const CELL: f64 = 0.12;
-/// A cell with fewer patches than this holds stray returns: a surface fills some hundred.
-const LEAST: f32 = 15.0;
+/// A cell with fewer surface patches than this holds stray returns: a surface fills some hundred.
+const LEAST_PATCHES: f32 = 15.0;
 /// Half of the cells along an axis that a key holds.
-const HALF: f64 = (1_u64 << 20) as f64;
+const HALF_KEY: f64 = (1_u64 << 20) as f64;
 
 /// What hangs together; working frame, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl Segments {
         self.samples.clear();
         self.sample_images(frame, origin, backgrounds);
         for cloud in frame.clouds {
-            let step = cloud.points.len().div_ceil(SAMPLES).max(1);
+            let step = cloud.points.len().div_ceil(SAMPLES_PER_SOURCE).max(1);
             for index in (0..cloud.points.len()).step_by(step) {
                 let point = cloud.world_from_sensor * cloud.points.get(index) - origin;
                 self.push(point, Vec3::ZERO, cloud.weight * step as f64);
@@ -88,8 +88,8 @@ impl Segments {
     }
 
     fn push(&mut self, point: Vec3, view: Vec3, weight: f64) {
-        let cell = (point / CELL).floor() + HALF;
-        if !(cell.cmpge(Vec3::ONE).all() && cell.cmplt(Vec3::splat(2.0 * HALF - 1.0)).all()) {
+        let cell = (point / CELL).floor() + HALF_KEY;
+        if !(cell.cmpge(Vec3::ONE).all() && cell.cmplt(Vec3::splat(2.0 * HALF_KEY - 1.0)).all()) {
             return;
         }
         let key = ((cell.x as u64) << 42) | ((cell.y as u64) << 21) | cell.z as u64;
@@ -100,7 +100,7 @@ impl Segments {
     fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
         for image in frame.images {
             let background = backgrounds.of(image).map_or(&[][..], Background::depth);
-            let step = ((image.pixels.len() as f64 / SAMPLES as f64).sqrt().ceil() as usize).max(1);
+            let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
             let spread = (step * step) as f64 / (image.intrinsics[0] * image.intrinsics[1] * REFERENCE_PATCH);
             let camera = image.world_from_sensor.translation - origin;
             for row in (0..image.height).step_by(step) {
@@ -129,7 +129,7 @@ impl Segments {
                 continue;
             }
             let weight: f32 = self.samples[start..end].iter().map(|sample| sample.weight).sum();
-            if weight >= LEAST {
+            if weight >= LEAST_PATCHES {
                 let parent = self.cells.len() as u32;
                 let samples = (start as u32, end as u32);
                 self.cells.push(Cell { key: self.samples[start].key, samples, parent });
@@ -211,11 +211,11 @@ mod tests {
     use crate::observation::frame::{Cloud, PointSlice, Scope};
 
     #[test]
-    fn heaps_apart_are_blobs_largest_first_and_strays_are_none() {
-        let heap = |at: [f64; 3], count: usize| {
+    fn points_apart_are_segments_largest_first_and_strays_are_none() {
+        let patch = |at: [f64; 3], count: usize| {
             (0..count).map(move |i| [at[0] + 0.01 * (i % 30) as f64, at[1] + 0.01 * (i / 30) as f64, at[2]])
         };
-        let mut points: Vec<[f64; 3]> = heap([1.0, 0.0, 0.0], 600).chain(heap([3.0, 0.0, 0.0], 900)).collect();
+        let mut points: Vec<[f64; 3]> = patch([1.0, 0.0, 0.0], 600).chain(patch([3.0, 0.0, 0.0], 900)).collect();
         // Single returns, half a metre apart, make no bridge between the two.
         points.extend((0..40).map(|i| [0.5 * f64::from(i), 0.5, 1.0]));
         let mut found = Vec::new();

@@ -1,6 +1,6 @@
 //! Closest points of many queries at once.
 
-use super::kernel::{BLOCK, Block, Constants, SHORT, Surface, closest};
+use super::kernel::{BLOCK, Block, BlockResult, Constants, SHORT, closest};
 use super::lanes::LANES;
 use super::{SurfacePoint, TaperedEllipticCylinder};
 #[cfg(target_arch = "x86_64")]
@@ -123,7 +123,7 @@ impl TaperedEllipticCylinder {
         out: &mut SurfaceBatch,
     ) {
         let mut block = Block::ZERO;
-        let mut found = Surface::ZERO;
+        let mut found = BlockResult::ZERO;
         for start in range.clone().step_by(N) {
             let count = N.min(range.end - start);
             let span = start..start + count;
@@ -197,7 +197,7 @@ fn store<T: Copy, const N: usize>(to: &mut [T], from: &[T; N]) {
     }
 }
 
-type Kernel<const N: usize> = fn(&Constants, &Block<N>, &mut Surface<N>);
+type Kernel<const N: usize> = fn(&Constants, &Block<N>, &mut BlockResult<N>);
 
 /// The fastest kernel this processor can run; the detection is cached by the standard library.
 fn kernel<const N: usize>() -> Kernel<N> {
@@ -205,7 +205,10 @@ fn kernel<const N: usize>() -> Kernel<N> {
     if has_avx512() && std::arch::is_x86_feature_detected!("fma") {
         return |constants, queries, out| {
             // SAFETY: the function is safe code that only needs AVX-512 and FMA, and this processor was found to have both.
-            #[allow(unsafe_code)]
+            #[allow(
+                unsafe_code,
+                reason = "a function compiled for an instruction set is called where the processor has it"
+            )]
             unsafe {
                 closest_avx512(constants, queries, out);
             }
@@ -215,7 +218,10 @@ fn kernel<const N: usize>() -> Kernel<N> {
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
         return |constants, queries, out| {
             // SAFETY: the function is safe code that only needs AVX2 and FMA, and this processor was found to have both.
-            #[allow(unsafe_code)]
+            #[allow(
+                unsafe_code,
+                reason = "a function compiled for an instruction set is called where the processor has it"
+            )]
             unsafe {
                 closest_avx2(constants, queries, out);
             }
@@ -225,19 +231,19 @@ fn kernel<const N: usize>() -> Kernel<N> {
 }
 
 /// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
-fn closest_baseline<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+fn closest_baseline<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
     closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
-fn closest_avx512<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+fn closest_avx512<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
     closest::<true, N>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn closest_avx2<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+fn closest_avx2<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
     closest::<true, N>(constants, queries, out);
 }
 
@@ -271,7 +277,7 @@ mod tests {
         {
             let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1)?;
             let constants = Constants::new(&shape, &Pose::IDENTITY);
-            let mut found = Surface::ZERO;
+            let mut found = BlockResult::ZERO;
             let mut doubtful = 0;
             for queries in shell(&shape) {
                 kernel()(&constants, &queries, &mut found);
@@ -287,7 +293,7 @@ mod tests {
     fn the_baseline_kernel_agrees_with_the_selected_one() -> Result<(), crate::shape::ShapeError> {
         let shape = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.027)?;
         let constants = Constants::new(&shape, &Pose::IDENTITY);
-        let (mut fast, mut plain) = (Surface::ZERO, Surface::ZERO);
+        let (mut fast, mut plain) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
             kernel()(&constants, &queries, &mut fast);
             closest_baseline(&constants, &queries, &mut plain);
@@ -303,21 +309,21 @@ mod tests {
     /// Skipped, as there is nothing to compare, on processors without AVX-512.
     #[test]
     #[cfg(target_arch = "x86_64")]
-    #[allow(unsafe_code)]
+    #[allow(unsafe_code, reason = "a function compiled for an instruction set is called where the processor has it")]
     fn wider_registers_change_no_bit() -> Result<(), crate::shape::ShapeError> {
         if !has_avx512() || !std::arch::is_x86_feature_detected!("fma") {
             return Ok(());
         }
         let shape = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.027)?;
         let constants = Constants::new(&shape, &Pose::IDENTITY);
-        let (mut wider, mut wide) = (Surface::ZERO, Surface::ZERO);
+        let (mut wider, mut wide) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
             // SAFETY: the processor was just found to have AVX-512 (hence AVX2) and FMA.
             unsafe {
                 closest_avx512(&constants, &queries, &mut wider);
                 closest_avx2(&constants, &queries, &mut wide);
             }
-            let bits = |found: &Surface<BLOCK>| {
+            let bits = |found: &BlockResult<BLOCK>| {
                 [
                     &found.points.x,
                     &found.points.y,

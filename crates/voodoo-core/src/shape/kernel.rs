@@ -9,7 +9,7 @@ use crate::math::{Mat3, Pose, Vec3};
 pub(super) const BLOCK: usize = 32;
 pub(super) const SHORT: usize = 8;
 /// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, metres, that passes.
-const CONVERGED: f32 = 3e-8;
+const FOOT_ERROR: f32 = 3e-8;
 /// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned: the error of the foot is that of the query divided by it.
 const CONDITIONED: f32 = DISTINCT as f32;
 
@@ -26,7 +26,7 @@ impl<const N: usize> Block<N> {
 }
 
 /// The results of one block, in the frame of the queries.
-pub(super) struct Surface<const N: usize> {
+pub(super) struct BlockResult<const N: usize> {
     pub points: Block<N>,
     pub normals: Block<N>,
     pub signed_distance: [f32; N],
@@ -35,7 +35,7 @@ pub(super) struct Surface<const N: usize> {
     pub doubtful: [u8; N],
 }
 
-impl<const N: usize> Surface<N> {
+impl<const N: usize> BlockResult<N> {
     pub const ZERO: Self =
         Self { points: Block::ZERO, normals: Block::ZERO, signed_distance: [0.0; N], region: [0; N], doubtful: [0; N] };
 }
@@ -87,6 +87,27 @@ impl Constants {
             proximal: cap(shape.a0, shape.b0),
             distal: cap(shape.a1, shape.b1),
         }
+    }
+
+    /// A query in the limb frame.
+    #[inline(always)]
+    fn in_limb<const FMA: bool>(&self, x: f32, y: f32, z: f32) -> (f32, f32, f32) {
+        let (wx, wy, wz) = (x - self.origin[0], y - self.origin[1], z - self.origin[2]);
+        let turn = |axis: usize| {
+            let [cx, cy, cz] = self.columns[axis];
+            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -self.rest[axis])))
+        };
+        (turn(0), turn(1), turn(2))
+    }
+
+    /// One coordinate of a vector of the limb frame in the frame of the queries, added to `base`.
+    #[inline(always)]
+    fn in_world<const FMA: bool>(&self, axis: usize, x: f32, y: f32, z: f32, base: f32) -> f32 {
+        fma::<FMA>(
+            self.columns[0][axis],
+            x,
+            fma::<FMA>(self.columns[1][axis], y, fma::<FMA>(self.columns[2][axis], z, base)),
+        )
     }
 
     /// Semi-axes of the slice at height `z`, clamped to the ends.
@@ -178,31 +199,95 @@ fn turned<const FMA: bool>(c: f32, s: f32, step: f32) -> (f32, f32) {
     nearly_unit::<FMA>(max(fma::<FMA>(-step, s, c), 0.0), max(fma::<FMA>(step, c, s), 0.0))
 }
 
+/// The angle to start from: the direction `(x/a, y/b)` in the slice, then one step over the evolute of the slice.
+#[inline(always)]
+fn first_angle<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32) -> (f32, f32) {
+    let (a, b) = k.slice::<FMA>(z);
+    let tiny = 1e-18;
+    let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
+    let focus = fma::<FMA>(a, a, -(b * b));
+    unit::<FMA>(max(fma::<FMA>(a, x, -(focus * c) * (c * c)), tiny), max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny))
+}
+
+/// The closest point of the side, for a query folded to `x, y >= 0`.
+struct SideFoot {
+    c: f32,
+    s: f32,
+    /// The parameter along the ruling, 0..1, and the semi-axes there.
+    t: f32,
+    a: f32,
+    b: f32,
+    /// From the query to the point, and the square of its length.
+    e: [f32; 3],
+    squared: f32,
+    /// The iteration has converged to a distinct minimum.
+    trusted: bool,
+}
+
+/// The last Newton step from the angle `(c, s)`.
+#[inline(always)]
+fn side_foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> SideFoot {
+    let f = foot::<FMA>(k, c, s, x, y, z);
+    // The last step moves t along with the angle to first order; what it leaves is of second order in the step.
+    let step = newton(&f);
+    let (c, s) = turned::<FMA>(c, s, step);
+    let free = fma::<FMA>(f.drift, step, f.free);
+    let t = max(min(free, 1.0), 0.0);
+    let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
+    let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
+    let ez = fma::<FMA>(k.length, t, -z);
+    let squared = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
+    // A step across a rim meets another g'' there, so its error is of first order.
+    let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
+    let error = k.second_order * select(crossed, step.abs(), step * step);
+    let trusted = (error < FOOT_ERROR) & (f.bend >= CONDITIONED * f.tangent);
+    SideFoot { c, s, t, a, b, e: [ex, ey, ez], squared, trusted }
+}
+
+/// Which face is nearest to a query.
+struct Face {
+    /// The query lies inside the solid.
+    inside: bool,
+    /// The nearest face is this cap; at most one of the two.
+    proximal: bool,
+    distal: bool,
+    /// The query lies straight beyond a cap: it is the nearest face, whatever the rounding of the side's distance.
+    decided: bool,
+    squared: f32,
+}
+
+/// The nearest face, when the side is the square root of `side` away.
+#[inline(always)]
+fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f32) -> Face {
+    // Inside: between the caps and inside the slice.
+    let (xx, yy) = (x * x, y * y);
+    let (aa, bb) = k.slice::<FMA>(z);
+    let (aa, bb) = (aa * aa, bb * bb);
+    let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
+    let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
+    // Caps, where the query projects into them.
+    let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
+    let top = z - k.length;
+    let (over_proximal, over_distal) = (over(k.proximal), over(k.distal));
+    let decided = (over_proximal & (z < 0.0)) | (over_distal & (top > 0.0));
+    let proximal = over_proximal & ((z < 0.0) | (z * z < side));
+    let squared = select(proximal, z * z, side);
+    let distal = over_distal & ((top > 0.0) | (top * top < squared));
+    let squared = select(distal, top * top, squared);
+    Face { inside, proximal: proximal & !distal, distal, decided, squared }
+}
+
 /// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
 ///
 /// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
 #[inline(always)]
-pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &Block<N>, out: &mut Surface<N>) {
+pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
     let mut limb = Block::<N>::ZERO;
     let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
     for i in 0..N {
-        let (wx, wy, wz) = (queries.x[i] - k.origin[0], queries.y[i] - k.origin[1], queries.z[i] - k.origin[2]);
-        let turn = |axis: usize| {
-            let [cx, cy, cz] = k.columns[axis];
-            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -k.rest[axis])))
-        };
-        let (qx, qy, z) = (turn(0), turn(1), turn(2));
+        let (qx, qy, z) = k.in_limb::<FMA>(queries.x[i], queries.y[i], queries.z[i]);
         (limb.x[i], limb.y[i], limb.z[i]) = (qx, qy, z);
-        // Start: the direction (x/a, y/b) in the slice, then one step over the evolute of the slice.
-        let (x, y) = (qx.abs(), qy.abs());
-        let (a, b) = k.slice::<FMA>(z);
-        let tiny = 1e-18;
-        let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
-        let focus = fma::<FMA>(a, a, -(b * b));
-        (cosine[i], sine[i]) = unit::<FMA>(
-            max(fma::<FMA>(a, x, -(focus * c) * (c * c)), tiny),
-            max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny),
-        );
+        (cosine[i], sine[i]) = first_angle::<FMA>(k, qx.abs(), qy.abs(), z);
     }
     for i in 0..N {
         let (c, s) = (cosine[i], sine[i]);
@@ -212,50 +297,21 @@ pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &
     for i in 0..N {
         let (qx, qy, z) = (limb.x[i], limb.y[i], limb.z[i]);
         let (x, y) = (qx.abs(), qy.abs());
-        let f = foot::<FMA>(k, cosine[i], sine[i], x, y, z);
-        // The last step moves t along with the angle to first order; what it leaves is of second order in the step.
-        let step = newton(&f);
-        let (c, s) = turned::<FMA>(cosine[i], sine[i], step);
-        let free = fma::<FMA>(f.drift, step, f.free);
-        let t = max(min(free, 1.0), 0.0);
-        let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
-        let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
-        let ez = fma::<FMA>(k.length, t, -z);
-        let side = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
-        // A step across a rim meets another g'' there, so its error is of first order.
-        let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
-        let error = k.second_order * select(crossed, step.abs(), step * step);
-        let trusted = (error < CONVERGED) & (f.bend >= CONDITIONED * f.tangent);
-
-        // Inside: between the caps and inside the slice.
-        let (xx, yy) = (x * x, y * y);
-        let (aa, bb) = k.slice::<FMA>(z);
-        let (aa, bb) = (aa * aa, bb * bb);
-        let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
-        let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
-
-        // Caps, where the query projects into them. Beyond one it is the nearest face, whatever the rounding of `side`.
-        let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
-        let top = z - k.length;
-        let (over_proximal, over_distal) = (over(k.proximal), over(k.distal));
-        let decided = (over_proximal & (z < 0.0)) | (over_distal & (top > 0.0));
-        let proximal = over_proximal & ((z < 0.0) | (z * z < side));
-        let squared = select(proximal, z * z, side);
-        let distal = over_distal & ((top > 0.0) | (top * top < squared));
-        let squared = select(distal, top * top, squared);
-        let proximal = proximal & !distal;
-        let cap = proximal | distal;
-        let distance = squared.sqrt();
-        let sign = select(inside, -1.0, 1.0);
+        let side = side_foot::<FMA>(k, cosine[i], sine[i], x, y, z);
+        let face = nearest_face::<FMA>(k, x, y, z, side.squared);
+        let cap = face.proximal | face.distal;
+        let distance = face.squared.sqrt();
+        let sign = select(face.inside, -1.0, 1.0);
 
         // The vector from the query to the surface, limb frame, unfolded.
         let (sx, sy) = (1f32.copysign(qx), 1f32.copysign(qy));
-        let ex = select(cap, 0.0, ex * sx);
-        let ey = select(cap, 0.0, ey * sy);
-        let ez = select(distal, -top, select(proximal, -z, ez));
+        let ex = select(cap, 0.0, side.e[0] * sx);
+        let ey = select(cap, 0.0, side.e[1] * sy);
+        let ez = select(face.distal, -(z - k.length), select(face.proximal, -z, side.e[2]));
 
-        // NormalEquations: P_θ × P_t on the side, the direction to the query on a rim.
-        let rim = (t <= 0.0) | (t >= 1.0);
+        // Normal: P_θ × P_t on the side, the direction to the query on a rim.
+        let rim = (side.t <= 0.0) | (side.t >= 1.0);
+        let (a, b, c, s) = (side.a, side.b, side.c, side.s);
         let nx = select(rim, -ex * sign, b * c * k.length * sx);
         let ny = select(rim, -ey * sign, a * s * k.length * sy);
         let slant = fma::<FMA>(a * k.db, s * s, b * k.da * (c * c));
@@ -264,29 +320,23 @@ pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &
         let inverse = 1.0 / norm.sqrt();
         let nx = select(cap, 0.0, nx * inverse);
         let ny = select(cap, 0.0, ny * inverse);
-        let nz = select(distal, 1.0, select(proximal, -1.0, nz * inverse));
+        let nz = select(face.distal, 1.0, select(face.proximal, -1.0, nz * inverse));
 
-        let world = |axis: usize, x: f32, y: f32, z: f32, base: f32| {
-            fma::<FMA>(
-                k.columns[0][axis],
-                x,
-                fma::<FMA>(k.columns[1][axis], y, fma::<FMA>(k.columns[2][axis], z, base)),
-            )
-        };
-        out.points.x[i] = world(0, ex, ey, ez, queries.x[i]);
-        out.points.y[i] = world(1, ex, ey, ez, queries.y[i]);
-        out.points.z[i] = world(2, ex, ey, ez, queries.z[i]);
-        out.normals.x[i] = world(0, nx, ny, nz, 0.0);
-        out.normals.y[i] = world(1, nx, ny, nz, 0.0);
-        out.normals.z[i] = world(2, nx, ny, nz, 0.0);
+        out.points.x[i] = k.in_world::<FMA>(0, ex, ey, ez, queries.x[i]);
+        out.points.y[i] = k.in_world::<FMA>(1, ex, ey, ez, queries.y[i]);
+        out.points.z[i] = k.in_world::<FMA>(2, ex, ey, ez, queries.z[i]);
+        out.normals.x[i] = k.in_world::<FMA>(0, nx, ny, nz, 0.0);
+        out.normals.y[i] = k.in_world::<FMA>(1, nx, ny, nz, 0.0);
+        out.normals.z[i] = k.in_world::<FMA>(2, nx, ny, nz, 0.0);
         out.signed_distance[i] = sign * distance;
-        let edge = if t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
+        let edge = if side.t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
         let lateral = if rim { edge } else { Region::Side as u8 };
-        let flat = if distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
+        let flat = if face.distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere is doubtful.
-        let clear =
-            (trusted | decided) & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        let clear = (side.trusted | face.decided)
+            & (cap | (norm > 1e-12))
+            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
         out.doubtful[i] = u8::from(!clear);
     }
 }

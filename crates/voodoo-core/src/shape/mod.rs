@@ -13,6 +13,7 @@
 //! | [`TaperedEllipticCylinder::approximate_distance`] | `approximate` |
 //! | [`TaperedEllipticCylinder::cast_ray`] | `ray` |
 //! | [`TaperedEllipticCylinder::aabb`] | `bounds` |
+//! | [`TaperedEllipticCylinder::section`], what of it faces a camera | `section` |
 
 mod approximate;
 mod batch;
@@ -22,12 +23,14 @@ mod kernel;
 mod lanes;
 mod ray;
 mod ruling;
+mod section;
 
 use crate::math::Vec3;
 use thiserror::Error;
 
 pub use batch::SurfaceBatch;
 pub use ray::RayHit;
+pub use section::{FacingSection, Section};
 
 /// A length below this, metres, is taken for a mistake: it is the accuracy of the queries.
 pub const MIN_SIZE: f64 = 1e-6;

@@ -34,29 +34,7 @@ impl TaperedEllipticCylinder {
         if !origin.is_finite() || max_distance.is_nan() {
             return None;
         }
-        let (mut near, mut far) = (0.0, max_distance);
-        let mut through_cap = None;
-        // The box is widened sideways, so that F > 0 where the ray enters it through a side.
-        let size = self.local_aabb().maxs * 1.001;
-        for (axis, min, max) in [(0, -size.x, size.x), (1, -size.y, size.y), (2, 0.0, self.length)] {
-            let (start, rate) = (origin[axis], direction[axis]);
-            if rate == 0.0 {
-                if start <= min || start >= max {
-                    return None;
-                }
-                continue;
-            }
-            let (first, last) = if rate > 0.0 { (min, max) } else { (max, min) };
-            let entry = (first - start) / rate;
-            if entry >= near {
-                near = entry;
-                through_cap = (axis == 2).then_some(rate > 0.0);
-            }
-            far = f64::min(far, (last - start) / rate);
-        }
-        if near > far {
-            return None;
-        }
+        let (near, far, through_cap) = self.cross_box(origin, direction, max_distance)?;
         let base = origin + direction * near;
         let span = far - near;
         let at = |u: f64| {
@@ -93,6 +71,35 @@ impl TaperedEllipticCylinder {
             (start, was_inside) = (end, is_inside);
         }
         None
+    }
+
+    /// Where a ray of unit direction enters and leaves the box around the shape, metres from its origin, and whether it enters
+    /// through the plane of a cap: of the proximal one when true. `None` when it misses.
+    fn cross_box(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<(f64, f64, Option<bool>)> {
+        let (mut near, mut far) = (0.0, max_distance);
+        let mut through_cap = None;
+        // The box is widened sideways, so that F > 0 where the ray enters it through a side.
+        let size = self.local_aabb().maxs * 1.001;
+        for (axis, min, max) in [(0, -size.x, size.x), (1, -size.y, size.y), (2, 0.0, self.length)] {
+            let (start, rate) = (origin[axis], direction[axis]);
+            if rate == 0.0 {
+                if start <= min || start >= max {
+                    return None;
+                }
+                continue;
+            }
+            let (first, last) = if rate > 0.0 { (min, max) } else { (max, min) };
+            let entry = (first - start) / rate;
+            if entry >= near {
+                near = entry;
+                through_cap = (axis == 2).then_some(rate > 0.0);
+            }
+            far = f64::min(far, (last - start) / rate);
+        }
+        if near > far {
+            return None;
+        }
+        Some((near, far, through_cap))
     }
 
     /// Outward normal at a point of the side.

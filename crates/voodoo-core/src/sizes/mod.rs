@@ -166,7 +166,7 @@ impl Sizes {
                 continue;
             }
             let shape = model.body.limbs()[limb].shape;
-            if let Some(axes) = girth.follow(&shape, fit.contour().sides(limb)) {
+            if let Some(axes) = girth.follow(&shape, fit.contours().sides(limb)) {
                 model.body.change_girth(limb, Vec3::ZERO, axes);
             }
         }

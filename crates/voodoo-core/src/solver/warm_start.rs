@@ -50,7 +50,7 @@ impl WarmStart {
         self.driven.resize(count, true);
         self.following.clear();
         self.following.resize(count, false);
-        for pair in problem.correspondences.sites.iter().filter(|pair| pair.given > 0.0) {
+        for pair in problem.correspondences.sites.iter().filter(|pair| pair.base_weight > 0.0) {
             self.following[pair.limb] = true;
             drive_from(problem.body, pair.limb, &mut self.following);
         }
@@ -89,7 +89,7 @@ impl WarmStart {
         self.normal.clear(poses.len());
         // Beside points a site within its bias must not count as much as any other.
         let with_points = !self.following.is_empty();
-        let weights = correspondences.sites.iter().map(|pair| if with_points { pair.given } else { pair.weight });
+        let weights = correspondences.sites.iter().map(|pair| if with_points { pair.base_weight } else { pair.weight });
         let heaviest = weights.fold(f64::MIN_POSITIVE, f64::max);
         let information = DRIVING_INFORMATION / (heaviest * config.point_sigma * config.point_sigma);
         if with_points {
@@ -97,7 +97,7 @@ impl WarmStart {
         }
         let terms: [&dyn Term; 3] = [
             &Sites { correspondences, information, scale: SCALE, biased: true },
-            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, calm: 0.0 },
+            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, still_gain: 0.0 },
             &Limits { sigma: LIMIT_SIGMA },
         ];
         for term in terms {
@@ -126,7 +126,8 @@ impl WarmStart {
     /// Points of the limbs that follow draw them, those of the others hold them where they are.
     fn add_points(&mut self, problem: &Problem, information: f64) {
         let Problem { body, correspondences, config, .. } = problem;
-        let surface = |slide| Surface { correspondences, information, slide, scale: config.kernel_start };
+        let surface =
+            |slide| Surface { correspondences, information, tangential_weight: slide, scale: config.kernel_start };
         // Limbs that follow may slide along themselves.
         surface(config.slide).add(body, &self.closed, &mut self.normal);
         self.held.clear(self.closed.len());

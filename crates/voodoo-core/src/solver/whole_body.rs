@@ -97,11 +97,11 @@ impl WholeBody {
         let root = [config.root_turn_sigma, config.root_shift_sigma]
             .map(|sigma| sigma * problem.time_scale * config.motion_scale);
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
-        let surface = Surface { correspondences, information, slide: config.slide, scale };
+        let surface = Surface { correspondences, information, tangential_weight: config.slide, scale };
         let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
-        let contour = Contour { edges: &correspondences.edges, information: edge_information, scale: 2.0 * scale };
-        let calm = still_prior_gain(problem, information);
-        let prior = Prior { predicted, root, joints: &self.joint_sigmas, calm };
+        let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
+        let still_gain = still_prior_gain(problem, information);
+        let prior = Prior { predicted, root, joints: &self.joint_sigmas, still_gain };
         let limits = Limits { sigma: LIMIT_SIGMA };
         let penetration = Penetration { sigma: OVERLAP_SIGMA };
         // The objective: one more term is a file and a line here.

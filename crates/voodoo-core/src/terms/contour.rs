@@ -1,7 +1,7 @@
-//! The body's outline in depth images: no limb stands out of it, and none keeps from an edge that is its own.
+//! The body's contour in depth images: no limb stands out of it, and none keeps from an edge that is its own.
 
 use super::{Term, surface::geman_mcclure};
-use crate::association::correspondence::EdgePair;
+use crate::association::correspondence::ContourPair;
 use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
@@ -10,7 +10,7 @@ use crate::terms::normal_equations::NormalEquations;
 #[derive(Debug)]
 pub struct Contour<'a> {
     /// The pairs.
-    pub edges: &'a [EdgePair],
+    pub pairs: &'a [ContourPair],
     /// Information of an edge, 1/m^2.
     pub information: f64,
     /// Scale of the kernel, metres.
@@ -19,7 +19,7 @@ pub struct Contour<'a> {
 
 impl Term for Contour<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
-        for pair in self.edges {
+        for pair in self.pairs {
             let (rho, kernel) = geman_mcclure(pair.distance, self.scale);
             normal.cost += self.information * rho;
             let row = crate::terms::normal_equations::line(pair.x, pair.normal);

@@ -1,4 +1,4 @@
-//! NormalEquations equations of the whole body: what terms add to and whole-body solvers read.
+//! Normal equations of the whole body: what terms add to and whole-body solvers read.
 //!
 //! A limb moves by a spatial twist `(omega, v)` about the working frame's origin: a point `x` fixed to it moves by
 //! `omega x x + v`. A joint turns by the relative angular motion `omega_child - omega_parent`, world axes.
@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::math::{Mat3, Vec3};
 
-/// NormalEquations equations of one limb's twist.
+/// Normal equations of one limb's twist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LimbBlock {
     /// Information of the twist.
@@ -17,7 +17,7 @@ pub struct LimbBlock {
     pub g: Vector6<f64>,
 }
 
-/// NormalEquations equations of one joint's relative turn (the joint of a limb to its parent).
+/// Normal equations of one joint's relative turn (the joint of a limb to its parent).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointBlock {
     /// Information of the turn.

@@ -7,7 +7,7 @@ use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 use crate::terms::normal_equations::NormalEquations;
 
-/// Where on a limb's axis it is felt, as shares of the length.
+/// Where on a limb's axis overlap is felt, as shares of the length: both ends, and two places between.
 const FELT: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 /// Error of `approximate_distance` that is allowed for before the exact distance is asked, metres.
 const APPROXIMATE: f64 = 0.01;

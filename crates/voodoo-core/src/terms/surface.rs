@@ -6,7 +6,7 @@ use crate::body::Body;
 use crate::math::{Mat3, Pose, widest};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 
-/// `W = w (n n^T + slide (I - n n^T))` under the Geman-McClure kernel of the signed distance.
+/// `W = w (n n^T + tangential_weight (I - n n^T))` under the Geman-McClure kernel of the signed distance.
 #[derive(Debug)]
 pub struct Surface<'a> {
     /// The matches.
@@ -14,7 +14,7 @@ pub struct Surface<'a> {
     /// Information of a point of weight one, 1/m^2.
     pub information: f64,
     /// Share of the information across the normal: it stops sliding.
-    pub slide: f64,
+    pub tangential_weight: f64,
     /// Scale of the kernel, metres.
     pub scale: f64,
 }
@@ -94,7 +94,7 @@ impl Surface<'_> {
 
     #[inline(always)]
     fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight]: [Lanes; 8], sums: &mut Sums) {
-        let (information, slide) = (self.information as f32, self.slide as f32);
+        let (information, tangential) = (self.information as f32, self.tangential_weight as f32);
         let inverse_square = (1.0 / (self.scale * self.scale)) as f32;
         let (mut pull, mut plane, mut iso) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         let mut row = [[0.0; LANES], [0.0; LANES], [0.0; LANES], nx, ny, nz];
@@ -106,8 +106,8 @@ impl Surface<'_> {
             let weight = weight * falloff * falloff;
             // The residual n . (x - p) is the negative signed distance of the measured point.
             pull[l] = -weight * distance[l];
-            plane[l] = weight * (1.0 - slide);
-            iso[l] = weight * slide;
+            plane[l] = weight * (1.0 - tangential);
+            iso[l] = weight * tangential;
             row[0][l] = y[l] * nz[l] - z[l] * ny[l];
             row[1][l] = z[l] * nx[l] - x[l] * nz[l];
             row[2][l] = x[l] * ny[l] - y[l] * nx[l];

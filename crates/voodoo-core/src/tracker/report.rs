@@ -53,7 +53,7 @@ impl Estimate {
         for pair in &correspondences.sites {
             let report = entry(sources, pair.source);
             report.count += 1;
-            report.add(pair.given, (pair.x - pair.p).length_squared());
+            report.add(pair.base_weight, (pair.x - pair.p).length_squared());
         }
         sources.iter_mut().for_each(SourceReport::finish);
     }

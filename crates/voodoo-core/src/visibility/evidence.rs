@@ -7,17 +7,17 @@ use crate::association::correspondence::Correspondences;
 use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::depth_view::{DepthViews, Pixel, View};
+use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
+use crate::visibility::{ALONG_LIMB, SEEN_PAST, SEEN_PAST_TO_SCENE};
 
-/// A point this far from the model is not explained, metres.
+/// A point this far from the model's surface is not explained by it, metres.
 pub const EXPLAINED: f64 = 0.04;
-/// The camera sees past the model's surface when the return lies this much behind it, metres.
-const PAST: f64 = 0.08;
-/// Cost of a patch that hides behind what is seen.
-const HIDDEN: f64 = 0.3;
-/// Places along a limb and across it that are looked at.
-const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
+/// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
+const OCCLUDED_COST: f64 = 0.3;
+/// Where across a limb patches are looked at, in shares of its radius from the middle.
+const PATCHES_ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
+/// A camera nearer to a limb's axis than this, metres, looks along it and sees no patch of its side.
+const END_ON: f64 = 1e-6;
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +68,7 @@ impl std::ops::AddAssign for Visibility {
 impl Visibility {
     /// Cost in unexplained patches: to be seen past is as bad as to leave a patch unexplained, to hide is suspicious.
     pub fn cost(&self) -> f64 {
-        self.image.free_space + HIDDEN * self.side.occluded
+        self.image.free_space + OCCLUDED_COST * self.side.occluded
     }
 }
 
@@ -78,25 +78,19 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
     let mut found = Visibility::default();
     for view in views.iter() {
         let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-        for t in ALONG {
-            let z = t * shape.length();
-            let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
-            let centre = camera_from_limb * Vec3::new(0.0, 0.0, z);
-            // Direction to the camera, across the limb, in the limb frame.
-            let ahead = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0);
-            if ahead.length() < 1e-6 {
+        for t in ALONG_LIMB {
+            let section = shape.section(t);
+            let Some(facing) = section.facing(&camera_from_limb) else { continue };
+            if facing.across.length() < END_ON {
                 continue;
             }
+            let (a, b) = (section.a, section.b);
             // A limb seen aslant covers so much less of the image, as the points seen on it do.
-            let aslant = ahead.length() / centre.length();
-            let ahead = ahead.normalize();
-            let side = Vec3::new(-ahead.y, ahead.x, 0.0);
-            for s in ACROSS {
-                let forward = (1.0 - s * s).sqrt();
-                let place = ahead * forward + side * s;
-                let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, z);
+            let aslant = facing.across.length() / (camera_from_limb * section.centre()).length();
+            for s in PATCHES_ACROSS {
+                let point = camera_from_limb * facing.point(s);
                 let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
-                    / (REFERENCE_PATCH * (ALONG.len() * ACROSS.len()) as f64);
+                    / (REFERENCE_PATCH * (ALONG_LIMB.len() * PATCHES_ACROSS.len()) as f64);
                 let Some(sight) = sight(&view, point) else { continue };
                 for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
                     match sight {
@@ -112,12 +106,12 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
     found
 }
 
-fn sight(view: &View, point: Vec3) -> Option<Sight> {
+fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
     Some(match view.at(point) {
         Pixel::Unknown => return None,
-        Pixel::Background(z) if z > point.z + 0.5 * PAST => Sight::FreeSpaceViolation,
-        Pixel::Foreground(z) if z > point.z + PAST => Sight::FreeSpaceViolation,
-        Pixel::Background(z) | Pixel::Foreground(z) if z > point.z - PAST => Sight::Consistent,
+        Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => Sight::FreeSpaceViolation,
+        Pixel::Foreground(z) if z > point.z + SEEN_PAST => Sight::FreeSpaceViolation,
+        Pixel::Background(z) | Pixel::Foreground(z) if z > point.z - SEEN_PAST => Sight::Consistent,
         _ => Sight::Occluded,
     })
 }
@@ -137,10 +131,98 @@ pub fn unexplained(correspondences: &Correspondences, total_weight: f64) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::association::correspondence::LimbMatches;
     use crate::body::{Body, HumanModel};
     use crate::math::Quat;
     use crate::observation::background::Backgrounds;
     use crate::observation::frame::{DepthImage, DepthPixels, Frame};
+    use crate::visibility::render::{Rendering, Viewpoint};
+
+    const WIDTH: usize = 160;
+    const HEIGHT: usize = 120;
+    const INTRINSICS: [f64; 4] = [140.0, 140.0, 79.5, 59.5];
+
+    /// What a camera at the origin sees of a body, and `behind` where it sees none of it, millimetres.
+    fn shoot(body: &Body, poses: &[Pose], behind: u16) -> Vec<u16> {
+        let world_from_sensor = Pose::identity();
+        let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
+        let mut image = Rendering::default();
+        image.render(body, poses, &view, None).unwrap();
+        let millimetres = |depth: &f32| if *depth > 0.0 { (depth * 1000.0).round() as u16 } else { behind };
+        image.depth().iter().map(millimetres).collect()
+    }
+
+    /// What is seen of every limb together.
+    fn seen(pixels: &[u16], body: &Body, poses: &[Pose]) -> Visibility {
+        let images = [DepthImage {
+            pixels: DepthPixels::U16(pixels),
+            width: WIDTH,
+            height: HEIGHT,
+            metres_per_unit: 0.001,
+            intrinsics: INTRINSICS,
+            rays: None,
+            world_from_sensor: Pose::identity(),
+            weight: 1.0,
+            source: 0,
+        }];
+        let frame = Frame { images: &images, ..Frame::empty(0.0) };
+        let views =
+            DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
+        let mut all = Visibility::default();
+        body.limbs().iter().zip(poses).for_each(|(limb, pose)| all += limb_visibility(views, limb, pose));
+        all
+    }
+
+    /// A person who faces the camera, 2.5 m before it, arms hanging.
+    fn standing(body: &Body) -> Vec<Pose> {
+        let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+        body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.0, 2.5), upright))
+    }
+
+    #[test]
+    fn a_body_where_it_is_seen_costs_little_and_elsewhere_much() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = standing(&body);
+        let pixels = shoot(&body, &poses, 4000);
+        let right = seen(&pixels, &body, &poses);
+        assert!(
+            right.image.front_facing > 500.0 && right.image.free_space < 0.05 * right.image.front_facing,
+            "{right:?}"
+        );
+        // The farther aside, the more of it stands where the camera sees the wall.
+        let mut last = right.cost();
+        for shift in [0.1, 0.2, 0.4] {
+            let aside: Vec<Pose> =
+                poses.iter().map(|pose| Pose::from_parts(pose.translation + shift * Vec3::X, pose.rotation)).collect();
+            let cost = seen(&pixels, &body, &aside).cost();
+            assert!(cost > last + 50.0, "{cost} at {shift} m after {last}");
+            last = cost;
+        }
+    }
+
+    #[test]
+    fn a_body_behind_a_wall_is_hidden_and_before_it_contradicted() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = standing(&body);
+        let wall = |millimetres: u16| seen(&vec![millimetres; WIDTH * HEIGHT], &body, &poses);
+        let (before, behind, nothing) = (wall(1500), wall(4000), wall(0));
+        assert!(before.image.front_facing > 0.0 && before.image.occluded == before.image.front_facing, "{before:?}");
+        assert!(before.image.free_space == 0.0 && behind.image.occluded == 0.0);
+        assert_eq!(behind.image.free_space, behind.image.front_facing);
+        assert!(before.cost() < behind.cost(), "to be hidden is possible, to be seen through is not");
+        assert_eq!(nothing, Visibility::default(), "no return says nothing");
+    }
+
+    #[test]
+    fn points_cost_what_the_surface_leaves_of_them() {
+        let mut all = Correspondences::default();
+        let mut matches = LimbMatches { weight: vec![2.0, 0.0, 1.0, 3.0], ..LimbMatches::default() };
+        matches.surface.signed_distance = vec![0.0, 0.0, -0.02, 0.5];
+        all.limbs.push(matches);
+        // Five points of weight one are matched to nothing at all: `w min(d^2 / c^2, 1)` one by one.
+        let expected = 5.0 + 2.0 * 0.0 + 1.0 * (0.02_f64 / EXPLAINED).powi(2) + 3.0;
+        assert!((unexplained(&all, 5.0 + 2.0 + 1.0 + 3.0) - expected).abs() < 1e-6);
+    }
 
     #[test]
     fn a_limb_seen_aslant_shows_as_much_less_as_its_image_is_shorter() {

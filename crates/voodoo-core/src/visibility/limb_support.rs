@@ -7,24 +7,22 @@
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::math::{Pose, Vec3};
-use crate::observation::depth_view::{DepthViews, Pixel, View};
+use crate::math::Pose;
+use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::render::LimbRaycaster;
+use crate::visibility::{ALONG_LIMB, SEEN_PAST, SEEN_PAST_TO_SCENE};
 
-/// Places along a limb and across it that are looked at; nearer to the rim, a pixel shows what lies beside it.
-const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const ACROSS: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
-/// The outer part of a limb begins here, with so many places.
+/// Where across a limb places are looked at, in shares of its radius from the middle; nearer to the rim, a pixel shows what
+/// lies beside it.
+const PLACES_ACROSS: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+/// The outer part of a limb begins at this share of its length.
 const OUTER: f64 = 0.6;
+/// So many places lie in the outer part: two along, five across.
 const OUTER_PLACES: f64 = 10.0;
 /// What a camera sees at a place this near is explained by it, and by any other surface this near, metres along the ray.
-const NEAR: f64 = 0.04;
-/// The camera sees past a place when what may be the body lies this much behind it, metres; what is known to be the scene
-/// behind the body less.
-const PAST: f64 = 0.08;
-const PAST_SCENE: f64 = 0.04;
-/// A limb stands before a place when it is nearer by this, metres.
+const SAME_DEPTH: f64 = 0.04;
+/// A limb stands before a place when it is nearer to the camera by this, metres: limbs overlap at their joints.
 const BEFORE: f64 = 0.01;
 
 /// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
@@ -37,8 +35,8 @@ const BEFORE: f64 = 0.01;
 pub struct LimbSupport {
     /// Seen where they are, and explained by no limb of another arm, leg or the trunk.
     pub own: [f64; 2],
-    /// A camera sees past them.
-    pub past: [f64; 2],
+    /// A camera sees past them: the space where they would be is free.
+    pub free_space: [f64; 2],
     /// Some image says something about the limb.
     pub known: bool,
 }
@@ -46,21 +44,21 @@ pub struct LimbSupport {
 impl LimbSupport {
     /// What speaks for the limb less what speaks against it.
     pub fn net(&self) -> [f64; 2] {
-        [self.own[0] - self.past[0], self.own[1] - self.past[1]]
+        [self.own[0] - self.free_space[0], self.own[1] - self.free_space[1]]
     }
 }
 
-/// Looks at the upper and lower limbs of all `chains`; `proofs` gets one entry a limb, `raycasters` is working memory.
+/// Looks at the upper and lower limbs of all `chains`; `supports` gets one entry a limb, `raycasters` is working memory.
 pub fn measure_support(
     views: DepthViews,
     body: &Body,
     poses: &[Pose],
     chains: &[TwoBone],
     raycasters: &mut Vec<LimbRaycaster>,
-    proofs: &mut Vec<LimbSupport>,
+    supports: &mut Vec<LimbSupport>,
 ) {
-    proofs.clear();
-    proofs.resize(poses.len(), LimbSupport::default());
+    supports.clear();
+    supports.resize(poses.len(), LimbSupport::default());
     for view in views.iter() {
         raycasters.clear();
         let limbs = body.limbs().iter().zip(poses);
@@ -69,12 +67,12 @@ pub fn measure_support(
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
                 let seen = support_seen_by(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);
-                let proof = &mut proofs[limb];
+                let support = &mut supports[limb];
                 for part in 0..2 {
-                    proof.own[part] = proof.own[part].max(seen.own[part]);
-                    proof.past[part] = proof.past[part].max(seen.past[part]);
+                    support.own[part] = support.own[part].max(seen.own[part]);
+                    support.free_space[part] = support.free_space[part].max(seen.free_space[part]);
                 }
-                proof.known |= seen.known;
+                support.known |= seen.known;
             }
         }
     }
@@ -82,7 +80,7 @@ pub fn measure_support(
 
 /// What one camera says of a limb of a chain.
 fn support_seen_by(
-    view: &View,
+    view: &DepthView,
     shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
     limb: usize,
@@ -90,44 +88,37 @@ fn support_seen_by(
     raycasters: &[LimbRaycaster],
 ) -> LimbSupport {
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-    let mut proof = LimbSupport::default();
-    for t in ALONG {
-        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
-        let centre = camera_from_limb * Vec3::new(0.0, 0.0, t * shape.length());
-        // Direction to the camera, across the limb, in the limb frame.
-        let Some(ahead) = camera_from_limb.inverse_transform_vector(-centre).with_z(0.0).try_normalize() else {
-            continue;
-        };
-        let side = Vec3::new(-ahead.y, ahead.x, 0.0);
+    let mut support = LimbSupport::default();
+    for t in ALONG_LIMB {
+        let Some(facing) = shape.section(t).facing(&camera_from_limb) else { continue };
         // The weights of all places add up to one, in the whole and in the outer part.
-        let lever = t / (ALONG.iter().sum::<f64>() * ACROSS.len() as f64);
+        let lever = t / (ALONG_LIMB.iter().sum::<f64>() * PLACES_ACROSS.len() as f64);
         let outer = if t > OUTER { 1.0 / OUTER_PLACES } else { 0.0 };
         let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
-        for s in ACROSS {
-            let place = ahead * (1.0 - s * s).sqrt() + side * s;
-            let point = camera_from_limb * Vec3::new(a * place.x, b * place.y, t * shape.length());
+        for s in PLACES_ACROSS {
+            let point = camera_from_limb * facing.point(s);
             let pixel = view.at(point);
             if pixel == Pixel::Unknown {
                 continue;
             }
-            proof.known = true;
+            support.known = true;
             let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
             let others = || raycasters.iter().enumerate().filter(|(other, _)| *other != limb);
             if others().any(|(_, other)| depth(other) < point.z - BEFORE) {
                 continue;
             }
             match pixel {
-                Pixel::Background(z) if z > point.z + PAST_SCENE => count(&mut proof.past),
-                Pixel::Foreground(z) if z > point.z + PAST => count(&mut proof.past),
-                Pixel::Foreground(z) if (z - point.z).abs() < NEAR => {
+                Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => count(&mut support.free_space),
+                Pixel::Foreground(z) if z > point.z + SEEN_PAST => count(&mut support.free_space),
+                Pixel::Foreground(z) if (z - point.z).abs() < SAME_DEPTH => {
                     let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
-                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < NEAR) {
-                        count(&mut proof.own);
+                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < SAME_DEPTH) {
+                        count(&mut support.own);
                     }
                 }
                 _ => {}
             }
         }
     }
-    proof
+    support
 }

@@ -1,9 +1,9 @@
 //! The depth image that a camera should see of a posed body, and which limb each pixel shows: geometry, no drawing.
 //!
-//! Every pixel's ray meets the limbs whose outline can cover it. Along a ray `o + u (x, y, 1)`, `u` the depth, the side is
+//! Every pixel's ray meets the limbs whose silhouette can cover it. Along a ray `o + u (x, y, 1)`, `u` the depth, the side is
 //! `(X / a)² + (Y / b)² = 1` with X, Y, a and b linear in u. With the aspect `a / b` held fixed that is a quadratic; two
 //! rounds of it, the aspect taken where the last one ended, and two Newton steps on the true equation give the root to a
-//! micrometre. Rays near an outline, along the axis of a limb, and limbs whose aspect changes much go through
+//! micrometre. Rays near a silhouette's border, along the axis of a limb, and limbs whose aspect changes much go through
 //! [`TaperedEllipticCylinder::cast_ray`], which is exact and fifty times slower.
 
 use rayon::prelude::*;
@@ -15,20 +15,25 @@ use crate::shape::TaperedEllipticCylinder;
 
 /// Mark of a pixel that shows no limb.
 pub const NO_LIMB: u16 = u16::MAX;
-/// Rays worked on together.
+/// Rays worked on together: one SIMD register of double precision.
 const LANES: usize = 8;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
-const BAND: usize = 16;
-/// Limbs nearer to the camera plane than this have no usable outline, metres; every ray is tried.
-const NEAR: f64 = 0.01;
-/// Outlines are widened by this, in units of `x / z`, against rounding.
-const ROUNDING: f64 = 1e-9;
+const ROWS_TOGETHER: usize = 16;
+/// Limbs nearer to the camera plane than this have no usable bounds in the image, metres; every ray is tried.
+const NEAREST_CORNER: f64 = 0.01;
+/// Bounds in the image are widened by this, in units of `x / z`, against rounding.
+const BOUNDS_SLACK: f64 = 1e-9;
 /// Greatest `|ln(a0 b1 / (a1 b0))|` for which the aspect may be held fixed (method section 2).
 const PLAIN_ASPECT: f64 = 0.3;
 /// A ray whose least squared distance from the axis is within this share of the squared radius grazes the limb.
 const GRAZING: f64 = 0.02;
+/// Looking along the axis, a cone is no ellipse any more: where the square of the ray's direction across the axis is less than
+/// this share of the square of the growth of the semi-axes along it.
+const AXIAL_SLOPE: f64 = 0.01;
+/// The same for a cylinder: the least square of the ray's direction across the axis (about half a degree).
+const AXIAL: f64 = 1e-4;
 /// Where the last Newton step was longer than this, metres, the root is not trusted.
-const CONVERGED: f64 = 1e-6;
+const ROOT_STEP: f64 = 1e-6;
 
 /// Where a depth camera stands and how its pixels look out.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +96,7 @@ pub struct Rendering {
     width: usize,
     depth: Vec<f32>,
     limb: Vec<u16>,
-    outlines: Vec<LimbRaycaster>,
+    raycasters: Vec<LimbRaycaster>,
 }
 
 impl Rendering {
@@ -130,27 +135,27 @@ impl Rendering {
             let found = format!("{} poses for {} limbs, or one not finite", world_from_limb.len(), limbs.len());
             return Err(TrackError::measurement("world_from_limb", "one finite pose a limb", found));
         }
-        let Self { width, depth, limb, outlines } = self;
+        let Self { width, depth, limb, raycasters } = self;
         *width = view.width;
         depth.clear();
         depth.resize(view.width * view.height, 0.0);
         limb.clear();
         limb.resize(view.width * view.height, NO_LIMB);
-        outlines.clear();
-        outlines.extend(
+        raycasters.clear();
+        raycasters.extend(
             limbs
                 .iter()
                 .zip(world_from_limb)
                 .map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.world_from_sensor))),
         );
-        let outlines = &*outlines;
-        let size = view.width * BAND;
+        let raycasters = &*raycasters;
+        let size = view.width * ROWS_TOGETHER;
         let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
             widest(
                 #[inline(always)]
                 || {
-                    for (index, outline) in (0..).zip(outlines) {
-                        outline.fill(view, band * BAND, index, depth, limb);
+                    for (index, raycaster) in (0..).zip(raycasters) {
+                        raycaster.fill(view, band * ROWS_TOGETHER, index, depth, limb);
                     }
                 },
             );
@@ -182,7 +187,7 @@ pub struct LimbRaycaster {
 }
 
 impl LimbRaycaster {
-    /// The outline of a limb of this shape for a camera in this place.
+    /// The rays of one camera against a limb of this shape for a camera in this place.
     pub fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();
         let mut corners = Some([[0.0; 2]; 8]);
@@ -194,7 +199,7 @@ impl LimbRaycaster {
             };
             let sign = |bit: usize| if index & bit == 0 { 1.0 } else { -1.0 };
             let corner = sensor_from_limb * Vec3::new(sign(1) * a, sign(2) * b, z);
-            corners = corners.filter(|_| corner.z > NEAR);
+            corners = corners.filter(|_| corner.z > NEAREST_CORNER);
             if let Some(corners) = &mut corners {
                 corners[index] = [corner.x / corner.z, corner.y / corner.z];
             }
@@ -202,8 +207,8 @@ impl LimbRaycaster {
         if let Some(corners) = &corners {
             for axis in 0..2 {
                 let values = || corners.iter().map(|corner| corner[axis]);
-                low[axis] = values().fold(f64::INFINITY, f64::min) - ROUNDING;
-                high[axis] = values().fold(f64::NEG_INFINITY, f64::max) + ROUNDING;
+                low[axis] = values().fold(f64::INFINITY, f64::min) - BOUNDS_SLACK;
+                high[axis] = values().fold(f64::NEG_INFINITY, f64::max) + BOUNDS_SLACK;
             }
         }
         // A cone's tip or a wedge has no aspect: the logarithm is not finite, and the comparison false.
@@ -253,11 +258,11 @@ impl LimbRaycaster {
         for (index, from) in corners.iter().enumerate() {
             for to in &corners[index + 1..] {
                 let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
-                if low[1] > y + ROUNDING || high[1] < y - ROUNDING {
+                if low[1] > y + BOUNDS_SLACK || high[1] < y - BOUNDS_SLACK {
                     continue;
                 }
                 let rise = high[1] - low[1];
-                if rise < ROUNDING {
+                if rise < BOUNDS_SLACK {
                     first = first.min(low[0]).min(high[0]);
                     last = last.max(low[0]).max(high[0]);
                 } else {
@@ -268,8 +273,8 @@ impl LimbRaycaster {
             }
         }
         let column = |x: f64| (fx * x + cx).clamp(-1.0, view.width as f64);
-        let start = column(first - 2.0 * ROUNDING).ceil().max(0.0) as usize;
-        let end = (column(last + 2.0 * ROUNDING).floor() + 1.0).clamp(0.0, view.width as f64) as usize;
+        let start = column(first - 2.0 * BOUNDS_SLACK).ceil().max(0.0) as usize;
+        let end = (column(last + 2.0 * BOUNDS_SLACK).floor() + 1.0).clamp(0.0, view.width as f64) as usize;
         (start, end.max(start))
     }
 
@@ -354,8 +359,7 @@ impl LimbRaycaster {
             let discriminant = q * q - p * r;
             let radius = a0 + da * z;
             grazing = discriminant.abs() < GRAZING * p * radius * radius;
-            // Looking along the axis, a cone is no ellipse any more.
-            grazing |= p < 0.01 * slope * slope + 1e-4;
+            grazing |= p < AXIAL_SLOPE * slope * slope + AXIAL;
             // A ray that misses comes nearest where the root's real part is.
             root = (-q - select(discriminant > 0.0, discriminant, 0.0).sqrt()) / p;
             root = select(discriminant >= 0.0, root, f64::NAN);
@@ -375,7 +379,7 @@ impl LimbRaycaster {
         }
         let on_side = (root >= enter) & (root <= leave) & (root > 0.0);
         let depth = select(on_side, root, f64::NAN);
-        let unsure = !through_cap & (grazing | (on_side & !(step.abs() < CONVERGED)) | (d.z.abs() < 1e-9));
+        let unsure = !through_cap & (grazing | (on_side & !(step.abs() < ROOT_STEP)) | (d.z.abs() < 1e-9));
         (select(through_cap, enter, depth), unsure)
     }
 }

@@ -27,7 +27,7 @@ impl Noise {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// NormalEquations with standard deviation 1 (Irwin-Hall).
+    /// Normal with standard deviation 1 (Irwin-Hall).
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }

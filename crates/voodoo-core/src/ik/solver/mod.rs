@@ -22,9 +22,10 @@ const NUDGE: f64 = 0.05;
 /// The same for an angle that stands at its limit: a knee bent backwards as far as it goes has its stretched pose, which is
 /// farther from a near goal, between itself and all that bend forwards.
 const NUDGE_AT_LIMIT: f64 = 0.35;
-/// The image is at rest when the criterion falls by less than this share in so many steps, one after the other.
+/// The image is at rest when the criterion falls by less than this share in [`STALLED_STEPS`] steps, one after the other.
 const LEAST_FALL: f64 = 1e-3;
-const PATIENCE: usize = 3;
+/// Steps without a fall after which the image is at rest.
+const STALLED_STEPS: usize = 3;
 
 /// How to solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -181,7 +182,7 @@ impl Solver {
             let before = self.h;
             let moved = self.step(problem, active, image, slack, angles);
             idle = if image && before - self.h < LEAST_FALL * before { idle + 1 } else { 0 };
-            if moved >= options.still && idle < PATIENCE {
+            if moved >= options.still && idle < STALLED_STEPS {
                 continue;
             }
             let stuck = !image && self.cost[phase].sqrt() > options.tolerance;

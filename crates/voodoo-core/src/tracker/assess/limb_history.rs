@@ -117,7 +117,7 @@ mod tests {
             limb.update(*now);
             limb.support(&support.map_or_else(LimbSupport::default, |own| LimbSupport {
                 own,
-                past: [0.0; 2],
+                free_space: [0.0; 2],
                 known: true,
             }));
         }

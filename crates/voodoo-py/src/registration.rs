@@ -4,7 +4,7 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use voodoo_core::observation::registration::{Measured, ProjectedPoints, Window};
+use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
 
 use crate::errors::{IntoPy, exception};
 
@@ -96,7 +96,7 @@ pub fn nearest_surface<'py>(
     columns(py, "pixels", &pixels, 2)?;
     let still = still.as_ref().map(|marks| marks.as_slice()).transpose()?;
     let among = among.as_ref().map(|marks| marks.as_slice()).transpose()?;
-    let measured = Measured { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
+    let measured = MeasuredPixels { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
     measured.nearest_surface(pixel, radius, among).map_err(|error| error.into_py(py))
 }
 

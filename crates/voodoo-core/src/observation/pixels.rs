@@ -1,0 +1,158 @@
+//! The pixels of a depth image as points: which are used, and a stretch of a row at a time on SIMD lanes.
+
+use crate::math::Points;
+use crate::observation::background::Background;
+use crate::observation::frame::{DepthImage, DepthPixels};
+
+/// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
+pub(super) struct PointGate {
+    pub low: [f32; 3],
+    pub high: [f32; 3],
+    pub up: [f32; 3],
+    pub floor: f32,
+}
+
+impl PointGate {
+    #[inline(always)]
+    pub fn passes(&self, p: [f32; 3]) -> bool {
+        let inside = |axis: usize| (p[axis] >= self.low[axis]) & (p[axis] <= self.high[axis]);
+        inside(0) & inside(1) & inside(2) & (p[0] * self.up[0] + p[1] * self.up[1] + p[2] * self.up[2] >= self.floor)
+    }
+}
+
+/// Which pixels of an image are used: every so manyth row, and in it every so manyth column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grid {
+    pub rows: usize,
+    pub columns: usize,
+}
+
+impl Grid {
+    /// About one pixel in `share`, as evenly as whole numbers allow.
+    pub fn new(share: f64) -> Self {
+        let rows = share.sqrt().floor().max(1.0);
+        let columns = (share / rows).round().max(1.0);
+        Self { rows: rows as usize, columns: columns as usize }
+    }
+
+    /// First column of a row: where columns are wider than rows, those of one row stand between those of the next.
+    pub fn offset(self, row: usize) -> usize {
+        if self.columns == self.rows { 0 } else { row / self.rows * (self.columns / 2) % self.columns }
+    }
+}
+
+/// Pixels of a row that are looked at together: a whole number of SIMD lanes.
+pub(super) const STRETCH: usize = 32;
+
+/// Visits every `stride`th value with its place in `to`; neighbours fill whole registers.
+#[inline(always)]
+fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, &T)) {
+    if stride == 1 {
+        to.iter_mut().zip(from).for_each(|(to, value)| visit(to, value));
+    } else {
+        to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, value)| visit(to, value));
+    }
+}
+
+/// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
+pub(super) struct Stretch {
+    x: [f32; STRETCH],
+    y: [f32; STRETCH],
+    z: [f32; STRETCH],
+}
+
+impl Stretch {
+    #[inline(always)]
+    pub fn load(image: &DepthImage, background: &[f32], row: usize, start: usize, end: usize, stride: usize) -> Self {
+        let count = STRETCH.min((end - start).div_ceil(stride));
+        let first = row * image.width + start;
+        let scale = image.metres_per_unit as f32;
+        let mut z = [0.0; STRETCH];
+        match image.pixels {
+            DepthPixels::U16(pixels) => {
+                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = f32::from(*pixel) * scale);
+            }
+            DepthPixels::F32(pixels) => {
+                every(&pixels[first..], stride, &mut z[..count], |z, pixel| *z = *pixel * scale);
+            }
+        }
+        if !background.is_empty() {
+            every(&background[first..], stride, &mut z[..count], |z, depth| {
+                *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
+            });
+        }
+        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
+        let mut x = [0.0; STRETCH];
+        let mut y = [(row as f32 - cy) * (1.0 / fy); STRETCH];
+        match image.rays {
+            Some(rays) => {
+                for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(rays[first..].iter().step_by(stride)).take(count) {
+                    (*x, *y) = (ray[0], ray[1]);
+                }
+            }
+            None => {
+                let inverse = 1.0 / fx;
+                for (x, offset) in x.iter_mut().zip(0_i32..) {
+                    *x = ((start as i32 + offset * stride as i32) as f32 - cx) * inverse;
+                }
+            }
+        }
+        Self { x, y, z }
+    }
+
+    /// Whether any pixel returned anything that is not the background.
+    #[inline(always)]
+    pub fn returned(&self) -> bool {
+        self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
+    }
+
+    /// Appends the points that returned and lie inside the gate, in order.
+    #[inline(always)]
+    pub fn gather(&self, m: &[[f32; 3]; 4], gate: &PointGate, points: &mut Points) {
+        let mut p = [[0.0; STRETCH]; 3];
+        let mut passes = [false; STRETCH];
+        for i in 0..STRETCH {
+            let z = self.z[i];
+            let (x, y) = (self.x[i] * z, self.y[i] * z);
+            let place = |axis: usize| m[0][axis] * x + (m[1][axis] * y + (m[2][axis] * z + m[3][axis]));
+            let point = [place(0), place(1), place(2)];
+            // A NaN fails the first comparison.
+            passes[i] = (z > 0.0) & (z < f32::INFINITY) & gate.passes(point);
+            (p[0][i], p[1][i], p[2][i]) = (point[0], point[1], point[2]);
+        }
+        if passes.iter().fold(0, |any, pass| any | u8::from(*pass)) == 0 {
+            return;
+        }
+        let mut kept = 0;
+        for i in 0..STRETCH {
+            // `kept` is at most `i`; the mask only spares the bounds checks.
+            let to = kept % STRETCH;
+            (p[0][to], p[1][to], p[2][to]) = (p[0][i], p[1][i], p[2][i]);
+            kept += usize::from(passes[i]);
+        }
+        points.x.extend_from_slice(&p[0][..kept]);
+        points.y.extend_from_slice(&p[1][..kept]);
+        points.z.extend_from_slice(&p[2][..kept]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_keeps_the_share_asked_for_and_spreads_it() {
+        for tenths in 1..400 {
+            let share = f64::from(tenths) / 10.0;
+            let grid = Grid::new(share);
+            let kept = (grid.rows * grid.columns) as f64 / share.max(1.0);
+            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {share}");
+            assert!((0..50).all(|row| grid.offset(row) < grid.columns));
+        }
+        let columns = |share: f64| [0, 1, 2, 3].map(|row| Grid::new(share).offset(row));
+        assert_eq!((Grid::new(0.3), columns(0.3)), (Grid { rows: 1, columns: 1 }, [0; 4]));
+        assert_eq!((Grid::new(2.0), columns(2.0)), (Grid { rows: 1, columns: 2 }, [0, 1, 0, 1]));
+        assert_eq!((Grid::new(4.0), columns(4.0)), (Grid { rows: 2, columns: 2 }, [0; 4]));
+        assert_eq!((Grid::new(8.0), columns(8.0)), (Grid { rows: 2, columns: 4 }, [0, 0, 2, 2]));
+    }
+}

@@ -1,0 +1,133 @@
+//! Sections of a limb across its axis: the ellipse at a height, and what of it faces a camera.
+
+use super::TaperedEllipticCylinder;
+use crate::math::{Pose, Vec3};
+
+/// The ellipse in which a plane across the axis cuts the side, limb frame, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// Semi-axis along x.
+    pub a: f64,
+    /// Semi-axis along y.
+    pub b: f64,
+    /// Height of the plane above the proximal end.
+    pub z: f64,
+}
+
+/// A section and the directions in which a camera sees it, limb frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FacingSection {
+    /// The section.
+    pub section: Section,
+    /// From its centre to the camera, metres.
+    pub to_camera: Vec3,
+    /// The part of that across the axis, metres.
+    pub across: Vec3,
+    /// The unit vector along that part: the middle of what the camera sees lies there.
+    pub ahead: Vec3,
+    /// The unit vector at right angles to it and to the axis: the section's borders in the image lie about there.
+    pub side: Vec3,
+}
+
+impl TaperedEllipticCylinder {
+    /// The section at the share `t` of the length, 0 at the proximal end and 1 at the distal one.
+    #[inline]
+    pub fn section(&self, t: f64) -> Section {
+        Section { a: self.a0 + t * (self.a1 - self.a0), b: self.b0 + t * (self.b1 - self.b0), z: t * self.length }
+    }
+}
+
+impl Section {
+    /// Its centre, on the axis.
+    #[inline]
+    pub fn centre(&self) -> Vec3 {
+        Vec3::new(0.0, 0.0, self.z)
+    }
+
+    /// What of it faces a camera; `None` when the camera looks along the axis.
+    #[inline]
+    pub fn facing(self, camera_from_limb: &Pose) -> Option<FacingSection> {
+        let to_camera = camera_from_limb.inverse_transform_vector(-(*camera_from_limb * self.centre()));
+        let across = to_camera.with_z(0.0);
+        let ahead = across.try_normalize()?;
+        let side = Vec3::new(-ahead.y, ahead.x, 0.0);
+        Some(FacingSection { section: self, to_camera, across, ahead, side })
+    }
+
+    /// How far the ellipse reaches along a unit vector across the axis, metres: the distance of its tangent from the centre.
+    #[inline]
+    pub fn extent(&self, direction: Vec3) -> f64 {
+        let (x, y) = (self.a * direction.x, self.b * direction.y);
+        (x * x + y * y).sqrt()
+    }
+
+    /// The point of the ellipse that reaches farthest along a unit vector across the axis, metres.
+    #[inline]
+    pub fn farthest_point(&self, direction: Vec3) -> Vec3 {
+        let extent = self.extent(direction);
+        Vec3::new(self.a * self.a * direction.x / extent, self.b * self.b * direction.y / extent, self.z)
+    }
+}
+
+impl FacingSection {
+    /// The point on the rim that lies the share `s`, from -1 to 1, across as the camera sees it: 0 is the middle, in units of
+    /// the semi-axes.
+    #[inline]
+    pub fn point(&self, s: f64) -> Vec3 {
+        let place = self.ahead * (1.0 - s * s).sqrt() + self.side * s;
+        Vec3::new(self.section.a * place.x, self.section.b * place.y, self.section.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn shapes() -> impl Strategy<Value = TaperedEllipticCylinder> {
+        (0.1..0.6, 0.02..0.2, 0.02..0.2, 0.02..0.2, 0.02..0.2)
+            .prop_map(|(length, a0, b0, a1, b1)| TaperedEllipticCylinder::new(length, a0, b0, a1, b1).unwrap())
+    }
+
+    fn vectors(range: f64) -> impl Strategy<Value = Vec3> {
+        [-range..range, -range..range, -range..range].prop_map(Vec3::from_array)
+    }
+
+    proptest! {
+        #[test]
+        fn what_faces_a_camera_is_on_the_surface_and_nearer_than_the_axis(
+            shape in shapes(), place in vectors(1.0), turn in vectors(2.0), t in 0.05..0.95, s in -0.9..0.9,
+        ) {
+            let camera_from_limb = Pose::new(place + 2.0 * Vec3::Z, turn);
+            let section = shape.section(t);
+            let facing = section.facing(&camera_from_limb).unwrap();
+            prop_assume!(facing.across.length() > 0.5);
+            let point = facing.point(s);
+            prop_assert!(shape.closest_point(point).signed_distance.abs() < 1e-9);
+            // The camera stands where the pose says: the origin of its frame, seen from the limb.
+            let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
+            prop_assert!((section.centre() + facing.to_camera - camera).length() < 1e-9);
+            prop_assert!((facing.point(0.0) - section.centre()).dot(facing.ahead) > 0.0, "the middle faces the camera");
+            prop_assert!(facing.ahead.dot(facing.side).abs() < 1e-12 && facing.side.z == 0.0);
+        }
+
+        #[test]
+        fn no_point_of_the_ellipse_reaches_farther(shape in shapes(), angle in 0.0..std::f64::consts::TAU, t in 0.0..1.0) {
+            let section = shape.section(t);
+            let direction = Vec3::new(angle.cos(), angle.sin(), 0.0);
+            // A dense search, which knows nothing of tangents.
+            let rim = (0..20_000).map(|k| f64::from(k) * std::f64::consts::TAU / 20_000.0);
+            let points = rim.map(|at| Vec3::new(section.a * at.cos(), section.b * at.sin(), section.z));
+            let best = points.max_by(|p, q| p.dot(direction).total_cmp(&q.dot(direction))).unwrap();
+            prop_assert!((best.dot(direction) - section.extent(direction)).abs() < 1e-7);
+            prop_assert!((best - section.farthest_point(direction)).length() < 2e-4);
+        }
+    }
+
+    #[test]
+    fn a_camera_on_the_axis_sees_no_side() {
+        let shape = TaperedEllipticCylinder::new(0.4, 0.1, 0.05, 0.06, 0.04).unwrap();
+        let camera_from_limb = Pose::from_translation(Vec3::new(0.0, 0.0, 2.0));
+        assert_eq!(shape.section(0.5).facing(&camera_from_limb), None);
+    }
+}

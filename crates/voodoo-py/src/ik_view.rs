@@ -1,0 +1,62 @@
+//! `View` of inverse kinematics: one silhouette with its camera.
+
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use voodoo_core::ik;
+use voodoo_core::math::Pose;
+
+use crate::arrays::pose;
+use crate::errors::exception;
+
+#[pyclass(name = "View", module = "voodoo._core", frozen)]
+pub struct PyView {
+    pixels: Vec<[f32; 2]>,
+    depth: Vec<f32>,
+    border: f64,
+    width: usize,
+    height: usize,
+    intrinsics: [f64; 4],
+    camera_from_world: Pose,
+}
+
+#[pymethods]
+impl PyView {
+    #[new]
+    fn new(
+        distance: PyReadonlyArray2<'_, f32>,
+        thickness: PyReadonlyArray2<'_, f32>,
+        depth: Option<PyReadonlyArray2<'_, f32>>,
+        border: f64,
+        intrinsics: [f64; 4],
+        camera_from_world: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let [height, width] = [distance.shape()[0], distance.shape()[1]];
+        if width < 2 || height < 2 {
+            let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
+            return Err(exception(camera_from_world.py(), "MeasurementError", message));
+        }
+        Ok(Self {
+            pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
+            depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,
+            border,
+            width,
+            height,
+            intrinsics,
+            camera_from_world: pose("camera_from_world", Some(camera_from_world))?,
+        })
+    }
+}
+
+impl PyView {
+    pub(crate) fn view(&self) -> ik::View<'_> {
+        ik::View {
+            pixels: &self.pixels,
+            depth: &self.depth,
+            border: self.border,
+            width: self.width,
+            height: self.height,
+            intrinsics: self.intrinsics,
+            camera_from_world: self.camera_from_world,
+        }
+    }
+}
