@@ -27,12 +27,12 @@ from typing import Any
 
 import numpy as np
 
-FORMAT = 2
+FORMAT = 3
 """Of the files of results; a new number makes all of them anew."""
 
 Record = dict[str, Any]
 TIMES = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)? ?(ms|us|µs|s|seconds|Hz|fps)\b")
-TIME_HEADS = re.compile(r"\b(ms|seconds|CPU|time)\b")
+TIME_HEADS = re.compile(r"\b(ms|CPU)\b")
 
 
 def packed(values: object) -> bytes:
@@ -144,16 +144,16 @@ def watched(log: Log) -> None:
 
 def without_times(text: str) -> str:
     """What a script printed, without the columns and numbers that are times."""
-    lines, columns = [], set[int]()
-    for line in text.splitlines():
-        if line.startswith("|"):
-            cells = line.split("|")
-            if TIME_HEADS.search(line) and not re.search(r"\d", line.replace("95 %", "")):
-                columns = {index for index, cell in enumerate(cells) if TIME_HEADS.search(cell)}
-            line = "|".join("*" if index in columns else cell for index, cell in enumerate(cells))
-        else:
+    lines = text.splitlines()
+    columns = set[int]()
+    for index, line in enumerate(lines):
+        if not line.startswith("|"):
             columns = set()
-        lines.append(TIMES.sub("*", line))
+        elif index + 1 < len(lines) and re.fullmatch(r"[|: -]*-[|: -]*", lines[index + 1]):
+            columns = {number for number, cell in enumerate(line.split("|")) if TIME_HEADS.search(cell)}
+        cells = line.split("|")
+        hidden = "|".join("*" if number in columns else cell for number, cell in enumerate(cells))
+        lines[index] = TIMES.sub("*", hidden if line.startswith("|") else line)
     return "\n".join(lines)
 
 
