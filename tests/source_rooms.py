@@ -15,6 +15,7 @@ from rust_source import code_of, without_tests
 PATH = re.compile(r"\b(?:crate|super|self)(?:\s*::\s*\w+)+")
 USE = re.compile(r"(?:(\bpub(?:\([^)]*\))?)\s+)?\buse\s+([^;]+);")
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\([^)]*\))?\s+)?mod\s+(\w+)\s*;")
+SEEN_BY = re.compile(r"\bpub\s*\(\s*in\s[^)]*\)")
 CHILD = re.compile(r"\bmod\s+(\w+)\s*;")
 
 
@@ -111,8 +112,8 @@ def rust_codes(root: Path) -> dict[Module, str]:
     codes, tests = {}, set()
     for path in sorted(root.rglob("*.rs")):
         parts = path.relative_to(root).with_suffix("").parts
-        module = parts[:-1] if parts[-1] == "mod" else parts
-        code = code_of(path.read_text(encoding="utf-8"))
+        module = parts[:-1] if parts[-1] in ("mod", "lib") else parts
+        code = SEEN_BY.sub("pub", code_of(path.read_text(encoding="utf-8")))
         tests.update((*module, name) for name in TEST_MODULE.findall(code))
         if parts != ("lib",):
             codes[module] = without_tests(code)

@@ -62,8 +62,8 @@ def test_no_arrow_runs_against_the_order(side):
 
 def test_the_order_names_every_room_once(side):
     listed, tree, _ = side
-    beside = tree.get("", set()) - {"lib"}
-    assert sorted(listed.order) == sorted({*tree, *beside} - {""})
+    tests = {"testing"} & tree[""]
+    assert sorted(listed.order) == sorted({*tree, *tree[""]} - {""} - tests)
 
 
 def test_no_cycle_between_files(side):
@@ -144,7 +144,7 @@ def test_step_names_the_method(codes):
 
 MADE_UP = """```
 src/    the core
-    lib config - beside the rooms
+    config testing - beside the rooms
     math/    lanes
         geometry - numbers
     body/    joint inner/ deep - limbs
@@ -158,13 +158,14 @@ Core: `config` < `math` <
 @pytest.fixture
 def core(tmp_path):
     files = {
-        "lib.rs": "pub mod body; pub mod config; pub mod math;",
+        "lib.rs": "pub mod body; pub mod config; pub mod math;\n#[cfg(test)]\nmod testing;",
+        "testing.rs": "use crate::body;",
         "config.rs": "pub struct Config { a: f64, pub(crate) b: Vec<(f64, [u8; 3])>, }",
         "math/mod.rs": "mod geometry; mod lanes; pub use geometry::{Pose, Vec3};",
         "math/geometry.rs": "pub struct Pose; pub struct Vec3;",
         "math/lanes.rs": "use super::Pose;\n#[cfg(test)]\nmod tests { use crate::body::Joint; }",
         "body/mod.rs": "pub mod joint; pub mod inner; pub use joint::Joint; // crate::nowhere\nfn f() { joint::g() }",
-        "body/joint.rs": "use crate::{config::Config, math::{Pose, Vec3 as V}};\nfn g() {\n let a = 1;\n}",
+        "body/joint.rs": "use crate::{config::Config, math::{Pose, Vec3 as V}};\npub(in crate::body) fn g() {\n let a = 1;\n}",
         "body/inner/mod.rs": "pub mod deep;",
         "body/inner/deep.rs": "fn h() -> super::super::Joint { crate::math::lanes::four() }",
     }
@@ -177,8 +178,9 @@ def core(tmp_path):
 
 def test_a_tree_that_agrees_passes(core):
     listed = stated(MADE_UP, "src", "Core")
-    assert listed.files == found(core, ".rs", ("mod",))
+    assert listed.files == found(core, ".rs", ("mod", "lib"))
     arrows = rust_arrows(core)
+    assert ("testing",) not in arrows
     assert arrows["body", "joint"] == {("config",), ("math", "geometry")}
     assert arrows["body", "inner", "deep"] == {("body", "joint"), ("math", "lanes")}
     assert arrows["body",] == {("body", "joint")}
@@ -188,7 +190,7 @@ def test_a_tree_that_agrees_passes(core):
 
 def test_a_file_that_is_not_listed_is_found(core):
     (core / "body" / "new.rs").write_text("")
-    assert stated(MADE_UP, "src", "Core").files != found(core, ".rs", ("mod",))
+    assert stated(MADE_UP, "src", "Core").files != found(core, ".rs", ("mod", "lib"))
 
 
 @pytest.mark.parametrize(
