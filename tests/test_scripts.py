@@ -99,9 +99,15 @@ def test_every_constant_of_the_core_is_documented_and_has_one_home():
 
 
 def results(*places):
-    """Results of a case: one pose of one number a frame."""
+    """Results of a case: one pose a frame, at one place along x."""
     records = [
-        {"call": "step", "poses": array("d", [place]).tobytes(), "sites": b"", "status": b"", "residuals": b""}
+        {
+            "call": "step",
+            "poses": array("d", [1.0, 0, 0, place, *range(12)]).tobytes(),
+            "sites": b"",
+            "status": b"",
+            "residuals": b"",
+        }
         for place in places
     ]
     return {"records": records, "printed": "", "files": {}}
@@ -114,6 +120,13 @@ def test_fingerprint_finds_the_first_frame_and_the_greatest_difference():
     assert 0.0 < last_bit.pose_mm < 1e-12
     far = compare.compare(results(0.1, 0.2, 0.3), results(0.1, 0.201, 0.305))
     assert (far.first, round(far.pose_mm, 6)) == (1, 5.0)
+
+
+def test_fingerprint_sees_a_turn_without_a_shift():
+    old, new = results(0.1), results(0.1)
+    new["records"][0]["poses"] = array("d", [0.9, 0, 0, 0.1, *range(12)]).tobytes()
+    found = compare.compare(old, new)
+    assert (found.what, found.pose_mm) == (("poses",), 0.0)
 
 
 @pytest.mark.parametrize("change", ["frames", "files", "printed", "not a number"])
