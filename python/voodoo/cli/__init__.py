@@ -1,21 +1,24 @@
-"""The command line. Every command is a few calls of the package; nothing is computed here."""
+"""The command line. Every command is a few calls of the package; nothing is computed here.
+
+What a command needs is imported when it runs, so that help and version are there at once.
+"""
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated
 
 import typer
 
+from voodoo.cli.demo import demo_command
 from voodoo.cli.evaluate import eval_command
 from voodoo.cli.ik import ik_command
 from voodoo.cli.show import body_command, config_command, info_command
-from voodoo.cli.track import demo_command, track_command
+from voodoo.cli.track import track_command
 
 app = typer.Typer(
     name="voodoo",
     no_args_is_help=True,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,  # Rich takes longer to import than all the rest of the help
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -28,6 +31,8 @@ def main() -> None:
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
         try:
             typer.echo(f"voodoo {version('voodoo')}")
         except PackageNotFoundError:
@@ -43,16 +48,16 @@ def voodoo_command(
 ) -> None:
     """Follow a person's pose through depth, laser and point cloud recordings, on a plain CPU.
 
-    Try [bold]voodoo demo[/bold] first; then [bold]voodoo info RECORDING[/bold] and
-    [bold]voodoo track RECORDING --out pose.csv --overlay look.mp4[/bold].
+    Try voodoo demo first; then voodoo info RECORDING and
+    voodoo track RECORDING --out pose.csv --overlay look.mp4.
     """
 
 
 # In the order of `voodoo --help`.
-app.command("track")(track_command)
-app.command("demo")(demo_command)
-app.command("ik")(ik_command)
-app.command("eval")(eval_command)
-app.command("info")(info_command)
-app.command("config")(config_command)
-app.command("body")(body_command)
+app.command("track", short_help="Track the body through a recording: a row a frame.")(track_command)
+app.command("demo", short_help="Track the bundled recording and draw what is found.")(demo_command)
+app.command("ik", short_help="Find postures from a few known sites and silhouettes.")(ik_command)
+app.command("eval", short_help="Measure the tracker on recordings with a truth.")(eval_command)
+app.command("info", short_help="Say what is in a recording.")(info_command)
+app.command("config", short_help="Print the default configuration as commented TOML.")(config_command)
+app.command("body", short_help="Print a body as TOML: the default human, or a file.")(body_command)

@@ -1,0 +1,152 @@
+"""The tracked body: a tree of limbs with elastic-band joints and named sites; a TOML file describes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+import voodoo._core as _core
+from voodoo._core import TaperedEllipticCylinder
+from voodoo.errors import BodyError, MeasurementError
+from voodoo.model.body_toml import body_text, core_body
+from voodoo.model.joint import Joint, Place, short
+from voodoo.model.toml_io import read_text
+from voodoo.names import HumanModel
+
+__all__ = ["Body", "Joint", "Limb", "Place", "checked_joints", "ordered_poses"]
+
+
+@dataclass(frozen=True)
+class Limb:
+    """One rigid part: name, name of the parent (None for the root) and shape [m].
+
+    Its frame has z along the axis from the proximal end (z = 0) to the distal end (z = shape.length).
+    """
+
+    name: str
+    parent: str | None
+    shape: TaperedEllipticCylinder
+
+
+class Body:
+    """A body to track. Immutable; made by `human`, `load` or `from_toml`."""
+
+    def __init__(self, core: _core.Body) -> None:
+        """Wrap a body of the core; use `human`, `load` or `from_toml` instead."""
+        self._core = core
+        name, limbs, sites = core.parts()
+        self.name: str = name
+        self.limbs: tuple[Limb, ...] = tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in limbs)
+        self.site_names: tuple[str, ...] = tuple(site[0] for site in sites)
+
+    @property
+    def core(self) -> _core.Body:
+        """The body of the compiled core."""
+        return self._core
+
+    @property
+    def limb_names(self) -> tuple[str, ...]:
+        """Names of the limbs, parents first."""
+        return tuple(limb.name for limb in self.limbs)
+
+    @classmethod
+    def human(cls, height: float = 1.75, *, model: HumanModel = "full") -> Body:
+        """The default human.
+
+        Args:
+            height: stature [m], 0.3 to 3.0.
+            model: "papers": ten limbs and nine joints (K06 III-C); "full": eighteen, with waist, neck, clavicles, hands and feet.
+
+        Raises:
+            BodyError: the stature is out of range, or the model unknown.
+        """
+        return cls(_core.Body.human(height, model))
+
+    @classmethod
+    def from_toml(cls, text: str, *, source: str = "body") -> Body:
+        """A body from TOML text; the format is that of `to_toml`, explained in docs/body.md.
+
+        Raises:
+            BodyError: it names the key, what was expected and what was found.
+        """
+        return cls(core_body(text, source=source))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Body:
+        """A body from a TOML file."""
+        return cls.from_toml(read_text(path, error=BodyError), source=str(path))
+
+    def scaled(self, factor: float) -> Body:
+        """The body with all lengths multiplied by a factor."""
+        return Body(self._core.scaled(factor))
+
+    def to_toml(self) -> str:
+        """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
+        return body_text(self._core)
+
+    def __reduce__(self) -> tuple[type[Body], tuple[_core.Body]]:
+        """Pickles and copies have the same bits."""
+        return type(self), (self._core,)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal when every limb, joint and site is."""
+        return isinstance(other, Body) and bool(self._core == other._core)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Name and counts."""
+        return f"Body(name={self.name!r}, limbs={len(self.limbs)}, sites={len(self.site_names)})"
+
+
+def checked_joints(
+    joints: Mapping[str, Sequence[float]], *, what: str = "joints"
+) -> dict[str, tuple[float, float, float]]:
+    """Positions by name as plain numbers.
+
+    Raises:
+        BodyError: no mapping, or an entry is not three finite numbers; it names the entry.
+    """
+    if not isinstance(joints, Mapping):
+        raise BodyError(f"{what}: expected a mapping of names to positions, found {type(joints).__name__}")
+    checked = {}
+    for name, position in joints.items():
+        try:
+            x, y, z = (float(value) for value in np.asarray(position, dtype=np.float64).reshape(-1))
+        except (TypeError, ValueError):
+            raise BodyError(f"{what}[{name}]: expected three numbers in metres, found {position!r}") from None
+        if not all(map(math.isfinite, (x, y, z))):
+            raise BodyError(f"{what}[{name}]: expected finite metres, found {position!r}")
+        checked[name] = (x, y, z)
+    return checked
+
+
+def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.float64]]:
+    """Poses (4, 4) by name in the order of the body's limbs; the core checks that they are rigid.
+
+    Raises:
+        BodyError: no mapping, or a limb is missing or unknown.
+        MeasurementError: a pose that is no array of numbers; it names the limb.
+    """
+    if not isinstance(world_from_limb, Mapping):
+        raise BodyError(
+            f"world_from_limb: expected a mapping of limbs to poses, found {type(world_from_limb).__name__}"
+        )
+    names = body.limb_names
+    if set(world_from_limb) != set(names):
+        raise BodyError(
+            f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(map(str, world_from_limb))}"
+        )
+    poses = []
+    for name in names:
+        try:
+            poses.append(np.asarray(world_from_limb[name], dtype=np.float64))
+        except (TypeError, ValueError):
+            found = short(world_from_limb[name])
+            raise MeasurementError(f"world_from_limb[{name}]: expected a rigid 4x4 transform, found {found}") from None
+    return poses
