@@ -16,12 +16,14 @@ import cv2
 import numpy as np
 
 import voodoo
-import voodoo.sensors.front_end as front_end_module
-from voodoo.keypoints import LAYOUTS
+import voodoo.pipeline.front_end as front_end_module
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
 from voodoo.recordings import ColorImage, KeypointImage, RecordedFrame, Recording, open_recording, sample_path
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.pixels import in_sensor
-from voodoo.sensors.skin import SkinTracker
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.sensors.skin.tracker import SkinTracker
 
 
 def keypoints(item: ColorImage, positions: dict[str, np.ndarray], chance: np.random.Generator) -> KeypointImage:

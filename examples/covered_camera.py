@@ -13,11 +13,13 @@ from pathlib import Path
 import numpy as np
 
 import voodoo
-from voodoo.evaluate import compare
+from voodoo.evaluation.evaluate import compare
+from voodoo.export.track import Track
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, Measurement
-from voodoo.results import Track
-from voodoo.running import start_tracker
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+from voodoo.sensors.settings import FrontEndSettings
 
 BACK_S = 0.5
 """So long after the cover is gone the error is taken, over three frames."""

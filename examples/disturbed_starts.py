@@ -19,12 +19,13 @@ from pathlib import Path
 import numpy as np
 
 import voodoo
-from voodoo import metrics
-from voodoo.evaluate import LIMIT_EXACT_M, LIMIT_REFERENCE_M, called_measured, compare, limb_ends
+from voodoo.evaluation import metrics
+from voodoo.evaluation.evaluate import called_measured, compare, limb_ends
+from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M
+from voodoo.export.track import Track
+from voodoo.pipeline.run import track
 from voodoo.recordings import RecordedFrame, Recording, RecordingInfo, Reference, Start
-from voodoo.results import Track
-from voodoo.running import track
-from voodoo.sensors.front_end import FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings
 
 NOISE_M = 0.004
 

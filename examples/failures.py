@@ -13,11 +13,14 @@ import cv2
 import numpy as np
 
 import voodoo
-from voodoo import metrics
-from voodoo.overlay import Overlay, Picture, contact_sheet
+from voodoo.evaluation import metrics
+from voodoo.model.projection import CameraView
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, Recording, Reference
-from voodoo.running import start_tracker, track
-from voodoo.views import CameraView
+from voodoo.visualization.canvas import Picture
+from voodoo.visualization.overlay import Overlay
+from voodoo.visualization.sheet import contact_sheet
 
 BONES = tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
 BONES += tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("hip", "knee"), ("knee", "ankle")))

@@ -19,9 +19,11 @@ import matplotlib
 import numpy as np
 
 import voodoo
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
 from voodoo.recordings import ColorImage, RecordedFrame, Recording, open_recording
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
 from voodoo.sensors.pixels import in_sensor
+from voodoo.sensors.settings import FrontEndSettings
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

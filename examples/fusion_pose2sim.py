@@ -19,11 +19,12 @@ import matplotlib
 import numpy as np
 
 import voodoo
-from voodoo.keypoints import nearest_person, site_pixels
-from voodoo.metrics import JOINTS
+from voodoo.evaluation.metrics import JOINTS
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.recordings import KeypointImage, RecordedFrame, Recording, open_recording
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
+from voodoo.sensors.keypoints import nearest_person, site_pixels
 from voodoo.sensors.pixels import in_sensor, world_rays
+from voodoo.sensors.settings import FrontEndSettings
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -12,14 +12,15 @@ from pathlib import Path
 import numpy as np
 
 import voodoo
-from voodoo.metrics import JOINTS, joint_errors
+from voodoo.evaluation.metrics import JOINTS, joint_errors
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.recordings import open_recording
 from voodoo.recordings.utd_mhad import CAMERA
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import PixelNoise, SensorModel
 from voodoo.sensors.pixels import world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
+from voodoo.sensors.settings import FrontEndSettings
 
 SITES = ("head_center", "l_hand", "r_hand")
 BIAS_M = 0.05

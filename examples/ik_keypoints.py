@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from ik_limbs import LIMBS, Truth
 
-from voodoo.keypoint_layouts import LAYOUTS
+from voodoo.model.projection import CameraView
 from voodoo.recordings import KeypointImage, Recording
-from voodoo.views import CameraView
+from voodoo.recordings.keypoint_layouts import LAYOUTS
 
 SURE = 0.3
 TURNS = np.radians(np.arange(-180.0, 180.0, 1.0))

@@ -15,11 +15,12 @@ from ik_limbs import LIMBS, Truth, follow, limb_lengths, steady
 
 import voodoo
 from voodoo import ik
-from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
+from voodoo.model.projection import CameraView
+from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.pose2sim import SITES
-from voodoo.sensors.background import StillBackground
-from voodoo.silhouettes import filled, surroundings
-from voodoo.views import CameraView
+from voodoo.sensors.silhouettes.color import StillBackground
+from voodoo.sensors.silhouettes.masks import filled
+from voodoo.sensors.silhouettes.surroundings import surroundings
 
 SCALE = 0.25
 LEARN_EVERY = 2

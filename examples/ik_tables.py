@@ -22,9 +22,10 @@ from ik_pose2sim import Trial, four_cameras
 
 import voodoo
 from voodoo import ik
+from voodoo.model.projection import CameraView, silhouette
 from voodoo.recordings import DepthImage
-from voodoo.silhouettes import StillScene, from_depth, metres
-from voodoo.views import CameraView, silhouette
+from voodoo.sensors.depth import metres
+from voodoo.sensors.silhouettes.depth import StillScene, from_depth
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
 SIDE_CAMERA = voodoo.Camera(320, 240, 290.0, 290.0, 159.5, 119.5)

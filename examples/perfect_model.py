@@ -18,11 +18,12 @@ import matplotlib
 import numpy as np
 
 import voodoo
-from voodoo import metrics
-from voodoo.overlay import draw_body
-from voodoo.picture_writer import save_picture
-from voodoo.views import CameraView
-from voodoo.virtual import VirtualFrame, VirtualSequence, grown
+from voodoo.evaluation import metrics
+from voodoo.model.projection import CameraView
+from voodoo.synthetic.grown import grown
+from voodoo.synthetic.sequence import VirtualFrame, VirtualSequence
+from voodoo.visualization.body_drawing import draw_body
+from voodoo.visualization.image_writer import save_picture
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

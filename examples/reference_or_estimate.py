@@ -16,12 +16,14 @@ from pathlib import Path
 import numpy as np
 
 import voodoo
-from voodoo import metrics
-from voodoo.evaluate import LIMIT_EXACT_M, select_by
+from voodoo.evaluation import metrics
+from voodoo.evaluation.evaluate import select_by
+from voodoo.evaluation.score import LIMIT_EXACT_M
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage
-from voodoo.rendering import render_depth
-from voodoo.running import start_tracker, track
-from voodoo.sensors.front_end import FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.synthetic.render import render_depth
 
 CHAINS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle")}
 LIMBS = {"arm": ("upperarm", "forearm", "hand"), "leg": ("thigh", "calf", "foot")}

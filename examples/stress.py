@@ -21,13 +21,15 @@ import matplotlib
 import numpy as np
 
 import voodoo
-from voodoo import metrics
-from voodoo.angles import angles_of
+from voodoo.evaluation import metrics
 from voodoo.ik import Chain
+from voodoo.ik.angles import angles_of
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, RecordedFrame
-from voodoo.running import start_tracker
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
-from voodoo.virtual import Disturbance, VirtualSequence, disturbed, disturbed_image
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.synthetic.disturbance import Disturbance, disturbed, disturbed_image
+from voodoo.synthetic.sequence import VirtualSequence
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from voodoo.camera import Camera
 from voodoo.errors import VoodooError
+from voodoo.model.camera import Camera
+from voodoo.model.projection import CameraView, silhouette
 from voodoo.recordings import DepthImage, LaserScan, RecordedFrame, Recording, RecordingInfo, Reference
-from voodoo.views import CameraView, silhouette
 
 BONES = {
     "torso": ("humanoid_root", "vc7", 0.16, 0.11, 0.19, 0.11),
@@ -209,14 +209,28 @@ class FakeRecording(Recording):
 
 def install(monkeypatch):
     """Put the stand-ins where the package looks for the core."""
-    import voodoo
-    from voodoo import results
+    import voodoo.cli.running
+    import voodoo.evaluation.evaluate
+    import voodoo.pipeline.front_end
+    import voodoo.pipeline.start
+    from voodoo.export import track as results
 
     # The fake body has no joints to take angles from.
     monkeypatch.setattr(results, "Chain", lambda body: body)
     monkeypatch.setattr(results, "angle_names_of", lambda body: ("l_elbow_flexion",))
     monkeypatch.setattr(results, "angles_of", lambda chain, estimate: np.array([0.25]))
     tracker = type("FreshTracker", (Tracker,), {})
-    for name, value in {"Body": Body, "Config": Config, "Frame": Frame, "Tracker": tracker}.items():
-        monkeypatch.setattr(voodoo, name, value, raising=False)
+    fakes = {"Body": Body, "Config": Config, "Frame": Frame, "Tracker": tracker}
+    places = (
+        (voodoo, "Body Config Frame Tracker"),
+        (voodoo.model.body, "Body"),
+        (voodoo.config, "Config"),
+        (voodoo.pipeline.start, "Body Config Tracker"),
+        (voodoo.pipeline.front_end, "Frame"),
+        (voodoo.cli.running, "Config"),
+        (voodoo.evaluation.evaluate, "Config"),
+    )
+    for module, names in places:
+        for name in names.split():
+            monkeypatch.setattr(module, name, fakes[name], raising=False)
     return tracker

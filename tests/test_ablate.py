@@ -8,10 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 import voodoo
-from voodoo import ablate as module
 from voodoo import cli
-from voodoo import evaluate as evaluate_module
-from voodoo.ablate import UNCHANGED, Variant, ablate, table, variants, write_tables
+from voodoo.evaluation import ablation as module
+from voodoo.evaluation import evaluate as evaluate_module
+from voodoo.evaluation.ablation import UNCHANGED, Variant, ablate, table, variants, write_tables
 from voodoo.recordings import open_recording, sample_path
 
 FEW = 4

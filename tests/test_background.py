@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from voodoo import MeasurementError
-from voodoo.sensors.background import Silhouettes
+from voodoo.sensors.silhouettes.color import Silhouettes
 
 
 def wall(seed):

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from voodoo.camera import Camera
 from voodoo.errors import CameraError, VoodooError
+from voodoo.model.camera import Camera
 from voodoo.sensors.pixels import normalized
 
 PINHOLE = Camera(width=8, height=6, fx=10.0, fy=12.0, cx=3.5, cy=2.5)

@@ -8,14 +8,15 @@ from typer.testing import CliRunner
 
 from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
-from voodoo import evaluate as evaluate_module
-from voodoo.cli import common
-from voodoo.cli import track as track_module
+from voodoo.cli import running
 from voodoo.errors import RecordingError
-from voodoo.results import Track
-from voodoo.running import Init, start_tracker, track
+from voodoo.evaluation import evaluate as evaluate_module
+from voodoo.export.track import Track
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import Init, start_tracker
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings
 
 
 @pytest.fixture
@@ -35,7 +36,7 @@ def run(monkeypatch, tmp_path):
 
     call.recording, call.tracker = FakeRecording(frames=12), tracker
     tracker.reference = call.recording.reference
-    for module in (common, evaluate_module):
+    for module in (running, evaluate_module):
         monkeypatch.setattr(module, "open_recording", opened)
     return call
 
@@ -199,7 +200,7 @@ def test_ctrl_c_before_the_first_frame_leaves_nothing(run):
 
 
 def test_demo(run, monkeypatch):
-    monkeypatch.setattr(track_module, "sample_path", lambda: Path("sample"))
+    monkeypatch.setattr("voodoo.recordings.sample.sample_path", lambda: Path("sample"))
     run.tracker.offset = (0.0, 0.03, 0.0)
     result = run("demo", "--out", "here")
     assert result.exit_code == 0, result.stderr
@@ -275,7 +276,7 @@ def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path
         opened.append((path.name, options))
         return FakeRecording(frames=12)
 
-    monkeypatch.setattr("voodoo.inputs.open_recording", other)
+    monkeypatch.setattr("voodoo.pipeline.inputs.open_recording", other)
     words = ("--with", "people", "--option", "rate=30", "--option", "tf_max_age=2")
     assert run("track", "bag", "--loader", "ros2", *words).exit_code == 0
     assert run.options == {"tf_max_age": 2.0}

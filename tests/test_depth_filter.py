@@ -5,7 +5,8 @@ import pytest
 
 from skin_scene import CAMERA, POSE, Z, at
 from voodoo import Camera, MeasurementError
-from voodoo.sensors.depth import DepthFilter, StillDepth, body_view
+from voodoo.sensors.body_view import StillDepth, body_view
+from voodoo.sensors.depth import DepthFilter
 
 
 def test_flying_pixels_go_and_surfaces_stay():

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, install, pose
-from voodoo import evaluate as module
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.evaluate import Score, compare, evaluate, evaluate_all, find_recordings, select_by
+from voodoo.evaluation import evaluate as module
+from voodoo.evaluation.depth_agreement import near_joints, witness
+from voodoo.evaluation.evaluate import compare, evaluate, evaluate_all, select_by
+from voodoo.evaluation.report import markdown, summarize, write_reports
+from voodoo.evaluation.score import Score
+from voodoo.evaluation.search import find_recordings
+from voodoo.export.track import Track
+from voodoo.model.projection import CameraView, silhouette
 from voodoo.recordings import RecordedFrame
-from voodoo.report import markdown, summarize, write_reports
-from voodoo.results import Track
-from voodoo.views import CameraView, silhouette
-from voodoo.witness import depth_points, near_joints, witness
+from voodoo.sensors.depth import depth_points
 
 
 @pytest.fixture
@@ -218,7 +221,7 @@ def scores():
             frames=10,
             exact=True,
             error_m=0.02,
-            far_told=1.0,
+            lost_recall=1.0,
             far_ends=10,
             tracking_class=2,
             best_lag=0,
@@ -230,7 +233,7 @@ def scores():
             frames=10,
             exact=True,
             error_m=0.06,
-            far_told=0.4,
+            lost_recall=0.4,
             far_ends=90,
             tracking_class=0,
             best_lag=1,
@@ -246,8 +249,10 @@ def test_summary_counts_classes_and_averages():
     assert exact.classes == (1, 0, 1)
     assert exact.class_average == 1.0
     assert exact.means["error_m"] == pytest.approx(0.04)
-    assert exact.means["far_told"] == pytest.approx(0.7) and exact.means["far_told_together"] == pytest.approx(0.46)
-    assert np.isnan(exact.means["near_doubted_together"])
+    assert exact.means["lost_recall"] == pytest.approx(0.7) and exact.means["lost_recall_together"] == pytest.approx(
+        0.46
+    )
+    assert np.isnan(exact.means["false_alarm_rate_together"])
     assert exact.lags == ((0, 1), (1, 1))
     assert (unknown.sequences, unknown.failures) == (0, 1)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from voodoo import metrics
+from voodoo.evaluation import metrics
 
 STAMPS = np.arange(60) / 30.0
 

@@ -15,8 +15,8 @@ from voodoo.export import write_bag, write_bvh, write_trc
 from voodoo.export.files import check_target
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import skeleton
-from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
-from voodoo.results import Track
+from voodoo.export.track import Track
+from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 
 REST = {
     "l_hip": (0, 0.09, 0.93), "r_hip": (0, -0.09, 0.93), "l_shoulder": (0, 0.2, 1.43), "r_shoulder": (0, -0.2, 1.43),

@@ -6,7 +6,7 @@ import numpy as np
 
 import voodoo
 from ik_cases import load_example
-from voodoo import running
+from voodoo.pipeline import run as running
 
 ROOT = Path(__file__).resolve().parent.parent
 BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 import voodoo
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import sample_path
-from voodoo.running import start_tracker, track
-from voodoo.sensors.front_end import FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings
 
 GOLDEN = Path(__file__).with_name("golden_limbwise.csv")
 FRAMES = (0, 10, 30, 60, 89)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
-from voodoo.sensors.depth import BodyView, body_view
-from voodoo.sensors.hands import FINGERS_M, of_pieces, to_palm
-from voodoo.sensors.skin import SkinTracker
-from voodoo.sensors.skin_regions import candidates, joined
+from voodoo.sensors.body_view import BodyView, body_view
+from voodoo.sensors.skin.hands import FINGERS_M, of_pieces, to_palm
+from voodoo.sensors.skin.regions import candidates, joined
+from voodoo.sensors.skin.tracker import SkinTracker
 
 
 @pytest.mark.parametrize("gap", [0, 6])
@@ -142,7 +142,9 @@ def test_a_hand_is_a_forearm_away_from_an_elbow_that_is_seen():
         joints["l_hand"] = at(left, Z + 0.04)
         joints["l_elbow"] = at((left[0] + 12, left[1] - 24), Z + 0.04)  # 23 cm above the hand
         piece = (left[0] + 6, left[1] - 12)
-        rays = skin.observe(picture(head, piece, right, seed=7), CAMERA, POSE, joints, body=body, held=held)
+        rays = skin.observe(
+            picture(head, piece, right, seed=7), CAMERA, POSE, joints, body=body, upper_arm_visible=held
+        )
         found[held] = {ray.site for ray in rays}
     assert found[()] == {"head_center", "l_hand", "r_hand"}
     assert found["l_hand",] == {"head_center", "r_hand"}

@@ -4,11 +4,12 @@ import numpy as np
 
 import voodoo
 from ik_cases import load_example
-from voodoo import metrics
-from voodoo.evaluate import compare, evaluate
-from voodoo.results import Track
-from voodoo.running import Init, start_tracker, track
-from voodoo.sensors.front_end import paired
+from voodoo.evaluation import metrics
+from voodoo.evaluation.evaluate import compare, evaluate
+from voodoo.export.track import Track
+from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import Init, start_tracker
 
 STARTS = 4
 

@@ -5,8 +5,8 @@ import pytest
 
 import voodoo
 from voodoo import ik
-from voodoo.angles import angle_names, joint_angles
-from voodoo.results import Track
+from voodoo.export.track import Track
+from voodoo.ik.angles import angle_names, joint_angles
 
 
 def test_jacobian_of_a_site(arm):

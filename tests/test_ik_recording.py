@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 
 import voodoo
 from voodoo import cli, ik
-from voodoo.ik_recording import KNOWN, Positions, follow
+from voodoo.export.track import Track
+from voodoo.pipeline.ik import KNOWN, Positions, follow
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings.sample import sample_path
-from voodoo.results import Track
-from voodoo.running import start_tracker
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from test_exports import read_bvh

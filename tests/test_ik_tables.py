@@ -12,7 +12,7 @@ import ik_open
 import ik_pose2sim
 import ik_tables
 
-from voodoo.views import CameraView
+from voodoo.model.projection import CameraView
 
 
 def means(found, truth):

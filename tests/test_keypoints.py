@@ -7,8 +7,10 @@ import pytest
 
 import voodoo
 from voodoo import Camera, MeasurementError, RecordingError
-from voodoo.keypoints import LAYOUTS, KeypointSensor, nearest_person, read_openpose_json, site_pixels, window_depth
+from voodoo.recordings.keypoint_files import read_openpose_json
+from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.gating import SiteGate
+from voodoo.sensors.keypoints import KeypointSensor, nearest_person, site_pixels, window_depth
 from voodoo.sensors.occlusion import body_before
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5, (-0.1, 0.02, 0.0, 0.0))

@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 import voodoo
 from voodoo.cli import app
 from voodoo.errors import BodyError, MeasurementError, RecordingError
-from voodoo.markers import Z_UP_FROM_Y_UP, add_markers, body_with_markers, marker_offset, read_markers, read_trc
 from voodoo.recordings.marker_files import MarkerMap
+from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_markers, read_trc
+from voodoo.sensors.markers import add_markers, body_with_markers, marker_offset
 
 TRC = (
     "PathFileType\t4\t(X/Y/Z)\tx.trc\n"

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import voodoo
+import voodoo.pipeline.front_end as front_end_module
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.recordings import LaserScan, RecordedFrame
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors.motion import LimbMotion
+from voodoo.sensors.settings import FrontEndSettings
 
 STEP = 1.0 / 30.0
 
@@ -36,27 +38,27 @@ POINTS = np.array([[0.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.5, 0.0], [5.0, 5.0,
 
 
 def test_points_go_on_with_their_limb_and_the_scene_stays():
-    found = moving((0.03, 0.0, 0.0)).carried(POINTS, STEP / 2, near)
+    found = moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, STEP / 2, near)
     assert np.allclose(found - POINTS, [[0, 0, 0], [0.015, 0, 0], [0, 0, 0], [0, 0, 0]])
-    earlier = moving((0.03, 0.0, 0.0)).carried(POINTS, -STEP / 2, near)
+    earlier = moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, -STEP / 2, near)
     assert np.allclose(earlier[1], POINTS[1] - (0.015, 0.0, 0.0))
 
 
 def test_a_turning_limb_moves_what_is_far_from_its_joint_more():
-    found = moving((0.0, 0.0, 0.0), angle=0.05).carried(POINTS, STEP, near)
+    found = moving((0.0, 0.0, 0.0), angle=0.05).motion_compensated(POINTS, STEP, near)
     assert np.allclose(found[1], [0.1 * np.cos(0.05), 1.0 + 0.1 * np.sin(0.05), 0.0])
 
 
 def test_what_is_not_known_to_move_stays():
-    assert LimbMotion().carried(POINTS, STEP, near) is POINTS
-    assert moving((0.03, 0.0, 0.0)).carried(POINTS, 0.0, near) is POINTS
+    assert LimbMotion().motion_compensated(POINTS, STEP, near) is POINTS
+    assert moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, 0.0, near) is POINTS
     jumped = moving((0.5, 0.0, 0.0))
-    assert np.array_equal(jumped.carried(POINTS, STEP, near), POINTS)
-    late = moving((0.03, 0.0, 0.0)).carried(POINTS, 5.0, near)
+    assert np.array_equal(jumped.motion_compensated(POINTS, STEP, near), POINTS)
+    late = moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, 5.0, near)
     assert late[1, 0] == pytest.approx(0.1 + 0.1 * 0.03 / STEP), "for no longer than 0.1 s"
     another_body = moving((0.03, 0.0, 0.0))
     another_body.update(2 * STEP, {"one": np.eye(4)})
-    assert another_body.carried(POINTS, STEP, near) is POINTS
+    assert another_body.motion_compensated(POINTS, STEP, near) is POINTS
 
 
 def test_an_older_scan_is_moved_along_with_the_leg(monkeypatch):
@@ -94,7 +96,7 @@ def test_an_older_scan_is_moved_along_with_the_leg(monkeypatch):
         def add_points(self, points, *, world_from_sensor, weight, source):
             seen.append((points, world_from_sensor))
 
-    monkeypatch.setattr(voodoo, "Frame", Noted)
+    monkeypatch.setattr(front_end_module, "Frame", Noted)
     front_end.frame(RecordedFrame(2 * STEP, (replace(scan, stamp=1.5 * STEP),)))
     (points, used) = seen[0]
     assert np.array_equal(used, pose), "still in the frame of the sensor: what faces it may be seen"

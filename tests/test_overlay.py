@@ -4,10 +4,12 @@ import pytest
 
 from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, pose, scan_at
 from voodoo.errors import VoodooError
-from voodoo.overlay import Overlay, contact_sheet, side_color
-from voodoo.picture_writer import PictureWriter
+from voodoo.model.projection import CameraView, TopView, limb_outline
 from voodoo.recordings import ColorImage, RecordedFrame
-from voodoo.views import CameraView, TopView, limb_outline
+from voodoo.visualization.body_drawing import side_color
+from voodoo.visualization.image_writer import PictureWriter
+from voodoo.visualization.overlay import Overlay
+from voodoo.visualization.sheet import contact_sheet
 
 STILL = RecordedFrame(0.0, (depth_of(T_POSE),))
 

@@ -8,7 +8,7 @@ import pytest
 
 from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
-from voodoo.sensors.camera_files import read_camera_toml
+from voodoo.recordings.camera_files import read_camera_toml
 from voodoo.sensors.rays import SiteRay, agreed
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))

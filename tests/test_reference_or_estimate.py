@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ik_cases import load_example
-from voodoo.body import TaperedEllipticCylinder
-from voodoo.camera import Camera
+from voodoo.model.body import TaperedEllipticCylinder
+from voodoo.model.camera import Camera
 
 CAMERA = Camera(width=200, height=200, fx=200.0, fy=200.0, cx=99.5, cy=99.5)
 LIMB = TaperedEllipticCylinder(length=0.3, a0=0.05, b0=0.05, a1=0.05, b1=0.05)

@@ -7,16 +7,16 @@ import pytest
 
 import voodoo
 from voodoo.errors import BodyError, ConfigError, MeasurementError, RecordingError, VoodooError
-from voodoo.inputs import join
-from voodoo.keypoints import KeypointSensor
-from voodoo.markers import read_trc
+from voodoo.pipeline.inputs import join
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.marker_files import MarkerMap
+from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.recordings.pose2sim import Pose2SimRecording
-from voodoo.running import start_tracker
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.front_end import FrontEndSettings
-from voodoo.sensors.skin import SkinTracker
+from voodoo.sensors.keypoints import KeypointSensor
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.sensors.skin.tracker import SkinTracker
 
 CAMERA = voodoo.Camera(32, 24, 30.0, 30.0, 15.5, 11.5)
 HERE = np.eye(4)

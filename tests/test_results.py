@@ -6,7 +6,7 @@ import pytest
 
 from core_fakes import T_POSE, pose
 from voodoo.errors import VoodooError
-from voodoo.results import Track
+from voodoo.export.track import Track
 
 
 def estimates(frames=5):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import voodoo
-from voodoo import metrics
-from voodoo.walks import Stop, Walk
+from voodoo.evaluation import metrics
+from voodoo.synthetic.room_walk import Stop, Walk
 
 LEFT, RIGHT, TO_CAMERA, AWAY = math.pi / 2, -math.pi / 2, math.pi, 0.0
 STANDING = (Stop(0.0, 2.8, 0.0, TO_CAMERA), Stop(0.5, 2.8, 0.0, TO_CAMERA))

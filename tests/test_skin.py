@@ -7,10 +7,11 @@ import pytest
 import voodoo
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo import MeasurementError
-from voodoo.sensors.assignment import assign
-from voodoo.sensors.depth import BodyView
-from voodoo.sensors.skin import SkinSettings, SkinTracker
-from voodoo.sensors.skin_regions import candidates
+from voodoo.sensors.body_view import BodyView
+from voodoo.sensors.skin.assignment import assign
+from voodoo.sensors.skin.regions import candidates
+from voodoo.sensors.skin.settings import SkinSettings
+from voodoo.sensors.skin.tracker import SkinTracker
 
 
 def test_hands_and_face_are_found_and_named():
@@ -104,7 +105,7 @@ def test_a_face_pulls_less_at_a_head_that_depth_shows():
     image, joints = picture(head, left, right, seed=9), Pose(head, left, right).joints
     found = {}
     for shown in ((), ("head_center", "l_hand")):
-        rays = skin.observe(image, CAMERA, POSE, joints, shown=shown)
+        rays = skin.observe(image, CAMERA, POSE, joints, head_visible=shown)
         found[shown] = {ray.site: ray.bias for ray in rays}
     settings = SkinSettings()
     assert found[()] == dict(settings.sites)
@@ -187,8 +188,10 @@ def test_settings_and_images_are_checked():
 
 
 def test_the_front_end_runs_on_the_bundled_recording():
+    from voodoo.pipeline.front_end import FrontEnd
+    from voodoo.pipeline.pairing import paired
     from voodoo.recordings import open_recording, sample_path
-    from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
+    from voodoo.sensors.settings import FrontEndSettings
 
     recording = open_recording(sample_path())
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))

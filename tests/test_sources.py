@@ -9,8 +9,9 @@ import pytest
 
 import voodoo
 from voodoo.errors import MeasurementError
-from voodoo.keypoints import layout_of
-from voodoo.metrics import JOINTS
+from voodoo.evaluation.metrics import JOINTS
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
 from voodoo.recordings import (
     ColorImage,
     DepthImage,
@@ -21,10 +22,11 @@ from voodoo.recordings import (
     open_recording,
     sample_path,
 )
+from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
 from voodoo.sensors.pixels import in_sensor
-from voodoo.sensors.skin import SkinSettings
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.sensors.skin.settings import SkinSettings
 
 FRAMES = 40
 MOVED = np.eye(4)
@@ -260,7 +262,7 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
                 for skin in front_end.skin.values()
                 for blob in skin.blobs.items
             ]
-            scenes = [scene._farthest.sum() for scene in front_end._scenes.values()]
+            scenes = [scene._farthest.sum() for scene in front_end.memory.all("scene").values()]
             steps.append(
                 repr((estimate.sources, front_end.frozen, front_end.reports, front_end._gate._last, blobs, scenes))
             )

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import voodoo
-from voodoo import metrics
+from voodoo.evaluation import metrics
 from voodoo.ik import Chain
-from voodoo.rendering import render_depth
-from voodoo.virtual import CAMERA, METRES_PER_UNIT, VirtualSequence
+from voodoo.synthetic.render import render_depth
+from voodoo.synthetic.sequence import CAMERA, METRES_PER_UNIT, VirtualSequence
 
 WALL_M, NOISE_M = 3.6, 0.004
 HELD = {"gate_start": 0.001, "gate_end": 0.001, "hypotheses": False, "outline": False, "recovery": False}

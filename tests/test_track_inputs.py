@@ -14,19 +14,20 @@ from typer.testing import CliRunner
 import voodoo
 from test_exports import read_bvh
 from voodoo import cli
-from voodoo.cli import common
+from voodoo.cli import running
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.export import write_trc
-from voodoo.inputs import join, keypoint_folders
-from voodoo.keypoints import layout_of
-from voodoo.markers import read_trc
+from voodoo.export.track import Track
+from voodoo.pipeline.inputs import join, keypoint_folders
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import ColorImage, DepthImage, KeypointImage, MarkerSet, Recording, open_recording, sample_path
 from voodoo.recordings.joined import Joined
+from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.marker_files import MarkerMap, MarkerRecording
-from voodoo.results import Track
-from voodoo.running import start_tracker, track
-from voodoo.sensors.front_end import FrontEndSettings
+from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.sensors.pixels import in_sensor
+from voodoo.sensors.settings import FrontEndSettings
 
 FRAMES = 8
 COLOR = "/camera/color/image_raw/compressed"
@@ -53,7 +54,7 @@ class Short(Recording):
 @pytest.fixture
 def run(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(common, "open_recording", lambda path, **options: Short(open_recording(path)))
+    monkeypatch.setattr(running, "open_recording", lambda path, **options: Short(open_recording(path)))
 
     def call(*arguments):
         return CliRunner().invoke(cli.app, ["track", str(sample_path()), *map(str, arguments)], env={"COLUMNS": "200"})

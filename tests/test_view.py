@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 import voodoo
-from voodoo import view
 from voodoo.errors import VoodooError
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
 from voodoo.recordings import open_recording, sample_path
-from voodoo.sensors.front_end import FrontEnd, FrontEndSettings, paired
-from voodoo.view import Viewer, bands, limb_mesh, nearest_limb
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.visualization import rerun_viewer as view
+from voodoo.visualization.body_geometry import bands, limb_mesh, nearest_limb
+from voodoo.visualization.rerun_viewer import Viewer
 
 
 @pytest.fixture

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import voodoo
-from voodoo import metrics
-from voodoo.angles import angles_of
+from voodoo.evaluation import metrics
 from voodoo.ik import Chain
-from voodoo.virtual import Disturbance, VirtualSequence, disturbed, grown
+from voodoo.ik.angles import angles_of
+from voodoo.synthetic.disturbance import Disturbance, disturbed
+from voodoo.synthetic.grown import grown
+from voodoo.synthetic.sequence import VirtualSequence
 
 SMALL = voodoo.Camera(320, 240, 275.0, 275.0, 159.5, 119.5)
 

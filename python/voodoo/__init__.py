@@ -1,14 +1,20 @@
 """voodoo: the 3-D pose of a person, or any articulated body, every frame, on a plain CPU, from what the robot has."""
 
-from voodoo import ik
-from voodoo._core import ClosestPoints, Estimate, Frame, TaperedEllipticCylinder, __version__
-from voodoo.body import Body, Joint, Limb, Place
-from voodoo.camera import Camera
-from voodoo.config import Config
-from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
-from voodoo.recordings import open_recording
-from voodoo.rendering import RenderedDepth, render_depth
-from voodoo.tracker import Tracker
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from voodoo._moved import MOVED, install
+
+if TYPE_CHECKING:
+    from voodoo import ik
+    from voodoo._core import ClosestPoints, Estimate, Frame, TaperedEllipticCylinder, __version__
+    from voodoo.config import Config
+    from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
+    from voodoo.model.body import Body, Joint, Limb, Place
+    from voodoo.model.camera import Camera
+    from voodoo.recordings.loaders import open_recording
+    from voodoo.synthetic.render import RenderedDepth, render_depth
+    from voodoo.tracker import Tracker
 
 __all__ = [
     "Body",
@@ -34,3 +40,56 @@ __all__ = [
     "open_recording",
     "render_depth",
 ]
+
+# Names are imported when they are first used: `voodoo --help` needs neither NumPy nor OpenCV.
+_HOMES = {
+    "voodoo._core": ("ClosestPoints", "Estimate", "Frame", "TaperedEllipticCylinder", "__version__"),
+    "voodoo.config": ("Config",),
+    "voodoo.errors": (
+        "BodyError",
+        "CameraError",
+        "ConfigError",
+        "MeasurementError",
+        "RecordingError",
+        "VoodooError",
+    ),
+    "voodoo.model.body": ("Body", "Joint", "Limb", "Place"),
+    "voodoo.model.camera": ("Camera",),
+    "voodoo.recordings.loaders": ("open_recording",),
+    "voodoo.synthetic.render": ("RenderedDepth", "render_depth"),
+    "voodoo.tracker": ("Tracker",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+_ROOMS = (
+    "_core",
+    "cli",
+    "config",
+    "errors",
+    "evaluation",
+    "export",
+    "ik",
+    "measurements",
+    "model",
+    "pipeline",
+    "recordings",
+    "sensors",
+    "synthetic",
+    "tracker",
+    "visualization",
+)
+
+install()
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
+    if name in _HOME_OF:
+        value = getattr(import_module(_HOME_OF[name]), name)
+        globals()[name] = value
+        return value
+    if name in _ROOMS or f"voodoo.{name}" in MOVED:
+        return import_module(f"voodoo.{name}")
+    raise AttributeError(f"module 'voodoo' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_ROOMS})

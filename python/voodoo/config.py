@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from voodoo import _core
+import voodoo._core as _core
 from voodoo.errors import ConfigError
-from voodoo.toml_text import parse_toml, read_text
+from voodoo.model.toml_io import parse_toml, read_text
 
 _FIELDS = {name: row for name, *row in _core.config_fields()}
 

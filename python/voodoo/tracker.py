@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from voodoo import _core
+import voodoo._core as _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
-from voodoo.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.config import Config
 from voodoo.errors import BodyError, ConfigError
+from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
 
 
 class Tracker:

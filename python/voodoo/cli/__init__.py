@@ -1,21 +1,24 @@
-"""The command line. Every command is a few calls of the package; nothing is computed here."""
+"""The command line. Every command is a few calls of the package; nothing is computed here.
+
+What a command needs is imported when it runs, so that help and version are there at once.
+"""
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated
 
 import typer
 
+from voodoo.cli.demo import demo_command
 from voodoo.cli.evaluate import eval_command
 from voodoo.cli.ik import ik_command
 from voodoo.cli.show import body_command, config_command, info_command
-from voodoo.cli.track import demo_command, track_command
+from voodoo.cli.track import track_command
 
 app = typer.Typer(
     name="voodoo",
     no_args_is_help=True,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,  # Rich takes longer to import than all the rest of the help
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -28,6 +31,8 @@ def main() -> None:
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
         try:
             typer.echo(f"voodoo {version('voodoo')}")
         except PackageNotFoundError:
@@ -43,8 +48,8 @@ def voodoo_command(
 ) -> None:
     """Follow a person's pose through depth, laser and point cloud recordings, on a plain CPU.
 
-    Try [bold]voodoo demo[/bold] first; then [bold]voodoo info RECORDING[/bold] and
-    [bold]voodoo track RECORDING --out pose.csv --overlay look.mp4[/bold].
+    Try voodoo demo first; then voodoo info RECORDING and
+    voodoo track RECORDING --out pose.csv --overlay look.mp4.
     """
 
 

@@ -1,51 +1,23 @@
-"""What several commands do: open a recording, run over it, show progress, turn errors into one line."""
+"""What all commands do: read words, refuse what does not go together, show progress, turn errors into one line."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-import voodoo
 from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.errors import VoodooError
-from voodoo.overlay import Overlay
-from voodoo.overlay_inputs import Picture
-from voodoo.picture_writer import PictureWriter
-from voodoo.recordings import Recording, open_recording
-from voodoo.results import Track
-from voodoo.running import track
-from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.front_end import INPUTS, FrontEndSettings
-from voodoo.view import Viewer
+
+if TYPE_CHECKING:
+    from voodoo.export.track import Track
 
 T = TypeVar("T")
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of every program that SIGINT ends."""
-
-
-class Run(NamedTuple):
-    """What a run over a recording leaves: the result, the time of every frame [s], the pictures that were asked for, and
-    whether Ctrl-C ended it before the recording did."""
-
-    track: Track
-    seconds: list[float]
-    pictures: list[Picture]
-    interrupted: bool
-
-
-def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
-    """The recording, in the root frame that was asked for."""
-    if frame is not None:
-        options["root_frame"] = frame
-    return open_recording(path, loader=loader, **options)
 
 
 def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
@@ -95,83 +67,6 @@ def refuse_both(name: str, value: object, **others: object) -> None:
             raise typer.BadParameter(f"give {name} or {other}, not both")
 
 
-def kinds_of(words: str | None) -> tuple[str, ...]:
-    """The kinds of inputs in "depth,scan"; all of them for None.
-
-    Raises:
-        VoodooError: an unknown kind.
-    """
-    return INPUTS if words is None else FrontEndSettings(use=tuple(word.strip() for word in words.split(","))).use
-
-
-def depth_filter_of(words: str | None) -> DepthFilter | None:
-    """The filter of "NEAR,FAR" in metres; none for None.
-
-    Raises:
-        VoodooError: not two numbers, or limits that leave nothing.
-    """
-    if words is None:
-        return None
-    try:
-        nearest, farthest = (float(word) for word in words.split(","))
-    except ValueError:
-        raise VoodooError(f"depth-range: expected NEAR,FAR in metres, found {words!r}") from None
-    return DepthFilter(nearest=nearest, farthest=farthest)
-
-
-def config_of(path: Path | None) -> voodoo.Config:
-    """The configuration of a file; the defaults for None."""
-    return voodoo.Config() if path is None else voodoo.Config.load(path)
-
-
-def run(
-    source: Recording,
-    tracker: voodoo.Tracker,
-    overlay: Path | None,
-    *,
-    sheet: int = 0,
-    settings: FrontEndSettings | None = None,
-    viewer: Viewer | None = None,
-) -> Run:
-    """Track and draw, with `sheet` pictures spread over the recording. Ctrl-C ends it with the frames up to there, if any."""
-    estimates, seconds, pictures, interrupted = [], [], [], False
-    chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
-    rate = source.info().rate_hz
-    drawing = Overlay(source)
-    writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
-    with writer or nullcontext():
-        try:
-            for step in progressing(track(source, tracker, settings=settings), source.name, len(source)):
-                estimates.append(step.estimate)
-                seconds.append(step.seconds)
-                if viewer is not None:
-                    viewer.log(
-                        step.estimate,
-                        tracker.body,
-                        recorded=step.recorded,
-                        front_end=step.front_end,
-                        seconds=step.seconds,
-                    )
-                if writer is not None or step.index in chosen:
-                    picture = drawing.draw(
-                        step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end
-                    )
-                    if writer is not None:
-                        writer.write(picture)
-                    if step.index in chosen:
-                        pictures.append(picture)
-        except KeyboardInterrupt:
-            if not estimates:
-                raise
-            interrupted = True
-    return Run(Track.of(estimates, body=tracker.body), seconds, pictures, interrupted)
-
-
-def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:
-    """The viewer that was asked for, opened before the work so that a missing Rerun is told at once."""
-    return Viewer(save=save, name=name) if view or save is not None else nullcontext()
-
-
 def states(result: Track) -> str:
     """How many frames the tracker itself called what, e.g. "88 tracking, 2 lost"."""
     return ", ".join(f"{result.status.count(word)} {word}" for word in dict.fromkeys(result.status))
@@ -179,6 +74,9 @@ def states(result: Track) -> str:
 
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     """Show a progress bar on stderr, if a person looks at it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress:

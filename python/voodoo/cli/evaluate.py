@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, config_of, kinds_of, progressing
+from voodoo.cli.common import clear_errors, progressing
 from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, UseOption
 from voodoo.errors import VoodooError
 
@@ -42,7 +42,7 @@ def eval_command(
     switch turned over, the other solvers, no prediction, no jitter penalty)
     and prints a row each; --out gets ablation.md and ablation.csv.
 
-    [bold]Examples[/bold]
+    Examples
 
     voodoo eval rendered/ --only '*_cmu' --out report
 
@@ -50,9 +50,11 @@ def eval_command(
 
     voodoo eval rendered/ --ablate --out report
     """
-    from voodoo.ablate import ablate, table, variants, write_tables
-    from voodoo.evaluate import evaluate_all, find_recordings
-    from voodoo.report import markdown, write_reports
+    from voodoo.cli.running import config_of, kinds_of
+    from voodoo.evaluation.ablation import ablate, table, variants, write_tables
+    from voodoo.evaluation.evaluate import evaluate_all
+    from voodoo.evaluation.report import markdown, write_reports
+    from voodoo.evaluation.search import find_recordings
 
     with clear_errors():
         human = model or "full"

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
-import voodoo
-from voodoo.cli.common import clear_errors, numbers_of, opened, refuse_both, states, topics_of
+from voodoo.cli.common import clear_errors, numbers_of, refuse_both, states, topics_of
 from voodoo.cli.options import (
     BodyOption,
     FrameOption,
@@ -21,10 +19,6 @@ from voodoo.cli.options import (
     RecordingArgument,
     TopicOption,
 )
-from voodoo.export.files import check_target
-from voodoo.export.files import save as export
-from voodoo.results import Track
-from voodoo.running import Init, start_tracker
 
 
 def ik_command(
@@ -73,13 +67,21 @@ def ik_command(
     The .csv has the columns of voodoo track, its NAME_rad led by the six of the root; the other formats are those of voodoo
     track, too. Sites that are not among the known ones are compared with the reference, if it has them.
 
-    [bold]Examples[/bold]
+    Examples
 
     voodoo ik walk_bag/ --pictures none
 
     voodoo ik walk_bag/ --targets pose.npz --sites head_center,l_shoulder,r_shoulder,l_hip,r_hip,l_hand --out pose.bvh
     """
-    from voodoo.ik_recording import Positions, follow
+    import numpy as np
+
+    from voodoo.cli.running import opened
+    from voodoo.export.files import check_target
+    from voodoo.export.files import save as export
+    from voodoo.export.track import Track
+    from voodoo.model.body import Body
+    from voodoo.pipeline.ik import Positions, follow
+    from voodoo.pipeline.start import Init, start_tracker
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
@@ -91,7 +93,7 @@ def ik_command(
         tracker = start_tracker(
             source,
             init=None if init is None else Init.load(init),
-            body=None if body is None else voodoo.Body.load(body),
+            body=None if body is None else Body.load(body),
             height=height,
             model=model or "full",
         )

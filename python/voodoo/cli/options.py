@@ -7,12 +7,10 @@ from typing import Annotated
 
 import typer
 
-from voodoo.recordings import LOADERS
-from voodoo.recordings.ros_topics import KINDS
-from voodoo.running import HumanModel
-from voodoo.sensors.front_end import INPUTS
+from voodoo.names import INPUTS, TOPIC_KINDS, HumanModel
+from voodoo.recordings.loaders import LOADERS
 
-TOPICS = (*KINDS, "camera_info")
+TOPICS = (*TOPIC_KINDS, "camera_info")
 """What a topic can be chosen for."""
 
 RecordingArgument = Annotated[

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-import voodoo
-from voodoo.cli.common import clear_errors, numbers_of, opened, refuse_both, topics_of
+from voodoo.cli.common import clear_errors, numbers_of, refuse_both, topics_of
 from voodoo.cli.options import (
     FrameOption,
     HeightOption,
@@ -28,6 +27,8 @@ def info_command(
     option: LoaderNumberOption = None,
 ) -> None:
     """Say what is in a recording: sensors, topics, frames, rates, root frame and reference."""
+    from voodoo.cli.running import opened
+
     with clear_errors():
         typer.echo(str(opened(recording, loader, frame, **topics_of(topic), **numbers_of(option)).info()))
 
@@ -35,11 +36,13 @@ def info_command(
 def config_command() -> None:
     """Print the default configuration as commented TOML, to change and give back with --config.
 
-    [bold]Example[/bold]
+    Example
 
     voodoo config > fast.toml
     """
-    typer.echo(voodoo.Config().to_toml(), nl=False)
+    from voodoo.config import Config
+
+    typer.echo(Config().to_toml(), nl=False)
 
 
 def body_command(
@@ -48,10 +51,12 @@ def body_command(
     model: ModelOption = None,
 ) -> None:
     """Print a body as TOML: the default human of a stature, or a file after checking it."""
+    from voodoo.model.body import Body
+
     with clear_errors():
         refuse_both("FILE", file, **{"--height": height, "--model": model})
         if file is not None:
-            body = voodoo.Body.load(file)
+            body = Body.load(file)
         else:
-            body = voodoo.Body.human(1.75 if height is None else height, model=model or "full")
+            body = Body.human(1.75 if height is None else height, model=model or "full")
         typer.echo(body.to_toml(), nl=False)

@@ -1,29 +1,13 @@
-"""`voodoo track` and `voodoo demo`."""
+"""`voodoo track`."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-import voodoo
-from voodoo.cli.common import (
-    INTERRUPTED,
-    clear_errors,
-    config_of,
-    depth_filter_of,
-    kinds_of,
-    numbers_of,
-    opened,
-    refuse_both,
-    run,
-    states,
-    topics_of,
-    viewer_of,
-)
+from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both, states, topics_of
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -37,16 +21,7 @@ from voodoo.cli.options import (
     TopicOption,
     UseOption,
 )
-from voodoo.export.files import check_target
-from voodoo.export.files import save as export
-from voodoo.inputs import join, keypoint_folders, loader_options
-from voodoo.keypoint_layouts import LAYOUTS
-from voodoo.overlay import contact_sheet
-from voodoo.picture_writer import save_picture
-from voodoo.recordings import sample_path
-from voodoo.recordings.marker_files import MarkerMap
-from voodoo.running import Init, start_tracker
-from voodoo.sensors.front_end import FrontEndSettings
+from voodoo.recordings.keypoint_layouts import LAYOUTS
 
 
 def track_command(
@@ -66,9 +41,7 @@ def track_command(
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
     ] = None,
-    view: Annotated[
-        bool, typer.Option("--view", help="Show every step in Rerun (pip install voodoo\\[view]).")
-    ] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show every step in Rerun (pip install voodoo[view]).")] = False,
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
     ] = None,
@@ -107,9 +80,9 @@ def track_command(
     result.
 
     --init gives the pose in the first frame, by any subset of names that fixes it:
-    [cyan]{"height_m": 1.76, "joints": {"l_shoulder": \\[3.1, -0.3, 1.4], "r_shoulder": \\[3.2, 0.1, 1.4], ...}}[/cyan]
+    {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
 
-    [bold]Examples[/bold]
+    Examples
 
     voodoo track walk_bag/ --init start.json --out walk.csv
 
@@ -117,6 +90,17 @@ def track_command(
 
     voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
+    from dataclasses import replace
+
+    from voodoo.cli.running import config_of, depth_filter_of, kinds_of, opened, run, viewer_of
+    from voodoo.export.files import check_target
+    from voodoo.export.files import save as export
+    from voodoo.model.body import Body
+    from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
+    from voodoo.pipeline.start import Init, start_tracker
+    from voodoo.recordings.marker_files import MarkerMap
+    from voodoo.sensors.settings import FrontEndSettings
+
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         refuse_both("--view", view or None, **{"--save": save})
@@ -145,7 +129,7 @@ def track_command(
         tracker = start_tracker(
             source,
             init=None if init is None else Init.load(init),
-            body=None if body is None else voodoo.Body.load(body),
+            body=None if body is None else Body.load(body),
             height=height,
             model=model or "full",
             config=config_of(config),
@@ -162,30 +146,3 @@ def track_command(
             typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {told}", err=True)
             raise typer.Exit(INTERRUPTED)
         typer.echo(told)
-
-
-def demo_command(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for result and pictures.")] = Path("voodoo-demo"),
-) -> None:
-    """Run the main job on the bundled recording, a person who bends, scoops and reaches up.
-
-    Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the recording's exact truth.
-    """
-    from voodoo.evaluate import compare
-
-    with clear_errors():
-        source = opened(sample_path(), None, None)
-        tracker = start_tracker(source)
-        out.mkdir(parents=True, exist_ok=True)
-        result, seconds, sheet, interrupted = run(source, tracker, out / "overlay.mp4", sheet=6)
-        if interrupted:
-            raise typer.Exit(INTERRUPTED)
-        result.save(out / "pose.csv")
-        save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
-        errors = compare(source, result)
-        typer.echo(f"{source.name}: {len(result)} frames, {states(result)}")
-        typer.echo(
-            f"time of a frame   {1e3 * np.mean(seconds):.2f} ms (mean), {1e3 * np.median(seconds):.2f} ms (median)"
-        )
-        typer.echo(f"mean joint error  {100 * np.nanmean(errors):.1f} cm against exact truth, twelve joints")
-        typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from voodoo.body import Body
 from voodoo.export.skeleton import Bone, FloatArray, mean_interval, skeleton
-from voodoo.results import Track
+from voodoo.export.track import Track
+from voodoo.model.body import Body
 
 _Y_UP = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """(x, y, z) of BVH = (y, z, x) of the standing frame: X to the left, Y up, Z forward."""

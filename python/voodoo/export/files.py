@@ -8,12 +8,12 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from voodoo.body import Body
 from voodoo.errors import VoodooError
 from voodoo.export.bvh import write_bvh
 from voodoo.export.ros2 import write_bag
+from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
-from voodoo.results import Track
+from voodoo.model.body import Body
 
 FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
 """Suffixes; a path without one is a ROS 2 bag folder."""

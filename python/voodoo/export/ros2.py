@@ -16,11 +16,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from voodoo.body import Body
 from voodoo.errors import VoodooError
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
-from voodoo.results import Track
+from voodoo.export.track import Track
+from voodoo.model.body import Body
 
 _SIDE = {
     "upperarm": "shoulder", "forearm": "elbow", "hand": "wrist", "thigh": "hip", "calf": "knee", "foot": "ankle",

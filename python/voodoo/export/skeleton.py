@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from voodoo.body import Body
 from voodoo.errors import VoodooError
-from voodoo.results import Track
+from voodoo.export.track import Track
+from voodoo.model.body import Body
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from voodoo.errors import VoodooError
 from voodoo.export.skeleton import mean_interval
-from voodoo.markers import Z_UP_FROM_Y_UP
-from voodoo.results import Track
+from voodoo.export.track import Track
+from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP
 
 
 def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None, y_up: bool = True) -> None:

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from voodoo import _core
-from voodoo.body import Body
+import voodoo._core as _core
 from voodoo.errors import MeasurementError
 from voodoo.ik.image import Silhouette, seen_views
 from voodoo.ik.options import Options
 from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, vector
+from voodoo.model.body import Body
 
 
 class Chain:

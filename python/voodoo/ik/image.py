@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo import _core
-from voodoo.camera import Camera
+import voodoo._core as _core
 from voodoo.errors import MeasurementError
 from voodoo.ik.values import numbers
-from voodoo.poses import rigid
+from voodoo.model.camera import Camera
+from voodoo.model.transforms import rigid
 
 _UNDISTORTED = 0.5
 _MIDDLE = 0.3

@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.body import Body
 from voodoo.errors import MeasurementError
 from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette, seen_views
@@ -17,6 +16,7 @@ from voodoo.ik.posture import Posture, Postures
 from voodoo.ik.rest import Rest, named_rest, rest_parts
 from voodoo.ik.targets import Target, Targets, target_parts
 from voodoo.ik.values import FloatArray, base_pose, listed_bones, listed_poses, named, vector
+from voodoo.model.body import Body
 
 
 def solve(

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.camera import Camera
 from voodoo.errors import CameraError, RecordingError
-from voodoo.recordings.measurements import FloatArray
-from voodoo.toml_text import parse_toml, read_text
+from voodoo.measurements import FloatArray
+from voodoo.model.camera import Camera
+from voodoo.model.toml_io import parse_toml, read_text
 
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")

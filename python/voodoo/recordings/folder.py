@@ -9,8 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from voodoo.errors import RecordingError, reading
+from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.calibration import Calibration, read_calibration
-from voodoo.recordings.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate
 

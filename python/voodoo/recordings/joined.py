@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from voodoo.errors import RecordingError
-from voodoo.keypoints import layout_of, read_openpose_json
-from voodoo.recordings.measurements import ColorImage, DepthImage, KeypointImage, Measurement, RecordedFrame
+from voodoo.measurements import ColorImage, DepthImage, KeypointImage, Measurement, RecordedFrame
+from voodoo.recordings.keypoint_files import read_openpose_json
+from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.recording import Recording, RecordingInfo
 
 
@@ -91,7 +92,7 @@ class WithKeypoints(Recording):
     Args:
         recording: with colour or depth images.
         folders: sensor -> folder of OpenPose JSON files, one for each of its images, sorted by name.
-        layout: of the keypoints, see voodoo.keypoints.LAYOUTS.
+        layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
 
     Raises:
         RecordingError: an unknown sensor, or another number of files than images.

@@ -7,33 +7,69 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from voodoo.errors import RecordingError
-from voodoo.recordings.folder import FolderRecording
-from voodoo.recordings.marker_files import MarkerRecording
-from voodoo.recordings.pose2sim import Pose2SimRecording
-from voodoo.recordings.recording import Recording
-from voodoo.recordings.ros import RosRecording
-from voodoo.recordings.ros_bag import find_bag, zip_members
-from voodoo.recordings.utd_mhad import UtdMhadRecording
+
+if TYPE_CHECKING:
+    from voodoo.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
 class Loader:
-    """How one kind of recording is opened, and what it looks like on disk."""
+    """How one kind of recording is opened, and what it looks like on disk.
 
-    open: Callable[..., Recording]
+    Args:
+        find: imports what opens it; other loaders' libraries are not needed.
+        expects: in words.
+    """
+
+    find: Callable[[], Callable[..., Recording]]
     expects: str
+
+    @property
+    def open(self) -> Callable[..., Recording]:
+        """Called with the path and the loader's options."""
+        return self.find()
+
+
+def _ros() -> Callable[..., Recording]:
+    from voodoo.recordings.ros import RosRecording
+
+    return RosRecording
+
+
+def _utd_mhad() -> Callable[..., Recording]:
+    from voodoo.recordings.utd_mhad import UtdMhadRecording
+
+    return UtdMhadRecording
+
+
+def _folder() -> Callable[..., Recording]:
+    from voodoo.recordings.folder import FolderRecording
+
+    return FolderRecording
+
+
+def _pose2sim() -> Callable[..., Recording]:
+    from voodoo.recordings.pose2sim import Pose2SimRecording
+
+    return Pose2SimRecording
+
+
+def _markers() -> Callable[..., Recording]:
+    from voodoo.recordings.marker_files import MarkerRecording
+
+    return MarkerRecording
 
 
 LOADERS: dict[str, Loader] = {
-    "ros2": Loader(RosRecording, "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"),
-    "ros1": Loader(RosRecording, "a ROS 1 .bag, or a .zip of it"),
-    "utd-mhad": Loader(UtdMhadRecording, "a *_depth.mat of UTD-MHAD"),
-    "folder": Loader(FolderRecording, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
-    "pose2sim": Loader(Pose2SimRecording, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
-    "markers": Loader(MarkerRecording, "a .trc or .c3d file of markers"),
+    "ros2": Loader(_ros, "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"),
+    "ros1": Loader(_ros, "a ROS 1 .bag, or a .zip of it"),
+    "utd-mhad": Loader(_utd_mhad, "a *_depth.mat of UTD-MHAD"),
+    "folder": Loader(_folder, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
+    "pose2sim": Loader(_pose2sim, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
+    "markers": Loader(_markers, "a .trc or .c3d file of markers"),
 }
 
 
@@ -64,10 +100,9 @@ def open_recording(path: str | Path, *, loader: str | None = None, **options: An
             f"loader {name!r} has no option {', '.join(unknown)}; its options: {', '.join(known) or 'none'}"
         )
     recording = LOADERS[name].open(path, **options)
-    if isinstance(recording, RosRecording) and recording.loader != name:
-        raise RecordingError(
-            f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {recording.loader!r}"
-        )
+    found = getattr(recording, "loader", name)  # a bag tells itself which of the two it is
+    if found != name:
+        raise RecordingError(f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {found!r}")
     return recording
 
 
@@ -82,6 +117,8 @@ def guess_loader(path: Path) -> str:
     Raises:
         RecordingError: nothing fits; the message lists the loaders.
     """
+    from voodoo.recordings.ros_bag import find_bag, zip_members
+
     if path.is_file():
         if path.name.endswith("_depth.mat"):
             return "utd-mhad"

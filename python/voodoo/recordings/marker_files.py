@@ -9,13 +9,13 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-from voodoo.body import Body
 from voodoo.errors import RecordingError
-from voodoo.markers import Z_UP_FROM_Y_UP, read_markers
-from voodoo.recordings.measurements import FloatArray, MarkerSet, RecordedFrame
+from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
+from voodoo.model.body import Body
+from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_markers
 from voodoo.recordings.pose2sim import SITES
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start, mean_rate
-from voodoo.toml_text import parse_toml, read_text
 
 FRAME = "world"
 
@@ -68,7 +68,7 @@ class MarkerMap(BaseModel):
             raise RecordingError(f"{path}: {key}: {problem['msg']}, found {problem['input']!r:.80}") from error
 
     def worn(self) -> dict[str, tuple[str, tuple[float, float, float]]]:
-        """The markers on limbs as voodoo.markers.body_with_markers takes them."""
+        """The markers on limbs as voodoo.sensors.markers.body_with_markers takes them."""
         return {name: (place.limb, place.position) for name, place in self.limbs.items()}
 
 

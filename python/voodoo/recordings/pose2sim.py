@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from voodoo.errors import MeasurementError, RecordingError
-from voodoo.keypoints import layout_of, read_openpose_json
-from voodoo.markers import Z_UP_FROM_Y_UP, read_trc
-from voodoo.recordings.measurements import KeypointImage, RecordedFrame
+from voodoo.measurements import KeypointImage, RecordedFrame
+from voodoo.recordings.camera_files import read_camera_toml
+from voodoo.recordings.keypoint_files import read_openpose_json
+from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
@@ -21,7 +23,6 @@ from voodoo.recordings.recording import (
     number_option,
     reference_words,
 )
-from voodoo.sensors.camera_files import read_camera_toml
 
 SITES = {
     f"{side}{joint}": f"{side.lower()}_{site}"
@@ -49,7 +50,7 @@ class Pose2SimRecording(Recording):
 
     Args:
         path: the folder.
-        layout: of the keypoints, see voodoo.keypoints.LAYOUTS.
+        layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
         rate: images per second; nothing in the folder tells it (`voodoo track --option rate=30`).
         cameras: names to use, as in the calibration file; None means all.
 

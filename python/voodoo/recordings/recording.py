@@ -12,7 +12,7 @@ from typing import TypedDict
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.recordings.measurements import FloatArray, RecordedFrame
+from voodoo.measurements import FloatArray, RecordedFrame
 
 
 class _Joints(TypedDict):

@@ -10,15 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading
-from voodoo.recordings.measurements import (
-    ColorImage,
-    DepthImage,
-    FloatArray,
-    LaserScan,
-    Measurement,
-    PointCloud,
-    RecordedFrame,
-)
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
+from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, reference_words
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
@@ -33,7 +26,7 @@ from voodoo.recordings.ros_messages import (
     scan_fields,
     stamp_of,
 )
-from voodoo.recordings.ros_topics import COMPRESSED, KINDS, Kind, Source, TopicChoice, TopicFinder
+from voodoo.recordings.ros_topics import COMPRESSED, Source, TopicChoice, TopicFinder
 from voodoo.recordings.transforms import TransformTree
 from voodoo.recordings.truth import TRUTH_FRAME, find_beside, read_start, read_truth
 
@@ -69,7 +62,7 @@ class RosRecording(Recording):
         self,
         path: Path,
         *,
-        use: Sequence[Kind] = KINDS,
+        use: Sequence[TopicKind] = TOPIC_KINDS,
         depth_topic: TopicChoice = None,
         points_topic: TopicChoice = None,
         scan_topic: TopicChoice = None,
@@ -80,14 +73,14 @@ class RosRecording(Recording):
         tf_max_age: float = 0.5,
     ) -> None:
         """Survey topics and transforms; see the class."""
-        if isinstance(use, str) or not use or not set(use) <= set(KINDS):
-            raise RecordingError(f"use: expected a tuple of some of {', '.join(KINDS)}, found {use!r}")
+        if isinstance(use, str) or not use or not set(use) <= set(TOPIC_KINDS):
+            raise RecordingError(f"use: expected a tuple of some of {', '.join(TOPIC_KINDS)}, found {use!r}")
         self.path = path
         self._metres_per_unit = number_option(path, "metres_per_unit", metres_per_unit, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._bag = Bag(path)
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
-        choices: dict[Kind, TopicChoice] = {
+        choices: dict[TopicKind, TopicChoice] = {
             "depth": depth_topic,
             "points": points_topic,
             "scan": scan_topic,

@@ -8,9 +8,9 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.camera import Camera
 from voodoo.errors import CameraError, RecordingError
-from voodoo.recordings.measurements import FloatArray
+from voodoo.measurements import FloatArray
+from voodoo.model.camera import Camera
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 
 Message: TypeAlias = Any

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import TypeAlias
 
-from voodoo.camera import Camera
 from voodoo.errors import RecordingError, reading
+from voodoo.model.camera import Camera
+from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
     COLOR_CHANNELS,
@@ -19,14 +20,11 @@ from voodoo.recordings.ros_messages import (
     stamp_of,
 )
 
-Kind: TypeAlias = Literal["depth", "points", "scan", "color"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
-"""In the order of precedence: the first kind a recording has makes its frames."""
 TopicChoice: TypeAlias = str | Sequence[str] | None
 
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
-_TYPES: dict[Kind, tuple[str, ...]] = {
+_TYPES: dict[TopicKind, tuple[str, ...]] = {
     "depth": (IMAGE, COMPRESSED),
     "points": ("sensor_msgs/msg/PointCloud2",),
     "scan": ("sensor_msgs/msg/LaserScan",),
@@ -40,7 +38,7 @@ class Source:
     stamp [s] and a word on the format. `camera` and the topic it came from are set for images."""
 
     topic: str
-    kind: Kind
+    kind: TopicKind
     type: str
     messages: int
     frame: str
@@ -62,7 +60,7 @@ class TopicFinder:
         camera_info_topic: calibration of the depth image, if it isn't beside it.
     """
 
-    def __init__(self, bag: Bag, *, choices: dict[Kind, TopicChoice], camera_info_topic: str | None) -> None:
+    def __init__(self, bag: Bag, *, choices: dict[TopicKind, TopicChoice], camera_info_topic: str | None) -> None:
         """Look at nothing yet."""
         self.bag = bag
         self.unused: list[tuple[str, str]] = []
@@ -71,14 +69,14 @@ class TopicFinder:
         self._topics = {topic.name: topic for topic in bag.topics}
         self._first: dict[str, Message] = {}
 
-    def find(self, use: Sequence[Kind]) -> list[Source]:
+    def find(self, use: Sequence[TopicKind]) -> list[Source]:
         """Sources of the kinds in `use`, the first one making the frames.
 
         Raises:
             RecordingError: nothing usable, an ambiguous choice, a missing calibration or a wrong encoding.
         """
         sources: list[Source] = []
-        for kind in KINDS:
+        for kind in TOPIC_KINDS:
             if kind not in use:
                 continue
             if self._choices[kind] is None and kind == "color":
@@ -97,7 +95,7 @@ class TopicFinder:
             raise RecordingError(f"{self.bag.path}: expected topics for {', '.join(use)}, found {listing}{why}")
         return sources
 
-    def _chosen(self, kind: Kind) -> list[str]:
+    def _chosen(self, kind: TopicKind) -> list[str]:
         choice = self._choices[kind]
         names = [choice] if isinstance(choice, str) else list(choice or ())
         for name in names:
@@ -111,7 +109,7 @@ class TopicFinder:
                 )
         return names
 
-    def _automatic(self, kind: Kind) -> list[str]:
+    def _automatic(self, kind: TopicKind) -> list[str]:
         names = [topic.name for topic in self.bag.topics if topic.type in _TYPES[kind] and topic.messages]
         if kind == "depth":
             names = self._depth_candidates(names)
@@ -165,7 +163,7 @@ class TopicFinder:
             self.unused.append((source.topic, "same frame as the depth image, hence the same points (points_topic=)"))
         return same
 
-    def _source(self, name: str, kind: Kind) -> Source:
+    def _source(self, name: str, kind: TopicKind) -> Source:
         topic, message = self._topics[name], self._message(name)
         camera, info_topic = None, None
         with reading(f"{self.bag.path}, topic {name}", f"a {topic.type} message"):
@@ -181,7 +179,7 @@ class TopicFinder:
             stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), frame_of(message)
         return Source(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
 
-    def _calibration(self, name: str, kind: Kind, frame: str) -> tuple[str, Camera]:
+    def _calibration(self, name: str, kind: TopicKind, frame: str) -> tuple[str, Camera]:
         """CameraInfo beside the image (its name with the last part replaced), or as chosen for depth."""
         expected = f"{base_topic(name).rsplit('/', 1)[0]}/camera_info"
         if kind == "depth" and self._camera_info_topic is not None:

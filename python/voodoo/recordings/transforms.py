@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.recordings.measurements import FloatArray
+from voodoo.measurements import FloatArray
 from voodoo.recordings.ros_messages import Message
 
 

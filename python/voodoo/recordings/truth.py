@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from voodoo.errors import RecordingError, reading
-from voodoo.recordings.measurements import FloatArray
+from voodoo.measurements import FloatArray
 from voodoo.recordings.recording import Reference, Start
 
 TRUTH_FRAME = "base_link"

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.io
 
-from voodoo.camera import Camera
 from voodoo.errors import RecordingError, reading
-from voodoo.recordings.measurements import DepthImage, RecordedFrame
+from voodoo.measurements import DepthImage, RecordedFrame
+from voodoo.model.camera import Camera
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,

@@ -3,35 +3,19 @@ range."""
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from dataclasses import dataclass
-from statistics import median
 from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo import _core
-from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
-from voodoo.sensors.pixels import FloatArray, in_sensor
+from voodoo.measurements import DepthImage
+from voodoo.model.projection import transform
+from voodoo.sensors.pixels import FloatArray
 
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
-
-
-_CORNERS = np.array([[bool(corner >> axis & 1) for axis in range(3)] for corner in range(8)])
-"""Which of a box's corners are at its high end."""
-_AROUND = np.ones((3, 3), np.uint8)
-_EDGE_M = 0.10
-"""Surfaces that differ by more than this in depth do not touch."""
-_STANDS = 1e-3
-"""A pose whose entries change by less is that of a camera that stands."""
-_BEHIND = (0.05, 0.02)
-"""What lies so far behind is another surface: metres, and share of the depth."""
-_STAYS, _STAYED = 6, (0.02, 0.015)
-"""Over so many pictures the depth of a still surface changes by less than this: metres, and share of the depth."""
 
 
 @dataclass(frozen=True)
@@ -111,199 +95,19 @@ class DepthFilter:
         return flying | lonely
 
 
-@dataclass(frozen=True, eq=False)
-class BodyView:
-    """What a depth camera saw of the body, in the picture of a colour camera beside it.
-
-    Args:
-        mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
-        pixels: (N, 2) of the points in the picture.
-        depths: (N,) of the points along the colour camera's optical axis [m].
-        still: (N,) whether nothing behind a point was ever seen there: it may be the scene. None: not known.
-        before: (H, W) of the picture: True where something is before what was seen there once. None: not known.
-    """
-
-    mask: npt.NDArray[np.bool_]
-    pixels: FloatArray
-    depths: FloatArray
-    still: npt.NDArray[np.bool_] | None = None
-    before: npt.NDArray[np.bool_] | None = None
-
-    def look_at(
-        self, pixel: tuple[float, float], radius: float, *, among: npt.NDArray[np.bool_] | None = None
-    ) -> tuple[float, bool] | None:
-        """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
-        less than three points there. Where three of the points `among` (N,) are there, only those count."""
-        return _core.nearest_surface(self.pixels, self.depths, self.still, pixel=pixel, radius=radius, among=among)
-
-    def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-        """Values (N,) of the picture (H, W) at the points, -1 outside."""
-        u, v = np.rint(self.pixels).astype(np.intp).T
-        inside = (u >= 0) & (v >= 0) & (u < image.shape[1]) & (v < image.shape[0])
-        place = np.where(inside, v * image.shape[1] + u, 0)
-        return np.where(inside, image.take(place), np.int32(-1))
-
-
-class StillDepth:
-    """What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind
-    which nothing was ever seen. A table's edge does not become a hand.
-
-    The surface of a person who has not moved yet looks the same, so this only tells what has moved.
-    """
-
-    def __init__(self) -> None:
-        """Nothing seen yet."""
-        self._farthest: npt.NDArray[np.float32] | None = None
-        self._pose: FloatArray | None = None
-        self._last: deque[npt.NDArray[np.float32]] = deque(maxlen=_STAYS)
-
-    def __copy__(self) -> StillDepth:
-        """The same; images are never changed in place."""
-        twin = StillDepth()
-        twin._farthest, twin._pose, twin._last = self._farthest, self._pose, self._last.copy()
-        return twin
-
-    def see(
-        self, z: npt.NDArray[np.float32], world_from_sensor: FloatArray
-    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]] | None:
-        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew.
-
-        Returns:
-            (H, W): True where the image shows what may be the scene; (H, W): True where it shows something before what
-            was seen there once. None as long as too little was seen.
-        """
-        moved = self._pose is None or (np.abs(self._pose - world_from_sensor) > _STANDS).any()
-        if self._farthest is None or moved or self._farthest.shape != z.shape:
-            self._farthest, self._pose = z, world_from_sensor
-            self._last.clear()
-        self._farthest = np.maximum(self._farthest, z)
-        still = None
-        if len(self._last) == _STAYS:
-            # At the edges of things every camera sees now the one, now the other.
-            behind = cv2.erode(self._farthest, _AROUND)
-            near, stayed = (low + share * z for low, share in (_BEHIND, _STAYED))
-            before = np.asarray(behind - z >= near)
-            still = (np.asarray(~before & (np.abs(z - self._last[0]) < stayed)), before)
-        self._last.append(z)
-        return still
-
-
-def body_view(
-    depth: DepthArray,
-    *,
-    depth_camera: Camera,
-    world_from_depth: FloatArray,
-    metres_per_unit: float,
-    color_camera: Camera,
-    world_from_color: FloatArray,
-    joints: npt.ArrayLike,
-    margin: float = 0.30,
-    step: int = 1,
-    scene: StillDepth | None = None,
-) -> BodyView:
-    """Where, in a colour image, a depth camera beside it saw something within the box around the body.
-
-    Args:
-        depth: (H, W) uint16 or float32; 0 and NaN mean "no return".
-        depth_camera, world_from_depth: calibration and (4, 4) pose.
-        metres_per_unit: of `depth`.
-        color_camera, world_from_color: calibration and (4, 4) pose of the colour camera.
-        joints: (N, 3) predicted positions of the body [m].
-        margin: enlargement of their box [m].
-        step: every step-th row and column of the depth image is used.
-        scene: what the depth camera saw before; takes up this image.
-
-    Returns:
-        Mask of the colour image and the points; the gaps between the depth pixels are closed in the mask.
-    """
-    places = np.asarray(joints, dtype=np.float64)
-    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
-    z = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
-    rows, columns = _window(depth_camera, world_from_depth, low, high)
-    points, index = _core.points_within(
-        z,
-        depth_camera.rays(),
-        step=step,
-        rows=(-(-rows.start // step), -(-rows.stop // step)),
-        columns=(-(-columns.start // step), -(-columns.stop // step)),
-        low=low,
-        high=high,
-        world_from_sensor=world_from_depth,
-        other_from_sensor=np.linalg.inv(world_from_color) @ world_from_depth,
+def depth_points(depth: DepthImage) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Points (H*W, 3) [m] of a depth image in the root frame, row by row, and which pixels (H*W,) measured anything."""
+    z = depth.image.astype(np.float64).reshape(-1) * depth.metres_per_unit
+    rays = depth.camera.rays().reshape(-1, 2)
+    valid = np.isfinite(z) & (z > 0.0) & np.isfinite(rays).all(axis=1)
+    points = np.full((len(z), 3), np.nan)
+    points[valid] = transform(
+        depth.root_from_sensor, np.column_stack([rays[valid], np.ones(valid.sum())]) * z[valid, None]
     )
-    standing = None if scene is None else scene.see(z, world_from_depth)
-    still, moved = (None, None) if standing is None else (item.ravel()[index] for item in standing)
-    pixels = color_camera.project(points)
-    mask, front, inside, corner, nearest = _core.splat(
-        pixels, points, moved, height=color_camera.height, width=color_camera.width
-    )
-    # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
-    size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
-    around = np.ones((size, size), np.uint8)
-    grown = cv2.dilate(mask, around).view(np.bool_)
-    before = None if front is None else cv2.dilate(front, around).view(np.bool_)
-    grown |= _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
-    # A hand's region ends where a table behind it begins.
-    edges = _behind_edges(nearest)
-    window = tuple(slice(first, first + count) for first, count in zip(corner, edges.shape, strict=True))
-    for image in (grown, before):
-        if image is not None:
-            image[window] &= ~edges
-    depths = points[:, 2].copy()
-    if len(inside) < len(points):
-        pixels, depths, still = pixels[inside], depths[inside], None if still is None else still[inside]
-    return BodyView(grown, pixels, depths, still, before)
+    return points, valid
 
 
-def _behind_edges(nearest: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
-    """(H, W): True in a line on the far side of the edges between surfaces.
-
-    Args:
-        nearest: (H, W) depths [m], infinite where nothing was measured; between the others the nearest one counts.
-    """
-    if not nearest.size:
-        return np.zeros(nearest.shape, dtype=np.bool_)
-    unknown = np.isinf(nearest)
-    _, labels = cv2.distanceTransformWithLabels(
-        unknown.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    # Known pixels are numbered row by row, from 1.
-    z = np.concatenate([np.zeros(1, np.float32), nearest[~unknown]]).take(np.asarray(labels, dtype=np.int32))
-    return np.asarray(z > cv2.erode(z, _AROUND) + _EDGE_M)
-
-
-def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high: FloatArray) -> tuple[slice, slice]:
-    """Rows and columns of a depth image that can show the box between two corners (3,); all where the lens distorts."""
-    corners = in_sensor(world_from_depth, np.where(_CORNERS, high, low))
-    if camera.distorted or (corners[:, 2] < 0.05).any():
-        return slice(0, camera.height), slice(0, camera.width)
-    columns, rows = camera.project(corners).T.tolist()
-    spans = [
-        slice(min(max(math.floor(min(span)), 0), size), min(max(math.ceil(max(span)) + 1, 0), size))
-        for span, size in ((rows, camera.height), (columns, camera.width))
-    ]
-    return spans[0], spans[1]
-
-
-def _beyond(
-    depth_camera: Camera,
-    world_from_depth: FloatArray,
-    color_camera: Camera,
-    world_from_color: FloatArray,
-    places: FloatArray,
-) -> npt.NDArray[np.bool_]:
-    """(H, W) of the colour image: True where the depth camera does not look, at the distance of the body."""
-    z = max(median(in_sensor(world_from_depth, places)[:, 2].tolist()), 0.1)
-    right, bottom = depth_camera.width - 1, depth_camera.height - 1
-    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]]
-    corners = np.ones((4, 3))
-    corners[:, :2] = rays
-    corners = (z * corners) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
-    outline = color_camera.project(in_sensor(world_from_color, corners))
-    # The corners are the centres of the outermost pixels.
-    middle = outline.mean(axis=0)
-    outline = middle + (outline - middle) * (1.0 + 4.0 / min(depth_camera.width, depth_camera.height))
-    away = np.ones((color_camera.height, color_camera.width), dtype=np.uint8)
-    if np.isfinite(outline).all():
-        cv2.fillConvexPoly(away, outline.round().clip(-9999, 9999).astype(np.int32), 0)
-    return away.view(np.bool_)
+def metres(depth: DepthImage) -> FloatArray:
+    """Depths (height, width) [m], NaN where nothing returned."""
+    z = depth.image.astype(np.float64) * depth.metres_per_unit
+    return np.asarray(np.where(z > 0.0, z, np.nan))

@@ -48,7 +48,7 @@ class LimbMotion:
         """Whether there is anything to do for points seen `elapsed` seconds before the frame."""
         return self._before is not None and abs(elapsed) >= _SAME_S
 
-    def carried(
+    def motion_compensated(
         self, points: FloatArray, elapsed: float, distances: Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
     ) -> FloatArray:
         """Places (N, 3) [m] at the frame's time of points (N, 3) in the world, seen `elapsed` seconds before it.

@@ -7,9 +7,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
-from voodoo.poses import rigid
+from voodoo.model.camera import Camera
+from voodoo.model.transforms import rigid
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 

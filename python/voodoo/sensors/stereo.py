@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.camera import Camera
 from voodoo.errors import MeasurementError
-from voodoo.poses import rigid
+from voodoo.model.camera import Camera
+from voodoo.model.transforms import rigid
 from voodoo.sensors.model import RangeNoise, stereo_noise
 from voodoo.sensors.pixels import FloatArray
 

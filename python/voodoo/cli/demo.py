@@ -1,0 +1,44 @@
+"""`voodoo demo`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from voodoo.cli.common import INTERRUPTED, clear_errors, states
+
+
+def demo_command(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for result and pictures.")] = Path("voodoo-demo"),
+) -> None:
+    """Run the main job on the bundled recording, a person who bends, scoops and reaches up.
+
+    Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the recording's exact truth.
+    """
+    import numpy as np
+
+    from voodoo.cli.running import opened, run
+    from voodoo.evaluation.evaluate import compare
+    from voodoo.pipeline.start import start_tracker
+    from voodoo.recordings.sample import sample_path
+    from voodoo.visualization.image_writer import save_picture
+    from voodoo.visualization.sheet import contact_sheet
+
+    with clear_errors():
+        source = opened(sample_path(), None, None)
+        tracker = start_tracker(source)
+        out.mkdir(parents=True, exist_ok=True)
+        result, seconds, sheet, interrupted = run(source, tracker, out / "overlay.mp4", sheet=6)
+        if interrupted:
+            raise typer.Exit(INTERRUPTED)
+        result.save(out / "pose.csv")
+        save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
+        errors = compare(source, result)
+        typer.echo(f"{source.name}: {len(result)} frames, {states(result)}")
+        typer.echo(
+            f"time of a frame   {1e3 * np.mean(seconds):.2f} ms (mean), {1e3 * np.median(seconds):.2f} ms (median)"
+        )
+        typer.echo(f"mean joint error  {100 * np.nanmean(errors):.1f} cm against exact truth, twelve joints")
+        typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")

@@ -1,0 +1,121 @@
+"""What commands that track do: open a recording, run over it, draw. Imported when a command runs, not for its help."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from voodoo.cli.common import progressing
+from voodoo.config import Config
+from voodoo.errors import VoodooError
+from voodoo.export.track import Track
+from voodoo.pipeline.run import track
+from voodoo.recordings.loaders import open_recording
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.tracker import Tracker
+from voodoo.visualization.image_writer import PictureWriter
+from voodoo.visualization.ink import Picture
+from voodoo.visualization.overlay import Overlay
+from voodoo.visualization.rerun_viewer import Viewer
+
+
+class Run(NamedTuple):
+    """What a run over a recording leaves: the result, the time of every frame [s], the pictures that were asked for, and
+    whether Ctrl-C ended it before the recording did."""
+
+    track: Track
+    seconds: list[float]
+    pictures: list[Picture]
+    interrupted: bool
+
+
+def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
+    """The recording, in the root frame that was asked for."""
+    if frame is not None:
+        options["root_frame"] = frame
+    return open_recording(path, loader=loader, **options)
+
+
+def kinds_of(words: str | None) -> tuple[str, ...]:
+    """The kinds of inputs in "depth,scan"; all of them for None.
+
+    Raises:
+        VoodooError: an unknown kind.
+    """
+    chosen = (
+        FrontEndSettings() if words is None else FrontEndSettings(use=tuple(word.strip() for word in words.split(",")))
+    )
+    return chosen.use
+
+
+def depth_filter_of(words: str | None) -> DepthFilter | None:
+    """The filter of "NEAR,FAR" in metres; none for None.
+
+    Raises:
+        VoodooError: not two numbers, or limits that leave nothing.
+    """
+    if words is None:
+        return None
+    try:
+        nearest, farthest = (float(word) for word in words.split(","))
+    except ValueError:
+        raise VoodooError(f"depth-range: expected NEAR,FAR in metres, found {words!r}") from None
+    return DepthFilter(nearest=nearest, farthest=farthest)
+
+
+def config_of(path: Path | None) -> Config:
+    """The configuration of a file; the defaults for None."""
+    return Config() if path is None else Config.load(path)
+
+
+def run(
+    source: Recording,
+    tracker: Tracker,
+    overlay: Path | None,
+    *,
+    sheet: int = 0,
+    settings: FrontEndSettings | None = None,
+    viewer: Viewer | None = None,
+) -> Run:
+    """Track and draw, with `sheet` pictures spread over the recording. Ctrl-C ends it with the frames up to there, if any."""
+    estimates, seconds, pictures, interrupted = [], [], [], False
+    chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
+    rate = source.info().rate_hz
+    drawing = Overlay(source)
+    writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
+    with writer or nullcontext():
+        try:
+            for step in progressing(track(source, tracker, settings=settings), source.name, len(source)):
+                estimates.append(step.estimate)
+                seconds.append(step.seconds)
+                if viewer is not None:
+                    viewer.log(
+                        step.estimate,
+                        tracker.body,
+                        recorded=step.recorded,
+                        front_end=step.front_end,
+                        seconds=step.seconds,
+                    )
+                if writer is not None or step.index in chosen:
+                    picture = drawing.draw(
+                        step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end
+                    )
+                    if writer is not None:
+                        writer.write(picture)
+                    if step.index in chosen:
+                        pictures.append(picture)
+        except KeyboardInterrupt:
+            if not estimates:
+                raise
+            interrupted = True
+    return Run(Track.of(estimates, body=tracker.body), seconds, pictures, interrupted)
+
+
+def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:
+    """The viewer that was asked for, opened before the work so that a missing Rerun is told at once."""
+    return Viewer(save=save, name=name) if view or save is not None else nullcontext()

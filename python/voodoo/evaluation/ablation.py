@@ -1,0 +1,150 @@
+"""What each switch of the configuration buys: the same evaluation once for every single change of it."""
+
+from __future__ import annotations
+
+import csv
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from voodoo.config import Config
+from voodoo.evaluation.evaluate import evaluate_all
+from voodoo.evaluation.summary import Summary, summarize
+from voodoo.evaluation.score import Score
+from voodoo.names import INPUTS, HumanModel
+
+UNCHANGED = "as configured"
+# Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty weighs nothing.
+_OFF = (("slide", 0.0), ("prediction", 0.0), ("motion_scale", 100.0), ("calm", 0.0))
+_MEASURES = (
+    ("error_m", "error", 100.0, "cm", 2),
+    ("within_10cm", "within 10 cm", 100.0, "%", 1),
+    ("depth_within_5cm", "depth within 5 cm", 100.0, "%", 1),
+    ("silhouette_iou", "IoU", 1.0, "", 3),
+    ("jitter_m", "second difference", 1000.0, "mm", 1),
+    ("step_s", "time of a frame", 1000.0, "ms", 2),
+)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One configuration of an ablation.
+
+    Args:
+        name: "as configured", or the one change, e.g. "outline = false".
+        config: all of it.
+    """
+
+    name: str
+    config: Config
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """What one configuration reached.
+
+    Args:
+        name: of the variant.
+        scores: one a recording, in the order of the paths.
+    """
+
+    name: str
+    scores: tuple[Score, ...]
+
+    @property
+    def failures(self) -> tuple[Score, ...]:
+        """Those recordings that were not tracked to their end."""
+        return tuple(score for score in self.scores if score.failure)
+
+
+def variants(base: Config) -> list[Variant]:
+    """`base` itself, then every change of one entry: each switch turned over, each other solver, and each
+    influence of a certain strength at none."""
+    values = base.values()
+    changes: list[tuple[str, bool | str | float]] = [
+        (key, not value) for key, value in values.items() if isinstance(value, bool)
+    ]
+    changes += [("solver", word) for word in Config.words("solver") if word != values["solver"]]
+    changes += [(key, off) for key, off in _OFF if values[key] != off]
+    changed = [Variant(f"{key} = {_toml(value)}", Config(**{**values, key: value})) for key, value in changes]
+    return [Variant(UNCHANGED, base), *changed]
+
+
+def ablate(
+    paths: Sequence[Path],
+    *,
+    config: Config | None = None,
+    loader: str | None = None,
+    model: HumanModel = "full",
+    use: Sequence[str] = INPUTS,
+    jobs: int = 1,
+) -> Iterator[Ablation]:
+    """Evaluate `paths` with every variant of `config`, one after another; each is yielded when it is done.
+
+    A recording that fails is one of the ablation's `failures`; the rest goes on.
+    """
+    with tempfile.TemporaryDirectory(prefix="voodoo-ablate-") as folder:
+        for index, variant in enumerate(variants(Config() if config is None else config)):
+            # The worker processes read their configuration from a file.
+            file = Path(folder) / f"{index}.toml"
+            file.write_text(variant.config.to_toml(), encoding="utf-8")
+            done = evaluate_all(paths, config_file=file, loader=loader, model=model, use=use, jobs=jobs)
+            yield Ablation(variant.name, tuple(score for _, score, _ in sorted(done, key=lambda item: item[0])))
+
+
+def table(ablations: Sequence[Ablation]) -> str:
+    """A row for every configuration, as Markdown; in parentheses the difference of the error to the first row."""
+    text: list[str] = []
+    for kind, rows in _by_kind(ablations).items():
+        text += [f"## Against {kind}: {rows[0][1].sequences} sequences\n"]
+        text += ["| configuration | class average | " + " | ".join(words for _, words, *_ in _MEASURES) + " | failed |"]
+        text += ["|---|" + "---|" * (len(_MEASURES) + 2)]
+        start = rows[0][1].means["error_m"]
+        for ablation, summary in rows:
+            cells = [_number(summary.class_average, 1.0, "", 2)]
+            cells += [_number(summary.means[key], *form) for key, _, *form in _MEASURES]  # type: ignore[arg-type]
+            if ablation.name != UNCHANGED and math.isfinite(summary.means["error_m"] - start):
+                cells[1] += f" ({100.0 * (summary.means['error_m'] - start):+.2f})"
+            text.append("| " + " | ".join([ablation.name, *cells, str(len(ablation.failures))]) + " |")
+        text.append("")
+    return "\n".join(text)
+
+
+def write_tables(folder: Path, ablations: Sequence[Ablation]) -> list[Path]:
+    """Write ablation.md and ablation.csv (a row for every configuration and recording); returns both.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    text, rows = folder / "ablation.md", folder / "ablation.csv"
+    text.write_text(table(ablations), encoding="utf-8")
+    with rows.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["configuration", "recording", "failure", "tracking_class", *(key for key, *_ in _MEASURES)])
+        for ablation in ablations:
+            for score in ablation.scores:
+                values = [getattr(score, key) for key, *_ in _MEASURES]
+                cells = [f"{value:.6f}" if math.isfinite(value) else "" for value in values]
+                class_ = "" if score.tracking_class is None else score.tracking_class
+                writer.writerow([ablation.name, score.name, score.failure, class_, *cells])
+    return [text, rows]
+
+
+def _by_kind(ablations: Sequence[Ablation]) -> dict[str, list[tuple[Ablation, Summary]]]:
+    """Rows of one kind of reference; recordings of different kinds are not averaged."""
+    kinds: dict[str, list[tuple[Ablation, Summary]]] = {}
+    for ablation in ablations:
+        for summary in summarize(ablation.scores):
+            kinds.setdefault(summary.kind, []).append((ablation, summary))
+    return kinds
+
+
+def _number(value: float, factor: float, unit: str, digits: int) -> str:
+    return f"{factor * value:.{digits}f} {unit}".strip() if math.isfinite(value) else "-"
+
+
+def _toml(value: float | bool | str) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value).lower()

@@ -1,0 +1,143 @@
+"""What the depth says about a pose: distances of the person's points to the model, and overlap of the outlines.
+
+Which depth pixels belong to the person is decided without the tracker wherever that is possible, so that a lost track
+cannot choose its own witnesses:
+
+* "segmented": the recording has the person cut out (UTD-MHAD): every pixel with depth (chair and floor band included).
+* "truth": exact joint positions are known: pixels within the capsules of CAPSULES around them.
+* "model": neither: pixels within 10 cm of the box around the model (K06 IV-B 1). Such numbers flatter a lost track.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate
+from voodoo.evaluation.metrics import mean_or_nan, share_within
+from voodoo.measurements import DepthImage, PointCloud, RecordedFrame
+from voodoo.model.body import Body
+from voodoo.model.projection import CameraView, limb_rings, silhouette, transform
+from voodoo.sensors.depth import depth_points
+from voodoo.tracker import Tracker
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+Selection: TypeAlias = Literal["segmented", "truth", "model"]
+
+CAPSULES: tuple[tuple[str, str, float], ...] = (
+    ("humanoid_root", "vc7", 0.20),
+    ("l_hip", "r_hip", 0.19),
+    ("l_shoulder", "r_shoulder", 0.15),
+    ("vc7", "skull_tip", 0.15),
+    *(
+        (f"{side}_{start}", f"{side}_{end}", radius)
+        for side in ("l", "r")
+        for start, end, radius in (
+            ("shoulder", "elbow", 0.11),
+            ("elbow", "wrist", 0.09),
+            ("wrist", "hand", 0.11),
+            ("hip", "knee", 0.16),
+            ("knee", "ankle", 0.11),
+        )
+    ),
+)
+"""Segments between true joints and the radius [m] within which depth is the person's. Wide enough for a heavy person in
+clothes, narrow enough that at the ankles (8 cm above the floor) only a few square decimetres of floor are taken."""
+
+_BOX_MARGIN_M = 0.1
+WITHIN_M = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class FrameWitness:
+    """One frame: unsigned distances (N,) [m] of the person's points to the model, which of them (N,) lie within CAPSULES
+    about known joints (chair and floor mostly do not), and the silhouettes' overlap (NaN without a depth image or without a
+    person in it)."""
+
+    distances: FloatArray
+    about_joints: BoolArray
+    iou: float
+
+    @property
+    def within(self) -> float:
+        """Share of the points within 5 cm of the model."""
+        return share_within(self.distances, WITHIN_M)
+
+
+def witness(
+    recorded: RecordedFrame,
+    tracker: Tracker,
+    estimate: Estimate,
+    truth: Mapping[str, FloatArray],
+    selection: Selection,
+) -> FrameWitness:
+    """Compare depth images and clouds of a frame with the model as it stands now.
+
+    Args:
+        recorded: the frame just tracked.
+        tracker: gives the distance to its current model.
+        estimate: of this frame.
+        truth: true joint positions [m] in the root frame, or those of a reference; only "truth" selects by them.
+        selection: see the module.
+    """
+    distances, about, overlaps = [np.empty(0)], [np.empty(0, dtype=bool)], [np.empty(0)]
+    for item in recorded.measurements:
+        if isinstance(item, DepthImage):
+            points, valid = depth_points(item)
+        elif isinstance(item, PointCloud):
+            points = transform(item.root_from_sensor, item.points)
+            valid = np.ones(len(points), dtype=bool)
+        else:
+            continue
+        person = np.zeros(len(points), dtype=bool)
+        person[valid] = _select(points[valid], tracker.body, estimate, truth, selection)
+        if person.any():
+            distances.append(np.abs(tracker.distance(points[person])).astype(np.float64))
+            about.append(near_joints(points[person], truth))
+        if isinstance(item, DepthImage):
+            overlaps.append(np.array([_overlap(item, person, tracker.body, estimate)]))
+    return FrameWitness(np.concatenate(distances), np.concatenate(about), mean_or_nan(np.concatenate(overlaps)))
+
+
+def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArray:
+    """Which points (N, 3) lie within a capsule of CAPSULES; segments without both joints are left out."""
+    near = np.zeros(len(points), dtype=bool)
+    for start, end, radius in CAPSULES:
+        if start in joints and end in joints and np.isfinite([joints[start], joints[end]]).all():
+            a, axis = joints[start], joints[end] - joints[start]
+            t = np.clip((points - a) @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
+            near |= np.linalg.norm(points - a - t[:, None] * axis, axis=1) <= radius
+    return near
+
+
+def _select(
+    points: FloatArray,
+    body: Body,
+    estimate: Estimate,
+    truth: Mapping[str, FloatArray],
+    selection: Selection,
+) -> BoolArray:
+    if selection == "segmented":
+        return np.ones(len(points), dtype=bool)
+    if selection == "truth":
+        return near_joints(points, truth)
+    rings = [transform(estimate.world_from_limb[limb.name], limb_rings(limb.shape)) for limb in body.limbs]
+    corners = np.concatenate(rings).reshape(-1, 3)
+    low, high = corners.min(axis=0) - _BOX_MARGIN_M, corners.max(axis=0) + _BOX_MARGIN_M
+    return np.asarray(((points >= low) & (points <= high)).all(axis=1))
+
+
+def _overlap(depth: DepthImage, person: BoolArray, body: Body, estimate: Estimate) -> float:
+    """Intersection over union of the model's outline and the person's pixels; NaN when no pixel is the person's."""
+    if not person.any():
+        return float("nan")
+    height, width = depth.image.shape
+    view = CameraView(depth.camera, depth.root_from_sensor)
+    model = silhouette(body, estimate, view, width=width, height=height)
+    seen = person.reshape(height, width)
+    return float((model & seen).sum() / (model | seen).sum())

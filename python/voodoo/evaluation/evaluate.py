@@ -1,0 +1,245 @@
+"""Measuring the tracker on recordings with truth or a reference skeleton, one recording a process."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate
+from voodoo.config import Config
+from voodoo.errors import RecordingError, VoodooError
+from voodoo.evaluation import metrics
+from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
+from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
+from voodoo.export.track import Track
+from voodoo.names import INPUTS, HumanModel
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_tracker
+from voodoo.recordings.loaders import open_recording
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.settings import FrontEndSettings
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+_CARRIER = {
+    f"{side}_{joint}": f"{side}_{limb}"
+    for side in ("l", "r")
+    for joint, limb in (("elbow", "upperarm"), ("wrist", "forearm"), ("knee", "thigh"), ("ankle", "calf"))
+}
+"""The limb that ends at a joint."""
+
+_SEGMENTED_LOADERS = ("utd-mhad",)
+
+
+def evaluate(
+    path: Path,
+    *,
+    config: Config | None = None,
+    loader: str | None = None,
+    model: HumanModel = "full",
+    use: Sequence[str] = INPUTS,
+) -> tuple[Score, FrameTable]:
+    """Track a recording from its own start and measure the result; `use` says from which of its inputs, see INPUTS.
+
+    Raises:
+        VoodooError: it cannot be read, has no start, or a frame was refused.
+    """
+    recording = open_recording(path, loader=loader)
+    tracker = start_tracker(recording, config=config, model=model)
+    selection = select_by(recording)
+    steps = []
+    for frame in track(recording, tracker, settings=FrontEndSettings.of(recording, use=use)):
+        estimate = frame.estimate
+        truth = _truth_at(recording, estimate.stamp)
+        joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
+        seen = witness(frame.recorded, tracker, estimate, truth, selection)
+        measured = called_measured(estimate)
+        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, joints, measured, seen))
+    if not steps:
+        raise RecordingError(f"{path}: expected at least one frame, found none")
+    return _score(recording, path, selection, steps)
+
+
+def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
+    """Errors (F, 12) [m] of metrics.JOINTS against the recording's reference, at lag 0 or at the best one; NaN where it is
+    missing."""
+    column = {name: index for index, name in enumerate(result.joint_names)}
+    positions = np.full((len(result), len(metrics.JOINTS), 3), np.nan)
+    for index, name in enumerate(metrics.JOINTS):
+        if name in column:
+            positions[:, index] = result.joints[:, column[name]]
+    reference = _reference_positions(recording, result.stamps)
+    lag = metrics.best_lag(positions, reference) if at_best_lag else 0
+    return metrics.joint_errors(positions, reference, lag=lag)
+
+
+def called_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
+    """Of which of metrics.JOINTS (12,) the limb that ends there is called measured; joints of the trunk end none."""
+    return np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
+
+
+def limb_ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
+    """Which of the joints (F, 12) are ends of limbs, and farther than LIMIT_EXACT_M from the truth or nearer."""
+    ends = np.array([name in _CARRIER for name in metrics.JOINTS])
+    return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
+
+
+def select_by(recording: Recording) -> Selection:
+    """How the person's points are told from the background in this recording, see witness."""
+    if recording.info().loader in _SEGMENTED_LOADERS:
+        return "segmented"
+    return "truth" if recording.reference is not None and recording.reference.exact else "model"
+
+
+def evaluate_all(
+    paths: Sequence[Path],
+    *,
+    config_file: Path | None = None,
+    loader: str | None = None,
+    model: HumanModel = "full",
+    use: Sequence[str] = INPUTS,
+    jobs: int = 1,
+) -> Iterator[tuple[int, Score, FrameTable | None]]:
+    """Evaluate recordings in parallel processes; (index in `paths`, score, frames) as each is done, in any order.
+
+    A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
+    """
+    tasks = [
+        (str(path), None if config_file is None else str(config_file), loader, model, tuple(use)) for path in paths
+    ]
+    if jobs == 1 or len(tasks) == 1:
+        for index, task in enumerate(tasks):
+            yield index, *_task(*task)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_one_thread) as pool:
+        futures = {pool.submit(_task, *task): index for index, task in enumerate(tasks)}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], *future.result()
+        except BrokenProcessPool as error:
+            raise VoodooError(f"evaluation: a worker process died ({error}); try fewer --jobs") from error
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _one_thread() -> None:
+    """In a worker: the processes are the parallelism."""
+    os.environ["RAYON_NUM_THREADS"] = "1"
+    cv2.setNumThreads(1)
+
+
+def _task(
+    path: str, config_file: str | None, loader: str | None, model: HumanModel, use: Sequence[str]
+) -> tuple[Score, FrameTable | None]:
+    try:
+        config = None if config_file is None else Config.load(config_file)
+        return evaluate(Path(path), config=config, loader=loader, model=model, use=use)
+    except (VoodooError, OSError) as error:
+        return Score(Path(path).name, Path(path), failure=str(error)), None
+
+
+def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
+    """Reference positions at a stamp by linear interpolation; NaN outside of the reference."""
+    reference = recording.reference
+    if reference is None or not reference.stamps[0] - 0.1 <= stamp <= reference.stamps[-1] + 0.1:
+        return {}
+    after = int(np.clip(np.searchsorted(reference.stamps, stamp), 1, max(len(reference.stamps) - 1, 1)))
+    if after >= len(reference.stamps):
+        return dict(zip(reference.names, reference.positions[0], strict=True))
+    span = reference.stamps[after] - reference.stamps[after - 1]
+    t = float(np.clip((stamp - reference.stamps[after - 1]) / span, 0.0, 1.0))
+    positions = (1.0 - t) * reference.positions[after - 1] + t * reference.positions[after]
+    return dict(zip(reference.names, positions, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """What is kept of a frame; the images of a whole recording would fill the memory."""
+
+    stamp: float
+    status: str
+    seconds: float
+    joints: FloatArray
+    measured: npt.NDArray[np.bool_]
+    witness: FrameWitness
+
+
+def _score(recording: Recording, path: Path, selection: Selection, steps: Sequence[_Step]) -> tuple[Score, FrameTable]:
+    stamps = np.array([step.stamp for step in steps])
+    status = tuple(step.status for step in steps)
+    seconds = np.array([step.seconds for step in steps])
+    positions = np.array([step.joints for step in steps])
+    overlaps = np.array([step.witness.iou for step in steps])
+    reference = _reference_positions(recording, stamps)
+    lag = metrics.best_lag(positions, reference)
+    exact = None if recording.reference is None else recording.reference.exact
+    errors0 = metrics.joint_errors(positions, reference)
+    errors_best = metrics.joint_errors(positions, reference, lag=lag)
+    errors = errors_best if exact is False else errors0
+    limit = LIMIT_EXACT_M if exact else LIMIT_REFERENCE_M
+    class_, lost = metrics.tracking_class(errors, stamps, limit=limit)
+    still = metrics.standing_still(reference, stamps)
+    distances = np.concatenate([step.witness.distances for step in steps])
+    about_joints = np.concatenate([step.witness.about_joints for step in steps])
+    measured = np.array([step.measured for step in steps])
+    far, near = (limb_ends(errors, far=which) for which in (True, False))
+    score = Score(
+        name=recording.name,
+        path=path,
+        frames=len(steps),
+        exact=exact,
+        error_m=metrics.mean_or_nan(errors),
+        error_lag0_m=metrics.mean_or_nan(errors0),
+        error_best_lag_m=metrics.mean_or_nan(errors_best),
+        best_lag=None if class_ is None else lag,
+        within_5cm=metrics.share_within(errors, 0.05),
+        within_10cm=metrics.share_within(errors, 0.10),
+        joint_error_m={name: metrics.mean_or_nan(errors[:, index]) for index, name in enumerate(metrics.JOINTS)},
+        tracking_class=class_,
+        lost_joints=tuple(name for index, name in enumerate(metrics.JOINTS) if lost[:, index].any()),
+        selection=selection if distances.size else None,
+        depth_within_5cm=metrics.share_within(distances, 0.05),
+        depth_median_m=float(np.median(distances)) if distances.size else np.nan,
+        depth_p95_m=float(np.percentile(distances, 95.0)) if distances.size else np.nan,
+        person_within_5cm=metrics.share_within(distances[about_joints], 0.05),
+        silhouette_iou=metrics.mean_or_nan(overlaps),
+        jitter_m=metrics.jitter(positions),
+        reference_jitter_m=metrics.jitter(reference),
+        standing_jitter_m=metrics.standing_jitter(positions, still, lag=lag if exact is False else 0),
+        reference_standing_jitter_m=metrics.standing_jitter(reference, still),
+        degraded_share=float(np.mean([word == "degraded" for word in status])),
+        lost_share=float(np.mean([word == "lost" for word in status])),
+        lost_recall=metrics.mean_or_nan((~measured[far]).astype(np.float64)),
+        false_alarm_rate=metrics.mean_or_nan((~measured[near]).astype(np.float64)),
+        far_ends=int(far.sum()),
+        near_ends=int(near.sum()),
+        step_s=float(seconds.mean()),
+    )
+    within = np.array([step.witness.within for step in steps])
+    return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
+
+
+def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
+    """Reference of the twelve joints at the stamps, (F, 12, 3); NaN where there is none."""
+    reference = recording.reference
+    if reference is None:
+        return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
+    column = {name: index for index, name in enumerate(reference.names)}
+    table = np.full((len(reference.stamps), len(metrics.JOINTS), 3), np.nan)
+    for index, name in enumerate(metrics.JOINTS):
+        if name in column:
+            table[:, index] = reference.positions[:, column[name]]
+    period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / 30.0
+    return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)

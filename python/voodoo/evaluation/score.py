@@ -1,0 +1,100 @@
+"""What is measured of a tracked recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.evaluation.depth_agreement import Selection
+from voodoo.evaluation.metrics import FloatArray
+
+LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
+"""How far a joint may be from exact truth, and from another tracker's skeleton, before it counts as lost [m]."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """How one recording was tracked; metres, seconds and shares in [0, 1], NaN where it cannot be known.
+
+    Args:
+        name: of the recording.
+        path: of the recording.
+        failure: why it could not be tracked to its end; "" when it was. Then all numbers are NaN.
+        frames: how many were tracked.
+        exact: compared with exact truth (else with another tracker's skeleton), None without any reference.
+        error_m: mean error of the twelve joints: at lag 0 against exact truth, at the best lag against a reference.
+        error_lag0_m, error_best_lag_m: both.
+        best_lag: constant lag [frames] with the least error; positive: the estimate is late.
+        within_5cm, within_10cm: share of joint errors, at the same lag as `error_m`.
+        joint_error_m: mean error of each of the twelve joints, at the same lag.
+        tracking_class: 2, 1 or 0 as in K06 Table I, see metrics.tracking_class, at the same lag.
+        lost_joints: the joints that were ever lost.
+        selection: how the person's depth points were found, see witness.
+        depth_within_5cm, depth_median_m, depth_p95_m: of their distances to the model.
+        person_within_5cm: share within 5 cm of the points about the joints of truth or reference, see FrameWitness.
+        silhouette_iou: mean over the frames.
+        jitter_m, reference_jitter_m: mean norm of the second difference of the twelve joints, over all frames.
+        standing_jitter_m, reference_standing_jitter_m: the same over the joints and frames in which the reference stands
+            still, see metrics.standing_still.
+        degraded_share, lost_share: frames in which the tracker itself said so.
+        lost_recall, false_alarm_rate: of the elbows, wrists, knees and ankles farther than 10 cm from the truth the share whose
+            limb was not called measured; and of the nearer ones.
+        far_ends, near_ends: how many such joints there were, over all frames.
+        step_s: mean time of a frame from measurements to estimate.
+    """
+
+    name: str
+    path: Path
+    failure: str = ""
+    frames: int = 0
+    exact: bool | None = None
+    error_m: float = np.nan
+    error_lag0_m: float = np.nan
+    error_best_lag_m: float = np.nan
+    best_lag: int | None = None
+    within_5cm: float = np.nan
+    within_10cm: float = np.nan
+    joint_error_m: dict[str, float] = field(default_factory=dict)
+    tracking_class: int | None = None
+    lost_joints: tuple[str, ...] = ()
+    selection: Selection | None = None
+    depth_within_5cm: float = np.nan
+    depth_median_m: float = np.nan
+    depth_p95_m: float = np.nan
+    person_within_5cm: float = np.nan
+    silhouette_iou: float = np.nan
+    jitter_m: float = np.nan
+    reference_jitter_m: float = np.nan
+    standing_jitter_m: float = np.nan
+    reference_standing_jitter_m: float = np.nan
+    degraded_share: float = np.nan
+    lost_share: float = np.nan
+    lost_recall: float = np.nan
+    false_alarm_rate: float = np.nan
+    far_ends: int = 0
+    near_ends: int = 0
+    step_s: float = np.nan
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameTable:
+    """The same, frame by frame.
+
+    Args:
+        stamps: (F,) [s].
+        status: F words of the tracker.
+        errors: (F, 12) of metrics.JOINTS [m] at the lag of the score.
+        lost: (F, 12).
+        depth_within_5cm, silhouette_iou, step_s: (F,).
+    """
+
+    stamps: FloatArray
+    status: tuple[str, ...]
+    errors: FloatArray
+    lost: npt.NDArray[np.bool_]
+    depth_within_5cm: FloatArray
+    silhouette_iou: FloatArray
+    step_s: FloatArray

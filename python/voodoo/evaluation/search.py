@@ -1,0 +1,56 @@
+"""Finding recordings to evaluate."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from voodoo.errors import RecordingError, VoodooError
+from voodoo.recordings.loaders import guess_loader
+
+_RECORDING_SUFFIXES = (".bag", ".mcap", ".db3", ".zip")
+
+
+def find_recordings(paths: Sequence[Path], *, only: Sequence[str] = ()) -> list[Path]:
+    """Recordings at `paths`, in that order; folders that are none are searched, their content in natural order.
+
+    Args:
+        paths: recordings, or folders that hold some, e.g. that of UTD-MHAD or of the rendered recordings.
+        only: patterns like "a0?_s1_*" or "*_cmu"; a recording is kept when its file or folder name fits one.
+
+    Raises:
+        RecordingError: nothing there, or nothing left.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if not path.exists():
+            raise RecordingError(f"{path}: expected a recording or a folder of recordings, found nothing there")
+        inside = [path] if _is_recording(path) else list(_search(path))
+        if not inside:
+            raise RecordingError(f"{path}: expected a recording or a folder of recordings, found none in it")
+        found += inside
+    kept = [path for path in found if not only or any(fnmatch.fnmatch(path.name, pattern) for pattern in only)]
+    if not kept:
+        raise RecordingError(f"expected recordings that fit {' or '.join(only)}, found none among {len(found)}")
+    return list(dict.fromkeys(kept))
+
+
+def _search(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        for path in sorted(folder.iterdir(), key=lambda path: _natural(path.name)):
+            if path.is_dir() or path.name.endswith("_depth.mat") or path.suffix in _RECORDING_SUFFIXES:
+                yield from [path] if _is_recording(path) else _search(path)
+
+
+def _is_recording(path: Path) -> bool:
+    try:
+        guess_loader(path)
+    except VoodooError:
+        return False
+    return True
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]

@@ -1,0 +1,94 @@
+"""Means over sequences of one kind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from voodoo.evaluation import metrics
+from voodoo.evaluation.score import Score
+
+CLASSES = (0, 1, 2)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Means over sequences of one kind, every sequence counting the same; metres and shares, NaN where unknown.
+
+    Args:
+        kind: "exact truth", "reference skeleton" or "no reference".
+        sequences: how many were tracked to their end.
+        failures: how many were not.
+        classes: how many in class 0, 1 and 2 of K06 Table I.
+        lags: (lag [frames], sequences) for each best lag that occurs.
+        means: by the name of the Score field; with "_together" behind it, over the limbs of all sequences.
+    """
+
+    kind: str
+    sequences: int
+    failures: int
+    classes: tuple[int, int, int]
+    lags: tuple[tuple[int, int], ...]
+    means: dict[str, float]
+
+    @property
+    def class_average(self) -> float:
+        """Mean class; NaN when no sequence has one."""
+        count = sum(self.classes)
+        return (
+            sum(value * number for value, number in zip(CLASSES, self.classes, strict=True)) / count
+            if count
+            else math.nan
+        )
+
+
+MEANS = (
+    "error_m", "error_lag0_m", "error_best_lag_m", "within_5cm", "within_10cm", "depth_within_5cm", "depth_median_m",
+    "depth_p95_m", "person_within_5cm", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
+    "reference_standing_jitter_m", "degraded_share", "lost_share", "lost_recall", "false_alarm_rate", "step_s",
+)  # fmt: skip
+
+
+TOGETHER = {"lost_recall": "far_ends", "false_alarm_rate": "near_ends"}
+"""Shares that are also taken of all sequences together, because some have few such limbs, and what they are shares of."""
+
+
+SUMMARY = (*MEANS, *(f"{name}_together" for name in TOGETHER))
+
+
+def summarize(scores: Sequence[Score]) -> list[Summary]:
+    """One summary for each kind of comparison that occurs; failures are counted with the kind "no reference" unless
+    something was known about them."""
+    kinds = {True: "exact truth", False: "reference skeleton", None: "no reference"}
+    summaries = []
+    for exact, kind in kinds.items():
+        group = [score for score in scores if score.exact is exact]
+        done = [score for score in group if not score.failure]
+        if group:
+            lags = [score.best_lag for score in done if score.best_lag is not None]
+            counts = [sum(score.tracking_class == value for score in done) for value in CLASSES]
+            means = {
+                name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in MEANS
+            }
+            means |= {f"{name}_together": _together(done, name, count) for name, count in TOGETHER.items()}
+            summaries.append(
+                Summary(
+                    kind=kind if done else "not tracked",
+                    sequences=len(done),
+                    failures=len(group) - len(done),
+                    classes=(counts[0], counts[1], counts[2]),
+                    lags=tuple((lag, lags.count(lag)) for lag in sorted(set(lags))),
+                    means=means,
+                )
+            )
+    return summaries
+
+
+def _together(scores: Sequence[Score], name: str, count: str) -> float:
+    """Share over all sequences, each counted by how many there are of what it is a share of; NaN when there are none."""
+    counts = [(getattr(score, name), getattr(score, count)) for score in scores if getattr(score, count) > 0]
+    total = sum(number for _, number in counts)
+    return sum(share * number for share, number in counts) / total if total else math.nan

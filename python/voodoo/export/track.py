@@ -1,0 +1,241 @@
+"""The result of a whole recording, and its files: one row a frame in .csv, arrays in .npz."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate
+from voodoo.errors import VoodooError, reading
+from voodoo.ik.angles import angle_names as angle_names_of
+from voodoo.ik.angles import angles_of
+from voodoo.ik.chain import Chain
+from voodoo.model.body import Body
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+SUFFIXES = (".csv", ".npz")
+_ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Track:
+    """Estimates of F frames: J joints and sites, L limbs.
+
+    Args:
+        stamps: (F,) [s].
+        status: F of "tracking", "degraded" or "lost".
+        residual: (F,) root mean square distance of the measurements to the model [m]; NaN in a lost frame without
+            measurements (an empty cell in .csv).
+        joint_names: J names of joints and sites.
+        joints: (F, J, 3) [m] in the recording's root frame.
+        limb_names: L names; () when the track was read from a .csv, which has no limb poses.
+        world_from_limb: (F, L, 4, 4) poses of the limb frames in the root frame.
+        angle_names: A names of joint angles, see voodoo.ik.angles; () when none were asked for.
+        angles: (F, A) [rad].
+    """
+
+    stamps: FloatArray
+    status: tuple[str, ...]
+    residual: FloatArray
+    joint_names: tuple[str, ...]
+    joints: FloatArray
+    limb_names: tuple[str, ...]
+    world_from_limb: FloatArray
+    angle_names: tuple[str, ...] = ()
+    angles: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+
+    def __post_init__(self) -> None:
+        """Check that the arrays belong together and are finite: a pose is never NaN, only a lost frame's residual."""
+        frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
+        if not self.angle_names:
+            object.__setattr__(self, "angles", np.empty((frames, 0)))
+        if len(self.status) != frames:
+            raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
+        expected = {
+            "angles": (frames, len(self.angle_names)),
+            "stamps": (frames,),
+            "residual": (frames,),
+            "joints": (frames, joints, 3),
+            "world_from_limb": (frames, limbs, 4, 4),
+        }
+        for name, shape in expected.items():
+            array = getattr(self, name)
+            if array.shape != shape:
+                raise VoodooError(f"{name}: expected shape {shape}, found {array.shape}")
+            finite = np.isfinite(array)
+            if name == "residual":
+                # A lost frame may have had nothing to measure a residual from.
+                finite |= np.array([status == "lost" for status in self.status], dtype=bool)[:frames]
+            if not finite.all():
+                where = tuple(int(index) for index in np.argwhere(~finite)[0])
+                raise VoodooError(f"{name}: expected finite numbers, found {array[where]} in frame {where[0]}")
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.stamps)
+
+    def __repr__(self) -> str:
+        """One line with the counts."""
+        return f"Track({len(self)} frames, {len(self.joint_names)} joints and sites, {len(self.limb_names)} limbs)"
+
+    @classmethod
+    def of(cls, estimates: Sequence[Estimate], *, body: Body | None = None) -> Track:
+        """Collect estimates of one body; with the body also its joint angles.
+
+        Raises:
+            VoodooError: no estimate, one that is not finite, or one of another body.
+        """
+        if not estimates:
+            raise VoodooError("estimates: expected at least one frame, found none")
+        joint_names, limb_names = tuple(estimates[0].joints), tuple(estimates[0].world_from_limb)
+        for index, estimate in enumerate(estimates):
+            if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
+                raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
+        angle_names: tuple[str, ...] = ()
+        angles = np.empty((len(estimates), 0))
+        if body is not None:
+            chain = Chain(body)
+            angles = np.array([angles_of(chain, estimate) for estimate in estimates], dtype=np.float64)
+            angle_names = angle_names_of(body)
+        return cls(
+            angle_names=angle_names,
+            angles=angles,
+            stamps=np.array([estimate.stamp for estimate in estimates], dtype=np.float64),
+            status=tuple(str(estimate.status) for estimate in estimates),
+            residual=np.array([estimate.residual for estimate in estimates], dtype=np.float64),
+            joint_names=joint_names,
+            joints=np.array([list(estimate.joints.values()) for estimate in estimates], dtype=np.float64),
+            limb_names=limb_names,
+            world_from_limb=np.array(
+                [list(estimate.world_from_limb.values()) for estimate in estimates], dtype=np.float64
+            ),
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write .csv (positions to 1 um) or .npz (everything, exactly); the file appears only when it is complete.
+
+        Raises:
+            VoodooError: another suffix.
+            OSError: the file cannot be written.
+        """
+        path = Path(path)
+        check_suffix(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(f".{path.name}.part")
+        try:
+            if path.suffix == ".csv":
+                self._write_csv(part)
+            else:
+                self._write_npz(part)
+            os.replace(part, path)  # noqa: PTH105 - the replacement must be atomic
+        finally:
+            part.unlink(missing_ok=True)
+
+    def _write_csv(self, path: Path) -> None:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(_header(self.joint_names, self.angle_names))
+            for stamp, status, residual, joints, angles in zip(
+                self.stamps, self.status, self.residual, self.joints, self.angles, strict=True
+            ):
+                # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
+                row = [repr(float(stamp)), status, "" if np.isnan(residual) else f"{residual:.6f}"]
+                writer.writerow(row + [f"{value:.6f}" for value in (*joints.ravel(), *angles)])
+
+    def _write_npz(self, path: Path) -> None:
+        with path.open("wb") as file:
+            np.savez_compressed(
+                file,
+                stamps=self.stamps,
+                status=np.array(self.status, dtype=np.str_),
+                residual=self.residual,
+                joint_names=np.array(self.joint_names, dtype=np.str_),
+                joints=self.joints,
+                limb_names=np.array(self.limb_names, dtype=np.str_),
+                world_from_limb=self.world_from_limb,
+                angle_names=np.array(self.angle_names, dtype=np.str_),
+                angles=self.angles,
+            )
+
+    @classmethod
+    def load(cls, path: str | Path) -> Track:
+        """Read what save() wrote.
+
+        Raises:
+            VoodooError: another suffix, damage, or a file of another kind.
+        """
+        path = Path(path)
+        check_suffix(path)
+        with reading(path, "a result of voodoo track"):
+            try:
+                return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
+            except VoodooError as error:
+                raise VoodooError(f"{path}: {error}") from error
+
+    @classmethod
+    def _read_csv(cls, path: Path) -> Track:
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+        first = next((i for i, cell in enumerate(header) if cell.endswith("_rad")), len(header))
+        names = tuple(cell.removesuffix("_x") for cell in header[3:first:3])
+        angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:])
+        if header != _header(names, angle_names):
+            raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {header[:5]}")
+        for line, row in enumerate(rows, start=2):
+            if len(row) != len(header):
+                raise VoodooError(f"line {line}: expected {len(header)} cells, found {len(row)}")
+        joints = np.array([[float(cell) for cell in row[3:first]] for row in rows], dtype=np.float64)
+        angles = np.array([[float(cell) for cell in row[first:]] for row in rows], dtype=np.float64)
+        return cls(
+            angle_names=angle_names,
+            angles=angles.reshape(len(rows), len(angle_names)),
+            stamps=np.array([float(row[0]) for row in rows], dtype=np.float64),
+            status=tuple(row[1] for row in rows),
+            residual=np.array([float(row[2] or "nan") for row in rows], dtype=np.float64),
+            joint_names=names,
+            joints=joints.reshape(len(rows), len(names), 3),
+            limb_names=(),
+            world_from_limb=np.empty((len(rows), 0, 4, 4)),
+        )
+
+    @classmethod
+    def _read_npz(cls, path: Path) -> Track:
+        with np.load(path, allow_pickle=False) as content:
+            missing = [name for name in _ARRAYS if name not in content]
+            if missing:
+                raise VoodooError(f"expected the arrays {', '.join(_ARRAYS)}, found no {', '.join(missing)}")
+            return cls(
+                stamps=content["stamps"],
+                status=tuple(str(value) for value in content["status"]),
+                residual=content["residual"],
+                joint_names=tuple(str(value) for value in content["joint_names"]),
+                joints=content["joints"],
+                limb_names=tuple(str(value) for value in content["limb_names"]),
+                world_from_limb=content["world_from_limb"],
+                # Files of earlier versions have no angles.
+                angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
+                angles=content["angles"] if "angles" in content else np.empty((0, 0)),
+            )
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse result files that are neither .csv nor .npz.
+
+    Raises:
+        VoodooError: names both.
+    """
+    if path.suffix not in SUFFIXES:
+        raise VoodooError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}, found {path.suffix!r}")
+
+
+def _header(names: Sequence[str], angle_names: Sequence[str] = ()) -> list[str]:
+    places = [f"{name}_{axis}" for name in names for axis in "xyz"]
+    return ["stamp_s", "status", "residual_m", *places, *(f"{name}_rad" for name in angle_names)]

@@ -1,0 +1,185 @@
+"""What the sensors of a recording measured, each with its own stamp and its pose in the root frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.model.camera import Camera
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthImage:
+    """A depth image; depth is measured along the optical axis (z), not along the ray.
+
+    Args:
+        sensor: topic or folder it came from.
+        stamp: time of measurement [s].
+        image: (H, W) uint16 or float32; 0, NaN and infinity mean "no return".
+        metres_per_unit: metres of one unit of `image`.
+        camera: calibration; its size is the image's.
+        root_from_sensor: (4, 4) rigid transform from the optical frame to the recording's root frame.
+    """
+
+    sensor: str
+    stamp: float
+    image: npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+    metres_per_unit: float
+    camera: Camera
+    root_from_sensor: FloatArray
+
+    def __repr__(self) -> str:
+        """One line with size and type instead of the pixels."""
+        height, width = self.image.shape
+        return f"DepthImage({self.sensor!r}, stamp={self.stamp:.6f}, {width}x{height} {self.image.dtype})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointCloud:
+    """Points (N, 3) [m] in the sensor's frame, rows with NaN or infinity already dropped."""
+
+    sensor: str
+    stamp: float
+    points: FloatArray
+    root_from_sensor: FloatArray
+
+    def __repr__(self) -> str:
+        """One line with the number of points."""
+        return f"PointCloud({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.points)} points)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LaserScan:
+    """One sweep of a planar laser: ranges in the sensor's x-y plane.
+
+    Args:
+        sensor: topic it came from.
+        stamp: time of the first ray [s].
+        ranges: (N,) float32 [m], as recorded.
+        angle_min: angle of the first ray from x towards y [rad].
+        angle_increment: angle between rays [rad].
+        range_min, range_max: returns outside are not valid [m].
+        root_from_sensor: (4, 4) from the laser's frame to the recording's root frame.
+    """
+
+    sensor: str
+    stamp: float
+    ranges: npt.NDArray[np.float32]
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    root_from_sensor: FloatArray
+
+    def points(self) -> FloatArray:
+        """Valid returns as (N, 3) points [m] in the laser's frame (z = 0), in the order of the rays."""
+        ranges = self.ranges.astype(np.float64)
+        valid = np.isfinite(ranges) & (ranges >= self.range_min) & (ranges <= self.range_max)
+        angles = self.angle_min + self.angle_increment * np.flatnonzero(valid)
+        ranges = ranges[valid]
+        return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles), np.zeros(len(ranges))])
+
+    def __repr__(self) -> str:
+        """One line with the number of rays."""
+        return f"LaserScan({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.ranges)} rays)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ColorImage:
+    """A colour image, decoded when `image` is first asked for.
+
+    Args:
+        sensor: topic or folder it came from.
+        stamp: time of measurement [s].
+        decode: gives the (H, W, 3) BGR uint8 image; called once at most.
+        camera: calibration.
+        root_from_sensor: (4, 4) from the optical frame to the recording's root frame.
+    """
+
+    sensor: str
+    stamp: float
+    decode: Callable[[], npt.NDArray[np.uint8]]
+    camera: Camera
+    root_from_sensor: FloatArray
+
+    @cached_property
+    def image(self) -> npt.NDArray[np.uint8]:
+        """The image, (H, W, 3) BGR uint8.
+
+        Raises:
+            RecordingError: the stored picture is damaged or its size is not the camera's.
+        """
+        return self.decode()
+
+    def __repr__(self) -> str:
+        """One line with the size."""
+        return f"ColorImage({self.sensor!r}, stamp={self.stamp:.6f}, {self.camera.width}x{self.camera.height})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KeypointImage:
+    """What a 2-D keypoint network saw in one image.
+
+    Args:
+        sensor: name of the camera.
+        stamp: time of measurement [s].
+        people: one (K, 3) array of (u, v, confidence) for each person found, in pixels of the distorted image.
+        layout: which keypoints these are, a name in voodoo.sensors.keypoints.LAYOUTS.
+        camera: calibration.
+        root_from_sensor: (4, 4) from the optical frame to the recording's root frame.
+    """
+
+    sensor: str
+    stamp: float
+    people: tuple[FloatArray, ...]
+    layout: str
+    camera: Camera
+    root_from_sensor: FloatArray
+
+    def __repr__(self) -> str:
+        """One line with the number of people."""
+        return f"KeypointImage({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.people)} people, {self.layout})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MarkerSet:
+    """Positions of named sites from markers or magnetic trackers.
+
+    Args:
+        sensor: name of the system or file.
+        stamp: time of measurement [s].
+        positions: site name -> (3,) [m] in the recording's root frame; missing ones are left out.
+        sigma: standard deviation of each [m]; None: not known.
+    """
+
+    sensor: str
+    stamp: float
+    positions: Mapping[str, FloatArray]
+    sigma: float | None = None
+
+    def __repr__(self) -> str:
+        """One line with the number of sites."""
+        return f"MarkerSet({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.positions)} sites)"
+
+
+Measurement: TypeAlias = DepthImage | PointCloud | LaserScan | ColorImage | KeypointImage | MarkerSet
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFrame:
+    """One step of a recording: the measurement that gives the frame its stamp and what came since the previous one.
+
+    Args:
+        stamp: [s], that of the measurement the frame was made for.
+        measurements: in the order of arrival, that one last.
+    """
+
+    stamp: float
+    measurements: tuple[Measurement, ...]

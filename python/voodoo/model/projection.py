@@ -1,0 +1,133 @@
+"""How the body looks from somewhere: views project points of the root frame to a picture; limbs become outlines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate, TaperedEllipticCylinder
+from voodoo.model.body import Body
+from voodoo.model.camera import Camera
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+Axes: TypeAlias = Literal["rep103", "optical"]
+
+_NEAREST_M = 0.05
+
+
+class View(Protocol):
+    """Projects points of the root frame into a picture."""
+
+    def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Pixels (N, 2) of points (N, 3) [m], NaN where they cannot be seen, and their depths (N,) [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """What a camera sees.
+
+    Args:
+        camera: its calibration.
+        root_from_sensor: (4, 4) pose of its optical frame.
+        scale: enlargement of the picture over the camera's image.
+    """
+
+    camera: Camera
+    root_from_sensor: FloatArray
+    scale: float = 1
+
+    def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See View; depth is along the optical axis."""
+        sensor_from_root = np.linalg.inv(self.root_from_sensor)
+        points = points_root @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
+        points[points[:, 2] < _NEAREST_M] = np.nan
+        # Integer coordinates are pixel centres, so enlarging moves them by half a pixel as well.
+        return (self.camera.project(points) + 0.5) * self.scale - 0.5, points[:, 2]
+
+
+@dataclass(frozen=True)
+class TopView:
+    """Straight from above, without perspective: forward is up in the picture, left is left.
+
+    Args:
+        centre: (x, y, z) [m] of the root frame shown in the middle.
+        metres_per_pixel: of the picture.
+        size: width = height [px].
+        axes: "rep103" for root frames with x forward, y left, z up; "optical" for x right, y down, z forward.
+    """
+
+    centre: tuple[float, float, float]
+    metres_per_pixel: float
+    size: int
+    axes: Axes = "rep103"
+
+    def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See View; depth counts downwards from the centre."""
+        x, y, z = (points_root - np.array(self.centre)).T
+        right, forward, down = (-y, x, -z) if self.axes == "rep103" else (x, z, y)
+        pixels = np.column_stack([right, -forward]) / self.metres_per_pixel + (self.size - 1) / 2
+        return pixels, down
+
+
+def transform(a_from_b: FloatArray, points_b: FloatArray) -> FloatArray:
+    """Points (..., 3) of frame b in frame a."""
+    return np.asarray(points_b @ a_from_b[:3, :3].T + a_from_b[:3, 3])
+
+
+def limb_rings(shape: TaperedEllipticCylinder, *, rings: int = 2, samples: int = 48) -> FloatArray:
+    """Cross-sections of a limb as (rings, samples, 3) points [m] in the limb frame, from proximal to distal end."""
+    angle = np.linspace(0.0, 2.0 * np.pi, samples, endpoint=False)
+    t = np.linspace(0.0, 1.0, rings)[:, None]
+    a, b = shape.a0 + (shape.a1 - shape.a0) * t, shape.b0 + (shape.b1 - shape.b0) * t
+    return np.stack([a * np.cos(angle), b * np.sin(angle), np.broadcast_to(shape.length * t, (rings, samples))], axis=2)
+
+
+def limb_outline(
+    shape: TaperedEllipticCylinder, root_from_limb: FloatArray, view: View
+) -> npt.NDArray[np.float32] | None:
+    """Outline of a limb in a view: (K, 2) pixels, convex.
+
+    The solid is a union of segments between its two end ellipses, so its outline is the hull of theirs (up to lens
+    distortion, and to the 0.1 mm by which a tapered side may be hollow).
+
+    Returns:
+        None when a part of the limb is behind the camera.
+    """
+    points = transform(root_from_limb, limb_rings(shape).reshape(-1, 3))
+    pixels, _ = view.project(points)
+    if not np.isfinite(pixels).all():
+        return None
+    hull = cv2.convexHull(pixels.astype(np.float32))
+    return np.asarray(hull, dtype=np.float32).reshape(-1, 2)
+
+
+def silhouette(body: Body, estimate: Estimate, view: View, *, width: int, height: int) -> npt.NDArray[np.bool_]:
+    """Pixels (height, width) whose centres lie inside the outline of a limb."""
+    mask = np.zeros((height, width), dtype=bool)
+    for limb in body.limbs:
+        outline = limb_outline(limb.shape, estimate.world_from_limb[limb.name], view)
+        if outline is not None and len(outline) >= 3:
+            _fill(mask, outline.astype(np.float64))
+    return mask
+
+
+def _fill(mask: npt.NDArray[np.bool_], outline: FloatArray) -> None:
+    """Set the pixels whose centres lie in a convex polygon (K, 2).
+
+    Not cv2.fillConvexPoly: it also sets every pixel the border touches, half a pixel too many all around.
+    """
+    height, width = mask.shape
+    low = np.clip(np.ceil(outline.min(axis=0)), 0, (width, height)).astype(int)
+    high = np.clip(np.floor(outline.max(axis=0)) + 1, 0, (width, height)).astype(int)
+    if (high <= low).any():
+        return
+    x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+    edge = np.roll(outline, -1, axis=0) - outline
+    side = edge[:, 0, None, None] * (y - outline[:, 1, None, None]) - edge[:, 1, None, None] * (
+        x - outline[:, 0, None, None]
+    )
+    mask[low[1] : high[1], low[0] : high[0]] |= (side >= 0.0).all(axis=0) | (side <= 0.0).all(axis=0)

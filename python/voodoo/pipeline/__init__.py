@@ -1,0 +1,1 @@
+"""From a recording to estimates: inputs, the front end, the loop, inverse kinematics."""

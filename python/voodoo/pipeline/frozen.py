@@ -1,0 +1,54 @@
+"""Sensors that repeat themselves: a frozen depth camera would say with all its points that nobody moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.measurements import Measurement
+from voodoo.sensors.adapters import adapter_of
+
+
+class FrozenSensors:
+    """Finds sensors that are frozen; `names` are those of the last frame."""
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self.names: tuple[str, ...] = ()
+        self._contents: dict[str, npt.NDArray[Any]] = {}
+
+    def __copy__(self) -> FrozenSensors:
+        """The same; what was measured is never changed in place."""
+        twin = FrozenSensors()
+        twin.names, twin._contents = self.names, dict(self._contents)
+        return twin
+
+    def without(self, measurements: Sequence[Measurement], *, use: Sequence[str]) -> list[Measurement]:
+        """Those measurements whose sensor is not frozen.
+
+        A sensor is frozen when it repeats its last measurement bit by bit while another one measures something new:
+        real sensors have noise. Only kinds in `use` count.
+        """
+        repeats, changes = [], False
+        for item in measurements:
+            adapter = adapter_of(item)
+            content = adapter.content(item) if adapter.kind in use else None
+            if content is None:
+                continue
+            before = self._contents.get(item.sensor)
+            self._contents[item.sensor] = content
+            if before is not None and _same(before, content):
+                repeats.append(item)
+            else:
+                changes = changes or before is not None
+        stuck = repeats if changes else []
+        self.names = tuple(item.sensor for item in stuck)
+        return [item for item in measurements if not any(item is other for other in stuck)]
+
+
+def _same(before: npt.NDArray[Any], content: npt.NDArray[Any]) -> bool:
+    # Noise shows in the first rows that are looked at.
+    return np.array_equal(before[::16], content[::16]) and np.array_equal(before, content)

@@ -1,0 +1,217 @@
+"""Inverse kinematics through a recording: known sites from its reference or a result file, silhouettes from its
+pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import VoodooError
+from voodoo.export.track import Track
+from voodoo.ik.chain import Chain
+from voodoo.ik.image import Silhouette
+from voodoo.ik.options import Options
+from voodoo.ik.posture import Posture
+from voodoo.ik.solve import Follower, solve
+from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.settings import LEVEL_FRAMES
+from voodoo.sensors.silhouettes.color import StillBackground
+from voodoo.sensors.silhouettes.depth import StillScene, from_depth
+from voodoo.sensors.silhouettes.surroundings import surroundings
+from voodoo.tracker import Tracker
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+Pictures: TypeAlias = Literal["depth", "color", "none"]
+
+KNOWN = ("head_center", "l_shoulder", "r_shoulder", "l_hand", "r_hand", "l_hip", "r_hip", "l_ankle", "r_ankle")
+"""What J10 takes for known, and the trunk that carries its chains."""
+_STAND_INS = {"head_center": "skullbase", "l_hand": "l_wrist", "r_hand": "r_wrist"}
+"""Taken for known where these are not: keypoint networks know wrists, not hands."""
+_SAME_TIME_S = 0.02
+_LEARN = 41
+_REACHED_M = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Positions (F, J, 3) [m] of J sites at F stamps [s], in the recording's root frame; NaN = missing."""
+
+    stamps: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+
+    @classmethod
+    def of(cls, recording: Recording, result: Track | None = None) -> Positions:
+        """Those of a result, or of the recording's reference.
+
+        Raises:
+            VoodooError: the recording has no reference and no result was given, or the result is of another time.
+        """
+        if result is not None:
+            about = recording.info()
+            low, high = about.start_stamp - _SAME_TIME_S, about.start_stamp + about.duration + _SAME_TIME_S
+            if not ((result.stamps >= low) & (result.stamps <= high)).any():
+                found = f"{result.stamps.min():.3f} to {result.stamps.max():.3f} s" if len(result) else "none"
+                raise VoodooError(
+                    f"targets: expected stamps between {low:.3f} and {high:.3f} s as in {recording.name}, found {found}"
+                )
+            return cls(result.stamps, result.joint_names, result.joints)
+        if recording.reference is None:
+            raise VoodooError(
+                f"{recording.name}: expected positions of known sites, found no reference in the recording; "
+                "give a result of voodoo track"
+            )
+        return cls(recording.reference.stamps, recording.reference.names, recording.reference.positions)
+
+    def at(self, stamp: float, sites: Sequence[str]) -> dict[str, FloatArray]:
+        """The sites known within 20 ms of a time; empty when none is."""
+        index = int(np.argmin(np.abs(self.stamps - stamp)))
+        if abs(self.stamps[index] - stamp) > _SAME_TIME_S:
+            return {}
+        row = {name: self.values[index, self.names.index(name)] for name in sites if name in self.names}
+        return {name: position for name, position in row.items() if np.isfinite(position).all()}
+
+
+def follow(
+    recording: Recording,
+    tracker: Tracker,
+    positions: Positions,
+    *,
+    sites: Sequence[str] | None = None,
+    pictures: Pictures = "depth",
+    options: Options | None = None,
+    warm: bool = True,
+    rest: bool = True,
+) -> tuple[Track, dict[str, FloatArray]]:
+    """Postures of all frames from the known sites and the silhouettes.
+
+    Args:
+        recording: read while solving.
+        tracker: at the first pose, see voodoo.pipeline.run.start_tracker; gives body and start.
+        positions: of the known sites.
+        sites: which ones are taken for known; those that `positions` lack are left out. None: head, trunk, hands and ankles;
+            wrists and skullbase where hands and head are lacking.
+        pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known sites and the
+            last posture, or stands before the still scene; "color" by the difference from the still background; "none":
+            plain inverse kinematics.
+        options: see voodoo.ik.Options.
+        warm: start each frame from the posture before; else solve it by itself, from the first pose.
+        rest: with `warm`: what neither sites nor silhouettes tell goes back to the mean of the postures so far, see ik.Follower.
+
+    Returns:
+        The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
+        else "tracking"; residual is the root mean square of the targets'. And the error (F,) [m] of every other site
+        of `positions`, NaN where unknown.
+
+    Raises:
+        VoodooError: no known site at all, unknown words, damage in the recording.
+    """
+    if pictures not in ("depth", "color", "none"):
+        raise VoodooError(f'pictures: expected "depth", "color" or "none", found {pictures!r}')
+    chain = Chain(tracker.body)
+    there = [name for name in positions.names if name in chain.site_names]
+    if sites is None:
+        sites = [name if name in there else _STAND_INS.get(name, name) for name in KNOWN]
+    known = [name for name in sites if name in there]
+    if not known:
+        raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
+    options = Options() if options is None else options
+    start = chain.project(tracker.estimate.world_from_limb)
+    chosen = {name: getattr(options, name) for name in Options.__dataclass_fields__}
+    follower = Follower(chain, start=start, rest="mean" if rest else None, **chosen)
+    scenes = {} if pictures == "none" else _scenes(recording, positions, known, pictures)
+    others = [name for name in there if name not in known]
+    postures: list[Posture] = []
+    stamps, rows = [], []
+    last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}
+    level = recording.root_frame in LEVEL_FRAMES
+    for recorded in recording:
+        targets = positions.at(recorded.stamp, known)
+        images = (
+            _silhouettes(recorded, {**last, **targets} if warm else targets, scenes, level=level) if targets else []
+        )
+        posture = (
+            follower.step(targets, images=images)
+            if warm
+            else solve(chain, targets, images=images, start=start, options=options)
+        )
+        last = posture.joints
+        truth = positions.at(recorded.stamp, others)
+        rows.append(
+            [float(np.linalg.norm(posture.joints[n] - truth[n])) if n in truth else float("nan") for n in others]
+        )
+        postures.append(posture)
+        stamps.append(recorded.stamp)
+    if not postures:
+        raise VoodooError(f"{recording.name}: expected at least one frame, found none")
+    table = np.array(rows, dtype=np.float64).reshape(len(postures), len(others))
+    errors = {name: table[:, index] for index, name in enumerate(others)}
+    return _track(stamps, postures), errors
+
+
+def _track(stamps: Sequence[float], postures: Sequence[Posture]) -> Track:
+    def reached(posture: Posture) -> float:
+        return float(np.sqrt(np.mean(np.square(posture.residuals)))) if posture.residuals else float("inf")
+
+    first = postures[0]
+    return Track(
+        stamps=np.array(stamps, dtype=np.float64),
+        status=tuple("tracking" if reached(posture) < _REACHED_M else "degraded" for posture in postures),
+        residual=np.array([reached(posture) if posture.residuals else 0.0 for posture in postures]),
+        joint_names=tuple(first.joints),
+        joints=np.array([list(posture.joints.values()) for posture in postures]),
+        limb_names=tuple(first.world_from_limb),
+        world_from_limb=np.array([list(posture.world_from_limb.values()) for posture in postures]),
+        angle_names=first.angle_names,
+        angles=np.array([posture.angles for posture in postures]),
+    )
+
+
+def _silhouettes(
+    recorded: RecordedFrame,
+    sites: Mapping[str, FloatArray],
+    scenes: Mapping[str, StillScene | StillBackground],
+    *,
+    level: bool,
+) -> list[Silhouette]:
+    """Silhouettes of all pictures whose scene is known; `sites`: where the person is and was (3,) [m]."""
+    found = []
+    for item in recorded.measurements:
+        scene = scenes.get(item.sensor)
+        if isinstance(item, DepthImage) and isinstance(scene, StillScene):
+            mask = from_depth(item, sites, scene=scene, level=level)
+        elif isinstance(item, ColorImage) and isinstance(scene, StillBackground):
+            mask = scene.mask(item.image)
+        else:
+            continue
+        found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor))
+    return found
+
+
+def _scenes(
+    recording: Recording, positions: Positions, known: Sequence[str], pictures: Pictures
+) -> dict[str, StillScene | StillBackground]:
+    """What each camera sees without the person, from pictures spread over the recording; cameras are taken to stand still."""
+    chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
+    depths: dict[str, list[DepthImage]] = {}
+    colours: dict[str, list[tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_]]]] = {}
+    for index, recorded in enumerate(recording):
+        if index not in chosen:
+            continue
+        for item in recorded.measurements:
+            if pictures == "depth" and isinstance(item, DepthImage):
+                depths.setdefault(item.sensor, []).append(item)
+            elif pictures == "color" and isinstance(item, ColorImage):
+                there = surroundings(positions.at(recorded.stamp, known), item.camera, item.root_from_sensor)
+                colours.setdefault(item.sensor, []).append((item.image, there))
+    if not depths and not colours:
+        raise VoodooError(f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look")
+    scenes: dict[str, StillScene | StillBackground] = {name: StillScene(images) for name, images in depths.items()}
+    for name, pairs in colours.items():
+        scenes[name] = StillBackground([image for image, _ in pairs], occupied=[there for _, there in pairs])
+    return scenes

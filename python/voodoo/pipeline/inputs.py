@@ -1,0 +1,98 @@
+"""What `voodoo track` reads: a recording, and what is joined to it on the command line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from voodoo.errors import VoodooError
+from voodoo.recordings.joined import Joined, WithKeypoints
+from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.recordings.loaders import LOADERS, guess_loader, open_recording, options_of
+from voodoo.recordings.marker_files import MarkerMap
+from voodoo.recordings.recording import Recording
+
+
+def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
+    """Sensor -> folder of "SENSOR=FOLDER" each.
+
+    Raises:
+        VoodooError: another form, or a folder that does not exist.
+    """
+    folders = {}
+    for word in words:
+        sensor, equals, folder = word.partition("=")
+        if not (sensor and equals and folder):
+            raise VoodooError(f"keypoints: expected SENSOR=FOLDER, found {word!r}")
+        if not Path(folder).is_dir():
+            raise VoodooError(f"{folder}: expected a folder of OpenPose JSON files, found none")
+        folders[sensor] = Path(folder)
+    return folders
+
+
+def join(
+    recording: Recording,
+    *,
+    keypoints: Mapping[str, Path] | None = None,
+    layout: str = "body25b",
+    others: Sequence[Path] = (),
+    offset: float = 0.0,
+    markers: MarkerMap | None = None,
+    numbers: Mapping[str, float] | None = None,
+) -> Recording:
+    """The recording with all that is joined to it.
+
+    Args:
+        recording: gives the frames.
+        keypoints: sensor -> folder of OpenPose JSON files, one for each of its images.
+        layout: of those keypoints.
+        others: further recordings of the scene, marker files among them.
+        offset: [s] added to their stamps.
+        markers: what the markers in marker files mean.
+        numbers: options of their loaders, for those that have them.
+
+    Raises:
+        VoodooError: what cannot be read or does not belong together.
+    """
+    layout_of(layout)
+    if not math.isfinite(offset):
+        raise VoodooError(f"offset: expected a finite number of seconds, found {offset}")
+    if keypoints:
+        recording = WithKeypoints(recording, keypoints, layout=layout)
+    if others:
+        recording = Joined(
+            recording, [_open(path, recording, markers, layout, numbers) for path in others], offset=offset
+        )
+    return recording
+
+
+def loader_options(
+    path: Path,
+    loader: str | None,
+    *,
+    markers: MarkerMap | None,
+    layout: str,
+    numbers: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
+    """Of the options of `voodoo track` those that the loader of a recording takes.
+
+    Raises:
+        VoodooError: no loader for it.
+    """
+    if loader is None and not path.exists():
+        return {}  # opening it says so
+    name = loader or guess_loader(path)
+    options: dict[str, dict[str, Any]] = {"markers": {"markers": markers}, "pose2sim": {"layout": layout}}
+    known = options_of(name) if name in LOADERS else ()
+    return options.get(name, {}) | {key: value for key, value in (numbers or {}).items() if key in known}
+
+
+def _open(
+    path: Path, first: Recording, markers: MarkerMap | None, layout: str, numbers: Mapping[str, float] | None
+) -> Recording:
+    options = loader_options(path, None, markers=markers, layout=layout, numbers=numbers)
+    if path.exists() and guess_loader(path) in ("ros1", "ros2"):
+        options["root_frame"] = first.root_frame
+    return open_recording(path, **options)

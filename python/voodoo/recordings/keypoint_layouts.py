@@ -1,0 +1,139 @@
+"""The one table that ties the keypoints of common networks to the sites of the body.
+
+Each row: site, {keypoint index: share}, spread [m]. A site is the sum of its keypoints times their shares; the spread
+is how far the network's idea of the joint lies from ours (a hip keypoint sits on the skin, a neck keypoint between
+the shoulders, ears below the middle of the head).
+Sites that would only repeat keypoints used already (a neck that a network computes from its two shoulders) are left
+out: they would count one error twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from voodoo.errors import MeasurementError
+
+_JOINT_SPREAD = {"shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.05}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A site and the keypoints it is made of."""
+
+    site: str
+    shares: Mapping[int, float]
+    spread: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A network's keypoints: how many, and which sites they give."""
+
+    count: int
+    parts: tuple[Part, ...]
+
+
+def _parts(left: Mapping[str, int], right: Mapping[str, int]) -> list[Part]:
+    rows = []
+    for prefix, indices in (("l_", left), ("r_", right)):
+        rows += [Part(prefix + name, {index: 1.0}, _JOINT_SPREAD[name]) for name, index in indices.items()]
+    return rows
+
+
+def _joints(first: str, start: int) -> tuple[dict[str, int], dict[str, int]]:
+    """Joints in pairs from `start`, as in COCO: left shoulder, right shoulder, left elbow, ..."""
+    names = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+    even = {name: start + 2 * i for i, name in enumerate(names)}
+    odd = {name: start + 2 * i + 1 for i, name in enumerate(names)}
+    return (even, odd) if first == "left" else (odd, even)
+
+
+def _body_25(start: Mapping[str, int], *, toe: int) -> dict[str, int]:
+    arm, leg = start["arm"], start["leg"]
+    rows = {"shoulder": arm, "elbow": arm + 1, "wrist": arm + 2, "hip": leg, "knee": leg + 1, "ankle": leg + 2}
+    return {**rows, "toe": toe}
+
+
+def _ears(left: int, right: int) -> Part:
+    # The middle of the ears is the middle of the head, from every side.
+    return Part("head_center", {left: 0.5, right: 0.5}, 0.06)
+
+
+def _palm(side: str, wrist: int, little: int, index: int) -> Part:
+    # The palm's centre lies between the wrist and the knuckles of the little and the index finger.
+    return Part(f"{side}_hand", {wrist: 0.4, little: 0.3, index: 0.3}, 0.02)
+
+
+_COCO_LEFT, _COCO_RIGHT = _joints("left", 5)
+
+LAYOUTS: dict[str, Layout] = {
+    # nose, eyes, ears (3, 4), then pairs from the shoulders to the ankles
+    "coco17": Layout(17, (*_parts(_COCO_LEFT, _COCO_RIGHT), _ears(3, 4))),
+    # OpenPose: its neck (1) and mid-hip (8) are made of the shoulders and hips
+    "body25": Layout(
+        25,
+        (
+            *_parts(_body_25({"arm": 5, "leg": 12}, toe=19), _body_25({"arm": 2, "leg": 9}, toe=22)),
+            _ears(18, 17),
+        ),
+    ),
+    # OpenPose BODY_25B: COCO, then upper neck (17) and head top (18) of MPII, then feet
+    "body25b": Layout(
+        25,
+        (
+            *_parts({**_COCO_LEFT, "toe": 19}, {**_COCO_RIGHT, "toe": 22}),
+            _ears(3, 4),
+            Part("skullbase", {17: 1.0}, 0.05),
+            Part("skull_tip", {18: 1.0}, 0.05),
+        ),
+    ),
+    # MediaPipe: 33 landmarks; ears 7 and 8; knuckles of little and index finger from 17
+    "blazepose33": Layout(
+        33,
+        (
+            *_parts(
+                {"shoulder": 11, "elbow": 13, "wrist": 15, "hip": 23, "knee": 25, "ankle": 27, "toe": 31},
+                {"shoulder": 12, "elbow": 14, "wrist": 16, "hip": 24, "knee": 26, "ankle": 28, "toe": 32},
+            ),
+            _ears(7, 8),
+            _palm("l", 15, 17, 19),
+            _palm("r", 16, 18, 20),
+        ),
+    ),
+    # COCO, then top of the head (17), neck (18), hip (19), and feet in pairs from the big toes (20, 21)
+    "halpe26": Layout(
+        26,
+        (
+            *_parts({**_COCO_LEFT, "toe": 20}, {**_COCO_RIGHT, "toe": 21}),
+            _ears(3, 4),
+            Part("skull_tip", {17: 1.0}, 0.05),
+            Part("vc7", {18: 1.0}, 0.05),
+        ),
+    ),
+    # pelvis, right leg, left leg, spine, thorax (8), nose (9), top of the head (10), left arm, right arm
+    "h36m17": Layout(
+        17,
+        (
+            *_parts(
+                {"hip": 4, "knee": 5, "ankle": 6, "shoulder": 11, "elbow": 12, "wrist": 13},
+                {"hip": 1, "knee": 2, "ankle": 3, "shoulder": 14, "elbow": 15, "wrist": 16},
+            ),
+            Part("humanoid_root", {0: 1.0}, 0.04),
+            Part("vc7", {8: 1.0}, 0.05),
+            Part("skull_tip", {10: 1.0}, 0.05),
+        ),
+    ),
+}
+"""Layout by name."""
+
+
+def layout_of(name: str) -> Layout:
+    """The layout called `name`, see LAYOUTS.
+
+    Raises:
+        MeasurementError: unknown; lists the known ones.
+    """
+    if name not in LAYOUTS:
+        raise MeasurementError(f"layout {name!r}: expected one of {', '.join(LAYOUTS)}")
+    return LAYOUTS[name]

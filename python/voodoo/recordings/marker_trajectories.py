@@ -1,0 +1,177 @@
+"""Markers and magnetic trackers: named 3-D points over time from .trc and .c3d files, on sites or with an offset on a
+limb."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError, VoodooError, reading
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+Z_UP_FROM_Y_UP: FloatArray = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""Rotation from OpenSim's axes (X forward, Y up, Z to the right) to REP-103's order of axes (Z up): (x, y, z) = (Z,
+X, Y).
+
+It is Pose2Sim's convention; it keeps right-handedness, not the direction a person faces."""
+
+_METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MarkerTrajectories:
+    """Positions of M named points at F times.
+
+    Args:
+        stamps: (F,) [s].
+        names: M names as in the file.
+        positions: (F, M, 3) [m]; NaN = missing.
+        rate_hz: nominal rate [Hz].
+    """
+
+    stamps: FloatArray
+    names: tuple[str, ...]
+    positions: FloatArray
+    rate_hz: float
+
+    def __repr__(self) -> str:
+        """Counts and rate."""
+        return f"MarkerTrajectories({len(self.stamps)} frames, {len(self.names)} markers, {self.rate_hz:g} Hz)"
+
+    def of(self, names: Mapping[str, str]) -> tuple[tuple[str, ...], FloatArray]:
+        """The markers that stand for sites.
+
+        Args:
+            names: marker name -> site name.
+
+        Returns:
+            The site names, and their positions (F, N, 3), of those markers that the file has.
+        """
+        kept = [(index, names[name]) for index, name in enumerate(self.names) if name in names]
+        return tuple(site for _, site in kept), self.positions[:, [index for index, _ in kept]]
+
+
+def read_markers(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
+    """Read a .trc or .c3d file, whichever the suffix says; see `read_trc` and `read_c3d`.
+
+    Raises:
+        RecordingError: another suffix, damage, or another form.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".trc":
+        return read_trc(path, world_from_file=world_from_file)
+    if suffix == ".c3d":
+        return read_c3d(path, world_from_file=world_from_file)
+    raise RecordingError(f"{path}: expected a .trc or .c3d file, found {suffix or 'no suffix'!r}")
+
+
+def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
+    """Read a .trc file (OpenSim, Motion Analysis).
+
+    Args:
+        path: the file; tab separated, two header lines with values, two lines of column names, then frames.
+        world_from_file: (3, 3) rotation applied to every position, e.g. Z_UP_FROM_Y_UP; None keeps the file's axes.
+
+    Raises:
+        RecordingError: not of that form; names the line.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise RecordingError(f"{path}: expected a .trc file, found none")
+    with reading(path, "a readable .trc file"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+    if len(lines) < 6 or not lines[0].startswith("PathFileType"):
+        raise RecordingError(f"{path}: expected a .trc file (PathFileType ... in the first line), found another")
+    header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
+    try:
+        rate, frames, markers = float(header["DataRate"]), int(header["NumFrames"]), int(header["NumMarkers"])
+        unit = _METRES[header["Units"].strip()]
+    except (KeyError, ValueError) as error:
+        raise RecordingError(
+            f"{path}, line 3: expected DataRate, NumFrames, NumMarkers and Units (m, cm, mm), found {header}"
+        ) from error
+    if not (rate > 0.0 and math.isfinite(rate)):
+        raise RecordingError(f"{path}, line 3: expected a DataRate above zero, found {rate}")
+    names = tuple(cell for cell in lines[3].split("\t")[2:] if cell.strip())
+    if len(names) != markers or len(set(names)) != markers:
+        raise RecordingError(f"{path}, line 4: expected {markers} different marker names, found {len(set(names))}")
+    rows = [(number, line) for number, line in enumerate(lines[5:], start=6) if line.strip()]
+    if len(rows) != frames:
+        raise RecordingError(f"{path}: expected {frames} frames as its header says, found {len(rows)}")
+    table = np.full((frames, 2 + 3 * markers), np.nan)
+    for row, (number, line) in zip(table, rows, strict=True):
+        cells = [cell.strip() for cell in line.split("\t")]
+        while len(cells) > len(row) and not cells[-1]:
+            cells.pop()
+        if len(cells) > len(row) or len(cells) < 2:
+            raise RecordingError(f"{path}, line {number}: expected {len(row)} columns, found {len(cells)}")
+        try:
+            row[: len(cells)] = [float(cell) if cell else math.nan for cell in cells]
+        except ValueError as error:
+            raise RecordingError(f"{path}, line {number}: expected numbers, found {error}") from error
+    stamps = table[:, 1].copy()
+    if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any():
+        raise RecordingError(f"{path}: expected rising times in the second column, found others")
+    positions = table[:, 2:].reshape(frames, markers, 3) * unit
+    return _trajectories(path, stamps, names, positions, rate, world_from_file)
+
+
+def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
+    """Read the points of a .c3d file with the ezc3d library (`pip install voodoo[c3d]`).
+
+    Args:
+        path: the file.
+        world_from_file: (3, 3) rotation applied to every position; None keeps the file's axes.
+
+    Raises:
+        VoodooError: ezc3d is not installed.
+        RecordingError: damage, no points, or an unknown unit.
+    """
+    try:
+        import ezc3d  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    except ImportError as error:
+        raise VoodooError(f"{path}: reading .c3d needs the library ezc3d: pip install voodoo[c3d]") from error
+    path = Path(path)
+    if not path.is_file():
+        raise RecordingError(f"{path}: expected a .c3d file, found none")
+    with reading(path, "a .c3d file"):
+        content = ezc3d.c3d(str(path))
+        points = np.asarray(content["data"]["points"], dtype=np.float64)
+        parameters = content["parameters"]["POINT"]
+        names = tuple(str(name).strip() for name in parameters["LABELS"]["value"])[: points.shape[1]]
+        unit = str(parameters["UNITS"]["value"][0]).strip() if parameters["UNITS"]["value"] else "mm"
+        rate = float(content["header"]["points"]["frame_rate"])
+        first = int(content["header"]["points"]["first_frame"])
+    if not points.size or unit not in _METRES or not rate > 0.0 or len(set(names)) != points.shape[1]:
+        raise RecordingError(
+            f"{path}: expected named points in m, cm or mm at a rate above zero, found {points.shape[1]} points with "
+            f"{len(set(names))} names in {unit!r} at {rate} Hz"
+        )
+    stamps = (first + np.arange(points.shape[2])) / rate
+    positions = points[:3].transpose(2, 1, 0) * _METRES[unit]
+    return _trajectories(path, stamps, names, positions, rate, world_from_file)
+
+
+def _trajectories(
+    path: Path,
+    stamps: FloatArray,
+    names: tuple[str, ...],
+    positions: FloatArray,
+    rate: float,
+    world_from_file: npt.ArrayLike | None,
+) -> MarkerTrajectories:
+    missing = ~np.isfinite(positions).all(axis=2)
+    if world_from_file is not None:
+        turn = np.asarray(world_from_file, dtype=np.float64)
+        if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
+            raise RecordingError(f"{path}: world_from_file: expected a (3, 3) rotation, found {turn.tolist()}")
+        positions = positions @ turn.T
+    positions[missing] = np.nan
+    return MarkerTrajectories(stamps, names, positions, rate)

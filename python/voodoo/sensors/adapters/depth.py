@@ -1,0 +1,62 @@
+"""Depth images as inputs: every pixel is a point on the body, or is not."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Frame
+from voodoo.measurements import DepthImage
+from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.drawing import Log
+
+
+class DepthAdapter(Adapter[DepthImage]):
+    """Depth images, filtered if the settings say so."""
+
+    kind = "depth"
+    measurement = DepthImage
+    panel = 0
+
+    def content(self, item: DepthImage) -> npt.NDArray[Any]:
+        """The image."""
+        return item.image
+
+    def add(self, frame: Frame, item: DepthImage, context: Context) -> None:
+        """As a depth image, weighted for the distance of the body."""
+        chosen = context.settings
+        image = item.image
+        if chosen.depth_filter is not None:
+            image = chosen.depth_filter.apply(image, metres_per_unit=item.metres_per_unit)
+        frame.add_depth(
+            image,
+            camera=item.camera,
+            metres_per_unit=item.metres_per_unit,
+            world_from_sensor=item.root_from_sensor,
+            weight=context.range_weight(chosen.depth_noise, chosen.sharing, item.root_from_sensor),
+            source=item.sensor,
+        )
+
+    def picture(self, item: DepthImage) -> npt.NDArray[Any]:
+        """Depths [m]."""
+        return item.image.astype(np.float32) * item.metres_per_unit
+
+    def log(self, item: DepthImage, log: Log, memory: Memory) -> None:
+        """The image, its points coloured by limb, and the person's silhouette."""
+        rr, path = log.rr, log.camera(item)
+        log.send(f"{path}/picture", rr.DepthImage(item.image, meter=1.0 / item.metres_per_unit))
+        # Of a large image every n-th row and column.
+        step = math.ceil(math.sqrt(item.image.size / log.most_points))
+        z = item.image[::step, ::step].astype(np.float32) * np.float32(item.metres_per_unit)
+        valid = np.isfinite(z) & (z > 0.0)
+        points = np.column_stack([item.camera.rays()[::step, ::step][valid] * z[valid, None], z[valid]])
+        limbs = log.body_points(f"world/points/{log.entity(item.sensor)}", points, item.root_from_sensor)
+        log.outlines(path, item)
+        silhouette = np.zeros(z.shape, dtype=np.uint8)
+        silhouette[valid] = np.where(limbs == log.limbs, 0, limbs + 1)
+        height, width = item.image.shape
+        silhouette = silhouette.repeat(step, axis=0).repeat(step, axis=1)[:height, :width]
+        log.send(f"{path}/picture/silhouette", rr.SegmentationImage(silhouette, opacity=0.5))

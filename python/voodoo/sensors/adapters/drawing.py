@@ -1,0 +1,68 @@
+"""What adapters draw on; `voodoo.visualization` brings pictures and Rerun streams of this form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.measurements import ColorImage, DepthImage, KeypointImage
+from voodoo.sensors.pixels import FloatArray
+
+Color: TypeAlias = tuple[int, int, int]
+Pictured: TypeAlias = DepthImage | ColorImage | KeypointImage
+"""Measurements of a camera."""
+
+
+class Canvas(Protocol):
+    """An overlay: the picture of one camera, or a view from above."""
+
+    def dots(self, points_root: FloatArray, *, color: Color, radius: int) -> None:
+        """Points (N, 3) [m] of the root frame as dots; colours are BGR, radii pixels."""
+
+    def rings(self, item: Pictured, pixels: FloatArray, strengths: FloatArray, *, color: Color) -> None:
+        """Rings about pixels (N, 2) of a camera, fainter with less strength (N,), if this is its picture."""
+
+    def regions(
+        self,
+        item: Pictured,
+        mask: npt.NDArray[np.bool_],
+        *,
+        marks: Sequence[tuple[float, float]],
+        names: Mapping[str, tuple[float, float]],
+        color: Color,
+    ) -> None:
+        """Outlines of a mask (H, W), dots at pixels, and names beside others, if this is the sensor's own picture."""
+
+
+class Log(Protocol):
+    """One step in Rerun."""
+
+    @property
+    def rr(self) -> Any:  # noqa: ANN401 - Rerun is optional
+        """The module `rerun`."""
+
+    @property
+    def limbs(self) -> int:
+        """How many limbs the body has."""
+
+    @property
+    def most_points(self) -> int:
+        """Of larger clouds and images only a part is shown."""
+
+    def send(self, path: str, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own
+        """Log archetypes of Rerun at a path."""
+
+    def entity(self, sensor: str) -> str:
+        """A sensor's name as part of a path."""
+
+    def camera(self, item: Pictured) -> str:
+        """Log pose and calibration of a camera; the path of its picture."""
+
+    def outlines(self, path: str, item: Pictured) -> None:
+        """Log the outlines of the limbs as the camera sees them, into the picture at a path."""
+
+    def body_points(self, path: str, points: npt.NDArray[Any], pose: FloatArray) -> npt.NDArray[np.intp]:
+        """Log points (N, 3) of a sensor at `pose` (4, 4), coloured by limb; the limb of each (N,), `limbs`: none."""

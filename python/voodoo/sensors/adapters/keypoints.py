@@ -1,0 +1,87 @@
+"""2-D keypoints as inputs: rays of named sites, and points where a registered depth image shows them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from voodoo._core import Frame
+from voodoo.measurements import DepthImage, KeypointImage
+from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.drawing import Canvas, Log
+from voodoo.sensors.keypoints.sensor import KeypointReport, KeypointSensor
+from voodoo.sensors.keypoints.sites import nearest_person
+from voodoo.sensors.occlusion import body_before
+
+KEYPOINT = (255, 120, 255)
+"""Colour in overlays, BGR."""
+
+
+class KeypointsAdapter(Adapter[KeypointImage]):
+    """What 2-D networks saw; the person nearest to the prediction is the tracked one."""
+
+    kind = "keypoints"
+    measurement = KeypointImage
+    panel = 2
+    panel_of_its_own = False
+
+    def add(self, frame: Frame, item: KeypointImage, context: Context) -> None:
+        """As rays, or with depth as positions; `Memory` keeps the report of each sensor under "keypoints"."""
+        chosen = context.settings
+        place: dict[str, Any] = {
+            "layout": item.layout,
+            "camera": item.camera,
+            "world_from_sensor": item.root_from_sensor,
+        }
+        person = nearest_person(item.people, predicted=context.predicted, **place)
+        if person is None:
+            context.memory.put(self.kind, item.sensor, KeypointReport())
+            return
+        sensor = KeypointSensor(
+            **place,
+            source=item.sensor,
+            noise=chosen.keypoint_noise,
+            model=chosen.model,
+            min_confidence=chosen.min_confidence,
+        )
+        registered = next((depth for depth in context.depth_images if _same_camera(depth, item)), None)
+        with_depth: dict[str, Any] = {}
+        if registered is not None:
+            with_depth = {"depth": registered.image, "metres_per_unit": registered.metres_per_unit}
+        joints = context.tracker.estimate.joints
+        sites = [part.site for part in layout_of(item.layout).parts if part.site in joints]
+        places = [joints[site] for site in sites]
+        hidden = body_before(places, item.root_from_sensor[:3, 3], context.tracker.distance)
+        report, rays, points = sensor.observe(
+            person,
+            stamp=context.stamp,
+            predicted=context.predicted,
+            gate=context.gate,
+            before=dict(zip(sites, hidden.tolist(), strict=True)),
+            **with_depth,
+        )
+        context.memory.put(self.kind, item.sensor, report)
+        context.rays.extend(rays)
+        for site, (position, sigma) in points.items():
+            frame.add_position(site, position, weight=chosen.model.weight(sigma), source=item.sensor)
+
+    def draw(self, item: KeypointImage, canvas: Canvas, memory: Memory) -> None:
+        """Rings in the picture they were found in, fainter with less confidence."""
+        for person in item.people:
+            rows = person[np.isfinite(person).all(axis=1) & (person[:, 2] > 0.0)]
+            canvas.rings(item, rows[:, :2], rows[:, 2], color=KEYPOINT)
+
+    def log(self, item: KeypointImage, log: Log, memory: Memory) -> None:
+        """Rings in the camera's picture, with the outlines of the limbs."""
+        path = log.camera(item)
+        log.outlines(path, item)
+        rows = np.vstack([*item.people, np.empty((0, 3))])
+        rows = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0.0)]
+        rings = np.column_stack([np.full((len(rows), 3), KEYPOINT), 60 + 195 * rows[:, 2].clip(0.0, 1.0)])
+        log.send(f"{path}/picture/keypoints", log.rr.Points2D(rows[:, :2], radii=4.0, colors=rings.astype(np.uint8)))
+
+
+def _same_camera(depth: DepthImage, item: KeypointImage) -> bool:
+    return depth.camera == item.camera and np.allclose(depth.root_from_sensor, item.root_from_sensor, atol=1e-6)

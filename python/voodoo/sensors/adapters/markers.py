@@ -1,0 +1,46 @@
+"""Markers and magnetic trackers as inputs: positions of named sites."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from voodoo._core import Frame
+from voodoo.measurements import MarkerSet
+from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.drawing import Canvas, Log
+
+MARKER = (60, 60, 255)
+"""Colour in overlays, BGR."""
+
+
+class MarkersAdapter(Adapter[MarkerSet]):
+    """Sets of markers; those on sites that the body has not are left out."""
+
+    kind = "markers"
+    measurement = MarkerSet
+
+    def add(self, frame: Frame, item: MarkerSet, context: Context) -> None:
+        """As positions of sites."""
+        sigma = context.settings.marker_sigma if item.sigma is None else item.sigma
+        weight = context.settings.model.weight(sigma)
+        for site, position in item.positions.items():
+            if site in context.predicted:
+                frame.add_position(site, position, weight=weight, source=item.sensor)
+
+    def draw(self, item: MarkerSet, canvas: Canvas, memory: Memory) -> None:
+        """Large dots."""
+        if item.positions:
+            canvas.dots(np.array(list(item.positions.values()), dtype=np.float64), color=MARKER, radius=4)
+
+    def log(self, item: MarkerSet, log: Log, memory: Memory) -> None:
+        """Named points."""
+        log.send(
+            f"world/markers/{log.entity(item.sensor)}",
+            log.rr.Points3D(
+                list(item.positions.values()),
+                radii=0.015,
+                colors=(255, 60, 60),
+                labels=list(item.positions),
+                show_labels=False,
+            ),
+        )

@@ -1,0 +1,70 @@
+"""Point clouds and laser scans as inputs: points that may be on the body, each where it is at the frame's time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy.typing as npt
+
+from voodoo._core import Frame
+from voodoo.measurements import LaserScan, PointCloud
+from voodoo.model.projection import transform
+from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.drawing import Canvas, Log
+
+SCAN, CLOUD = (90, 230, 90), (225, 225, 120)
+"""Colours in overlays, BGR."""
+
+
+class PointsAdapter(Adapter[PointCloud]):
+    """Point clouds."""
+
+    kind = "points"
+    measurement = PointCloud
+
+    def content(self, item: PointCloud) -> npt.NDArray[Any]:
+        """The points."""
+        return item.points
+
+    def add(self, frame: Frame, item: PointCloud, context: Context) -> None:
+        """As points, those on the body moved to the frame's time."""
+        chosen, pose = context.settings, item.root_from_sensor
+        weight = context.range_weight(chosen.depth_noise, chosen.sharing, pose)
+        points = context.motion_compensated(item.points, pose, item.stamp)
+        frame.add_points(points, world_from_sensor=pose, weight=weight, source=item.sensor)
+
+    def draw(self, item: PointCloud, canvas: Canvas, memory: Memory) -> None:
+        """Small dots."""
+        canvas.dots(transform(item.root_from_sensor, item.points), color=CLOUD, radius=1)
+
+    def log(self, item: PointCloud, log: Log, memory: Memory) -> None:
+        """Points coloured by limb."""
+        some = item.points[:: max(len(item.points) // log.most_points, 1)]
+        log.body_points(f"world/points/{log.entity(item.sensor)}", some, item.root_from_sensor)
+
+
+class ScanAdapter(Adapter[LaserScan]):
+    """Sweeps of planar lasers."""
+
+    kind = "scan"
+    measurement = LaserScan
+
+    def content(self, item: LaserScan) -> npt.NDArray[Any]:
+        """The ranges."""
+        return item.ranges
+
+    def add(self, frame: Frame, item: LaserScan, context: Context) -> None:
+        """As points, those on the body moved to the frame's time."""
+        chosen, pose = context.settings, item.root_from_sensor
+        weight = context.range_weight(chosen.scan_noise, chosen.scan_sharing, pose)
+        points = context.motion_compensated(item.points(), pose, item.stamp)
+        frame.add_points(points, world_from_sensor=pose, weight=weight, source=item.sensor)
+
+    def draw(self, item: LaserScan, canvas: Canvas, memory: Memory) -> None:
+        """Dots."""
+        canvas.dots(transform(item.root_from_sensor, item.points()), color=SCAN, radius=2)
+
+    def log(self, item: LaserScan, log: Log, memory: Memory) -> None:
+        """Points."""
+        points = transform(item.root_from_sensor, item.points())
+        log.send(f"world/laser/{log.entity(item.sensor)}", log.rr.Points3D(points, radii=0.015, colors=(255, 220, 0)))

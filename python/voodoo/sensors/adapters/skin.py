@@ -1,0 +1,127 @@
+"""Skin in colour images as an input: rays of head and hands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate, Frame
+from voodoo.measurements import ColorImage
+from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.drawing import Canvas, Log
+from voodoo.sensors.body_view import BodyView, StillDepth, body_view
+from voodoo.sensors.pixels import FloatArray
+from voodoo.sensors.skin.tracker import SkinTracker
+from voodoo.tracker import Tracker
+
+SKIN = (80, 255, 255)
+"""Colour in overlays, BGR."""
+SCENE = "scene"
+"""Under this `Memory` keeps what may be the still scene of a depth camera."""
+
+
+class SkinAdapter(Adapter[ColorImage]):
+    """Colour images; `Memory` keeps the skin tracker of each camera under "skin"."""
+
+    kind = "skin"
+    measurement = ColorImage
+    recorded_as = "color"
+    panel = 1
+
+    def content(self, item: ColorImage) -> npt.NDArray[Any]:
+        """The image."""
+        return item.image
+
+    def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
+        """As rays, moved from the picture's time to the frame's."""
+        skin = context.memory.get(self.kind, item.sensor, lambda: SkinTracker(context.settings.skin))
+        # The picture is older or newer than the frame: the ray is moved along with its site.
+        then = context.predictor.predict(item.stamp)
+        view = _body_view(item, then, context)
+        sites = skin.settings.sites if view is not None else ()
+        tracker = context.tracker
+        rays = skin.observe(
+            item.image,
+            item.camera,
+            item.root_from_sensor,
+            then,
+            stamp=item.stamp,
+            body=view,
+            surface=lambda places: _limb_distances(tracker, places),
+            arm_lost=_hands(tracker, sites, "forearm", measured=False),
+            upper_arm_visible=_hands(tracker, sites, "upperarm", measured=True),
+            head_visible=_heads(tracker, sites),
+            source=item.sensor,
+        )
+        context.rays.extend(ray.moved(context.predicted[ray.site] - then[ray.site]) for ray in rays)
+
+    def learn(self, item: ColorImage, estimate: Estimate, memory: Memory, *, vouched: bool) -> None:
+        """Colours and background of the picture."""
+        skin = memory.all(self.kind).get(item.sensor)
+        if skin is not None:
+            # The first frame shows the pose that was set; without it a colour camera alone would never begin.
+            skin.learn(item.image, item.camera, item.root_from_sensor, estimate, vouched=vouched)
+
+    def picture(self, item: ColorImage) -> npt.NDArray[Any]:
+        """The image."""
+        return item.image
+
+    def draw(self, item: ColorImage, canvas: Canvas, memory: Memory) -> None:
+        """Outlines of all skin regions; candidates are dots, the assigned ones are named."""
+        skin = memory.all(self.kind).get(item.sensor)
+        if skin is not None and skin.mask is not None:
+            canvas.regions(
+                item,
+                skin.mask,
+                marks=[candidate.pixel for candidate in skin.candidates],
+                names={site: candidate.pixel for site, candidate in skin.assigned.items()},
+                color=SKIN,
+            )
+
+    def log(self, item: ColorImage, log: Log, memory: Memory) -> None:
+        """The picture with the outlines of the limbs and the skin candidates."""
+        rr, path = log.rr, log.camera(item)
+        log.send(f"{path}/picture", rr.Image(item.image, color_model="BGR").compress(jpeg_quality=80))
+        log.outlines(path, item)
+        skin = memory.all(self.kind).get(item.sensor)
+        if skin is not None:
+            places = [candidate.pixel for candidate in skin.candidates]
+            log.send(f"{path}/picture/skin", rr.Points2D(places, radii=3.0, colors=(0, 255, 255)))
+
+
+def _body_view(item: ColorImage, then: dict[str, FloatArray], context: Context) -> BodyView | None:
+    """What the frame's first depth camera sees of the body, in this picture; None without one."""
+    depth = next(iter(context.depth_images), None)
+    if depth is None:
+        return None
+    return body_view(
+        depth.image,
+        depth_camera=depth.camera,
+        world_from_depth=depth.root_from_sensor,
+        metres_per_unit=depth.metres_per_unit,
+        color_camera=item.camera,
+        world_from_color=item.root_from_sensor,
+        joints=list(then.values()),
+        step=max(depth.camera.width // 200, 1),
+        scene=context.memory.get(SCENE, depth.sensor, StillDepth),
+    )
+
+
+def _hands(tracker: Tracker, sites: Iterable[str], limb: str, *, measured: bool) -> set[str]:
+    """Hands whose forearm or upper arm was, or was not, measured in the last frame."""
+    status = tracker.estimate.limb_status
+    known = {site: status.get(f"{site[:2]}{limb}") for site in sites}
+    return {site for site, value in known.items() if value is not None and (value == "measured") == measured}
+
+
+def _heads(tracker: Tracker, sites: Iterable[str]) -> set[str]:
+    """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
+    measured = tracker.estimate.limb_status.get("head") == "measured"
+    return {site for site in sites if measured and site.startswith("head")}
+
+
+def _limb_distances(tracker: Tracker, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
+    return dict(zip(tracker.estimate.limb_names, tracker.limb_distances(places), strict=True))

@@ -1,0 +1,198 @@
+"""2-D keypoints of any network as measurements: one table of layouts, rays, and robust 3-D points from registered
+depth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Frame
+from voodoo.errors import MeasurementError
+from voodoo.model.camera import Camera
+from voodoo.model.transforms import rigid
+from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.sensors.gating import SiteGate
+from voodoo.sensors.keypoints.sites import MIN_CONFIDENCE, SitePixel, check_confidence, site_pixels
+from voodoo.sensors.keypoints.surface import DepthArray, behind_surface, window_depth
+from voodoo.sensors.model import PixelNoise, SensorModel
+from voodoo.sensors.pixels import checked_camera, in_sensor, ray_distance, world_rays
+from voodoo.sensors.rays import SiteRay, add_rays
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+POINT_SIGMA_M = 0.03
+"""Least standard deviation of a 3-D point from depth: how well `BEHIND_SURFACE_M` is known."""
+
+GUESSED = 0.4
+"""Standard deviation of a site behind so many metres of the person's own body, beyond half a limb: the network guesses it."""
+
+
+@dataclass(frozen=True)
+class KeypointReport:
+    """What became of the keypoints of one image: site names.
+
+    Args:
+        rays: given to the frame as rays.
+        points: given as 3-D points.
+        unseen: keypoints missing or below the least confidence.
+        dropped: too far from where the site was predicted, or outside the lens model.
+    """
+
+    rays: tuple[str, ...] = ()
+    points: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
+    dropped: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class KeypointSensor:
+    """How the keypoints of one camera become measurements.
+
+    Args:
+        layout: name in LAYOUTS.
+        camera: calibration; keypoints are in the pixels of the distorted image.
+        world_from_sensor: (4, 4) pose of the camera's optical frame.
+        noise: pixels to standard deviation; the layout's own spreads apply.
+        model: standard deviation to weight.
+        min_confidence: see site_pixels.
+        source: name for `Estimate.sources`.
+        sites: use only these; None means all the layout has.
+
+    Raises:
+        MeasurementError: an unknown layout or site, no calibration, no rigid pose, or no finite least confidence.
+    """
+
+    layout: str
+    camera: Camera
+    world_from_sensor: FloatArray
+    noise: PixelNoise = field(default_factory=PixelNoise)
+    model: SensorModel = field(default_factory=SensorModel)
+    min_confidence: float = MIN_CONFIDENCE
+    source: str = "keypoints"
+    sites: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Check what does not depend on a picture."""
+        known = [part.site for part in layout_of(self.layout).parts]
+        unknown = sorted(set(self.sites or ()) - set(known))
+        if unknown:
+            raise MeasurementError(f"sites: expected some of {', '.join(known)}, found {', '.join(unknown)}")
+        checked_camera(self.camera)
+        rigid(self.world_from_sensor)
+        check_confidence(self.min_confidence)
+
+    def add(
+        self,
+        frame: Frame,
+        keypoints: npt.ArrayLike,
+        *,
+        predicted: Mapping[str, npt.NDArray[np.float64]],
+        gate: SiteGate | None = None,
+        depth: DepthArray | None = None,
+        metres_per_unit: float = 0.001,
+    ) -> KeypointReport:
+        """Add the keypoints of one person in one image to a frame; for several cameras see `observe`.
+
+        Raises:
+            MeasurementError: wrong shapes, or an unknown layout.
+        """
+        report, rays, points = self.observe(
+            keypoints,
+            stamp=frame.stamp,
+            predicted=predicted,
+            gate=gate,
+            depth=depth,
+            metres_per_unit=metres_per_unit,
+        )
+        add_rays(frame, rays, model=self.model)
+        for site, (position, sigma) in points.items():
+            frame.add_position(site, position, weight=self.model.weight(sigma), source=self.source)
+        return report
+
+    def observe(
+        self,
+        keypoints: npt.ArrayLike,
+        *,
+        stamp: float,
+        predicted: Mapping[str, npt.NDArray[np.float64]],
+        gate: SiteGate | None = None,
+        depth: DepthArray | None = None,
+        metres_per_unit: float = 0.001,
+        before: Mapping[str, float] | None = None,
+    ) -> tuple[KeypointReport, list[SiteRay], dict[str, tuple[FloatArray, float]]]:
+        """What the keypoints of one person say: rays, and with depth points.
+
+        Without depth each site becomes a ray. With a registered depth image (same camera, same size) it becomes a 3-D
+        point: the median depth of the nearest surface in a 5 x 5 window, moved behind the surface by BEHIND_SURFACE_M;
+        where the image has no return, or the point is refused by the gate (the site is hidden), it stays a ray.
+
+        Args:
+            keypoints: (K, 3), see site_pixels.
+            stamp: [s], for the gate.
+            predicted: site name -> (3,) in the world, e.g. `tracker.estimate.joints`; sites not in it are not used.
+            gate: drops what is too far from the prediction; None takes everything.
+            depth: (H, W) uint16 or float32.
+            metres_per_unit: of `depth`.
+            before: site name -> how much of the person's body lies between it and the camera [m], see
+                `voodoo.sensors.occlusion`; None: not known. Networks are as sure of what they guess as of what they see.
+
+        Returns:
+            The report, the rays, and site name -> (position (3,) in the world, standard deviation) [m].
+
+        Raises:
+            MeasurementError: wrong shapes, or an unknown layout.
+        """
+        pose = rigid(self.world_from_sensor)
+        if depth is not None and depth.shape != (self.camera.height, self.camera.width):
+            expected = (self.camera.height, self.camera.width)
+            raise MeasurementError(f"depth: expected the camera's shape {expected}, found {depth.shape}")
+        seen, unseen = site_pixels(keypoints, layout=self.layout, min_confidence=self.min_confidence)
+        seen = [item for item in seen if item.site in predicted and (self.sites is None or item.site in self.sites)]
+        rays: list[SiteRay] = []
+        points: dict[str, tuple[FloatArray, float]] = {}
+        dropped: list[str] = []
+        if not seen:
+            return KeypointReport(unseen=tuple(unseen)), rays, points
+        origin, directions = world_rays(self.camera, pose, [item.pixel for item in seen])
+        sites = np.array([predicted[item.site] for item in seen], dtype=np.float64)
+        depths = in_sensor(pose, sites)[:, 2]
+        usable = np.isfinite(directions).all(axis=1) & (depths > 0.0)
+        off = ray_distance(origin, directions, sites)
+        for item, direction, site, z, away, able in zip(
+            seen, directions, sites, depths.tolist(), off.tolist(), usable.tolist(), strict=True
+        ):
+            if not able:
+                dropped.append(item.site)
+                continue
+            sigma = self._sigma(item, z)
+            if depth is not None:
+                point = self._point(item, direction, pose, depth, metres_per_unit)
+                if point is not None and (gate is None or gate.accepts_point(item.site, site, point, stamp)):
+                    points[item.site] = (point, max(sigma, POINT_SIGMA_M))
+                    continue
+            if gate is None or gate.accepts(item.site, away, stamp, self.source):
+                hidden = (before or {}).get(item.site, 0.0) - behind_surface(item.site)
+                sigma = math.hypot(sigma, GUESSED * max(hidden, 0.0))
+                rays.append(SiteRay(item.site, origin, direction, sigma, self.source))
+            else:
+                dropped.append(item.site)
+        report = KeypointReport(tuple(ray.site for ray in rays), tuple(points), tuple(unseen), tuple(dropped))
+        return report, rays, points
+
+    def _sigma(self, item: SitePixel, z: float) -> float:
+        focal = math.sqrt(self.camera.fx * self.camera.fy)
+        return self.noise.sigma(z, focal, confidence=item.confidence, spread=item.spread)
+
+    def _point(
+        self, item: SitePixel, direction: FloatArray, pose: FloatArray, depth: DepthArray, metres_per_unit: float
+    ) -> FloatArray | None:
+        z = window_depth(depth, item.pixel, metres_per_unit=metres_per_unit)
+        if z is None:
+            return None
+        cosine = float(direction @ pose[:3, 2])
+        return np.asarray(pose[:3, 3] + direction * (z / cosine + behind_surface(item.site)))

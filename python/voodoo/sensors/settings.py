@@ -1,0 +1,84 @@
+"""Which inputs are used, and how much each is believed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from voodoo.errors import MeasurementError
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.keypoints.sites import check_confidence
+from voodoo.sensors.kinds import input_of, inputs
+from voodoo.sensors.model import PLANAR_LASER, POINTS_SHARING, PixelNoise, RangeNoise, SensorModel
+from voodoo.sensors.skin.settings import SkinSettings
+
+LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
+"""Root frames whose z = 0 is the floor (REP-105)."""
+
+
+@dataclass(frozen=True)
+class FrontEndSettings:
+    """What is used, and how much it is believed.
+
+    Args:
+        use: kinds of inputs, by default all there are; measurements of other kinds are left out.
+        model: standard deviation to weight.
+        depth_noise: of depth images and point clouds; the weight is that at the predicted range of the body. None:
+            every point weighs 1, as in the papers (a time-of-flight point at 3 m).
+        scan_noise: of laser scans; None: every return weighs 1.
+        sharing: neighbouring depth pixels that share one error.
+        scan_sharing: the same for a scan, whose beams lie farther apart.
+        keypoint_noise: of 2-D keypoints.
+        min_confidence: keypoints believed less are not used.
+        gate_radius, gate_growth, gate_widest: see SiteGate.
+        agreement: scale [m] of `agreed`; 0 switches it off.
+        marker_sigma: standard deviation [m] of a marker that is given without one.
+        depth_filter: what is dropped from depth images; None takes them as they are.
+        skin: settings of the skin-colour cue.
+        ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
+
+    Raises:
+        MeasurementError: an unknown kind, or no finite least confidence.
+    """
+
+    use: tuple[str, ...] = field(default_factory=inputs)
+    model: SensorModel = field(default_factory=SensorModel)
+    depth_noise: RangeNoise | None = None
+    scan_noise: RangeNoise | None = PLANAR_LASER
+    sharing: float = POINTS_SHARING
+    scan_sharing: float = 4.0
+    keypoint_noise: PixelNoise = field(default_factory=PixelNoise)
+    min_confidence: float = 0.1
+    gate_radius: float = 0.15
+    gate_growth: float = 0.5
+    gate_widest: float = 0.40
+    agreement: float = 0.08
+    marker_sigma: float = 0.02
+    depth_filter: DepthFilter | None = None
+    skin: SkinSettings = field(default_factory=SkinSettings)
+    ground_z: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the kinds, and what would silently let everything in."""
+        check_confidence(self.min_confidence)
+        unknown = sorted(set(self.use) - set(inputs()))
+        if unknown or not self.use:
+            raise MeasurementError(f"use: expected some of {', '.join(inputs())}, found {', '.join(unknown) or 'none'}")
+
+    @classmethod
+    def of(cls, recording: Recording, *, use: Sequence[str] | None = None) -> FrontEndSettings:
+        """The defaults for a recording, with all inputs or those in `use`.
+
+        The floor is known where the root frame is one of LEVEL_FRAMES.
+
+        Raises:
+            MeasurementError: an unknown kind, or kinds of which the recording has none.
+        """
+        settings = cls() if use is None else cls(use=tuple(use))
+        has = {kind for sensor in recording.info().sensors if (kind := input_of(sensor.kind)) is not None}
+        if has and not has & set(settings.use):
+            raise MeasurementError(
+                f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(settings.use)}"
+            )
+        return replace(settings, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)

@@ -1,0 +1,16 @@
+"""Masks of the person in depth and colour pictures, for voodoo.ik."""
+
+from voodoo.sensors.silhouettes.color import Silhouettes, StillBackground
+from voodoo.sensors.silhouettes.depth import StillScene, from_depth
+from voodoo.sensors.silhouettes.masks import filled, without_specks
+from voodoo.sensors.silhouettes.surroundings import surroundings
+
+__all__ = [
+    "Silhouettes",
+    "StillBackground",
+    "StillScene",
+    "filled",
+    "from_depth",
+    "surroundings",
+    "without_specks",
+]

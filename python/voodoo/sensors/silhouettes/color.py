@@ -1,0 +1,153 @@
+"""Silhouettes from static colour cameras by background subtraction: `Silhouettes` learns while it runs, `StillBackground` from
+pictures that are there beforehand, even if the person never leaves the place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import MeasurementError
+from voodoo.sensors.silhouettes.masks import Mask, without_specks
+
+ByteImage: TypeAlias = npt.NDArray[np.uint8]
+
+_SMOOTH_PX = 1.5
+_INPAINT_PX = 5
+
+
+class Silhouettes:
+    """What moves in front of a background that does not, for one camera that stands still.
+
+    A mixture of Gaussians for each pixel (Zivkovic 2004, OpenCV's MOG2) learns the background; shadows do not count,
+    specks are removed and holes closed. A person who stands still for `seconds` starts to become background, unless
+    `learn` is False.
+
+    Args:
+        rate_hz: pictures a second.
+        seconds: memory of the background [s].
+        smallest: regions of less area are specks [px].
+
+    Raises:
+        MeasurementError: a number that is not above zero.
+    """
+
+    def __init__(self, *, rate_hz: float = 30.0, seconds: float = 20.0, smallest: int = 100) -> None:
+        """Start without a background."""
+        if not (rate_hz > 0.0 and seconds > 0.0 and smallest > 0):
+            raise MeasurementError(
+                f"silhouettes: expected numbers > 0, found rate {rate_hz!r}, seconds {seconds!r}, smallest {smallest!r}"
+            )
+        self._model = cv2.createBackgroundSubtractorMOG2(
+            history=max(round(rate_hz * seconds), 2), varThreshold=25.0, detectShadows=True
+        )
+        self._smallest = smallest
+        self._shape: tuple[int, ...] | None = None
+
+    def apply(self, image: ByteImage, *, learn: bool = True) -> Mask:
+        """(H, W): True where something stands in front of the background.
+
+        Args:
+            image: (H, W, 3) BGR uint8.
+            learn: take the picture up into the background; False once the person is there and the background known.
+
+        Raises:
+            MeasurementError: another type, or another size than before.
+        """
+        _check(image, self._shape)
+        self._shape = image.shape
+        moving = (np.asarray(self._model.apply(image, learningRate=-1.0 if learn else 0.0)) == 255).astype(np.uint8)
+        return _large(np.asarray(cv2.medianBlur(moving, 5), dtype=np.uint8), self._smallest)
+
+
+class StillBackground:
+    """What a camera that stands still sees behind the person: in each pixel the median colour of those pictures in which the
+    person cannot be there. Where that is never the case (`unknown`) the background around is continued (Telea 2004).
+
+    Args:
+        pictures: some tens spread over a recording, (H, W, 3) BGR uint8.
+        occupied: for each picture, (H, W) where the person may be; None: anywhere, so that the person must leave every place in
+            more than half of the pictures.
+        threshold: least difference of the foreground in any colour, 0 to 255, or
+        chroma: in colour alone, whatever the light (CIE 1976 a*, b*): skin in the shade is as dark as a dark floor, but redder.
+        smallest: regions of less area are specks [px].
+
+    Raises:
+        MeasurementError: no picture, pictures or masks of different sizes, a number that cannot be used, or a person who may be
+            everywhere in all pictures.
+    """
+
+    def __init__(
+        self,
+        pictures: Sequence[ByteImage],
+        *,
+        occupied: Sequence[Mask] | None = None,
+        threshold: float = 30.0,
+        chroma: float = 8.0,
+        smallest: int = 100,
+    ) -> None:
+        """Learn the background; see the class."""
+        if not pictures:
+            raise MeasurementError("pictures: expected some, found none")
+        if not (0.0 < threshold < 255.0 and chroma > 0.0 and smallest > 0):
+            raise MeasurementError(
+                f"background: expected threshold 0 to 255, chroma and smallest > 0, found {threshold!r}, {chroma!r}, "
+                f"{smallest!r}"
+            )
+        for picture in pictures:
+            _check(picture, pictures[0].shape)
+        if occupied is not None and [mask.shape for mask in occupied] != [picture.shape[:2] for picture in pictures]:
+            raise MeasurementError(f"occupied: expected {len(pictures)} masks of the pictures' size, found others")
+        stack = np.stack([_smooth(picture) for picture in pictures]).astype(np.float32)
+        if occupied is not None:
+            stack[np.stack(occupied)] = np.nan
+        # Sorting puts NaN last, so the median of what is left is in the middle of the valid ones.
+        free = np.isfinite(stack[..., 0]).sum(axis=0)
+        middle = np.maximum(free - 1, 0) // 2
+        median = np.take_along_axis(np.sort(stack, axis=0), middle[None, ..., None], axis=0)[0]
+        self.unknown: Mask = np.asarray(free == 0, dtype=bool)
+        if self.unknown.all():
+            raise MeasurementError("occupied: expected pixels where the person is not in some picture, found none")
+        hidden = self.unknown.astype(np.uint8)
+        self._background = cv2.inpaint(np.nan_to_num(median).astype(np.uint8), hidden, _INPAINT_PX, cv2.INPAINT_TELEA)
+        self._colours = _colours(np.asarray(self._background, dtype=np.uint8))
+        self._shape, self._threshold, self._chroma, self._smallest = pictures[0].shape, threshold, chroma, smallest
+
+    def mask(self, picture: ByteImage) -> Mask:
+        """(H, W): True where the picture differs from the background.
+
+        Raises:
+            MeasurementError: another type or size than the background's.
+        """
+        _check(picture, self._shape)
+        smooth = _smooth(picture)
+        differs = cv2.absdiff(smooth, self._background).max(axis=2) > self._threshold
+        # A low threshold: smoothing carries vivid colours a pixel beyond their border.
+        colourful = np.linalg.norm(_colours(smooth) - self._colours, axis=2) > self._chroma
+        differs |= cv2.erode(colourful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
+        return _large(differs.astype(np.uint8), self._smallest)
+
+
+def _check(image: ByteImage, shape: tuple[int, ...] | None) -> None:
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise MeasurementError(f"image: expected (H, W, 3) uint8, found {image.dtype} of {image.shape}")
+    if shape is not None and image.shape != shape:
+        raise MeasurementError(f"image: expected {shape} as before, found {image.shape}")
+
+
+def _smooth(picture: ByteImage) -> ByteImage:
+    return np.asarray(cv2.GaussianBlur(picture, (0, 0), _SMOOTH_PX), dtype=np.uint8)
+
+
+def _colours(picture: ByteImage) -> npt.NDArray[np.float32]:
+    """(H, W, 2): a* and b* of CIE 1976, without the lightness."""
+    return cv2.cvtColor(picture.astype(np.float32) / np.float32(255.0), cv2.COLOR_BGR2LAB)[..., 1:]
+
+
+def _large(mask: ByteImage, smallest: int) -> Mask:
+    """What is large enough of a mask, small gaps closed."""
+    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
+    return without_specks(np.asarray(closed != 0, dtype=bool), smallest=smallest)

@@ -1,0 +1,129 @@
+"""Masks of the person in depth pictures, for voodoo.ik: what hangs together with the known sites, and what stands before the
+still scene near them. Those of colour pictures are in voodoo.sensors.silhouettes.color."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import MeasurementError
+from voodoo.measurements import DepthImage
+from voodoo.model.projection import CameraView
+from voodoo.sensors.depth import depth_points, metres
+from voodoo.sensors.silhouettes.masks import Mask, filled, without_specks
+from voodoo.sensors.silhouettes.sites import known_place
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+_STEP = 0.03
+"""Two neighbours whose depths differ by more than this share lie on different things."""
+_FLOOR_M = 0.05
+_IN_FRONT_M, _BEHIND_M = 0.30, 0.05
+"""A body's surface lies in front of its joints: depths around a known site that belong to the person."""
+_REACH_M = 0.6
+"""No elbow or knee is farther from a known shoulder, hand, hip or ankle, girth included."""
+_BEFORE = (0.04, 0.012)
+"""What stands before the scene is nearer by this: metres, and share of the depth (three deviations of a structured-light camera
+at 4 m)."""
+_SPECK_PX = 30
+
+
+class StillScene:
+    """How far a depth camera that stands still sees without the person: in each pixel what it saw farthest away."""
+
+    def __init__(self, images: Sequence[DepthImage]) -> None:
+        """Learn the scene from images spread over a recording, some tens.
+
+        Raises:
+            MeasurementError: no image, or images of different sizes.
+        """
+        if not images or len({image.image.shape for image in images}) != 1:
+            raise MeasurementError(f"images: expected some of one size, found {len(images)}")
+        depths = np.sort(np.stack([metres(image) for image in images]), axis=0)  # NaN comes last
+        last = np.isfinite(depths).sum(axis=0)[None] - 1
+        # The farthest but one, since one alone may be an error; then the middle of what lies as deep.
+        deep = np.take_along_axis(depths, np.maximum(last - 1, 0), axis=0)
+        with np.errstate(invalid="ignore"):
+            first = (depths < _nearest_of(deep)).sum(axis=0)[None]
+        self._depth = np.take_along_axis(depths, np.maximum((first + last) // 2, 0), axis=0)[0]
+
+    def before(self, z: FloatArray) -> Mask:
+        """Where depths (height, width) [m] lie before the scene.
+
+        Raises:
+            MeasurementError: another size.
+        """
+        if z.shape != self._depth.shape:
+            raise MeasurementError(f"depth: expected shape {self._depth.shape} as learnt, found {z.shape}")
+        with np.errstate(invalid="ignore"):
+            return np.asarray(z < _nearest_of(self._depth), dtype=bool)
+
+
+def from_depth(
+    depth: DepthImage, known: Mapping[str, FloatArray], *, scene: StillScene | None = None, level: bool = True
+) -> Mask:
+    """The person in a depth image: all that hangs together in depth with a known site.
+
+    With a scene also what stands before it within 0.6 m of a known site, so that a leg behind the other one is not lost; and
+    nothing of the scene farther from all of them, if the person touches it.
+
+    Args:
+        depth: the image.
+        known: positions (3,) [m] of sites of the person in the root frame; none of the others is used.
+        scene: the still scene behind the person.
+        level: z is up and 0 on the floor in the root frame: what is lower than 5 cm is floor.
+
+    Returns:
+        (height, width); all false when no known site is seen.
+
+    Raises:
+        MeasurementError: a position is not three finite numbers, or the scene has another size.
+    """
+    height, width = depth.image.shape
+    places = {site: known_place(site, position) for site, position in known.items()}
+    points, valid = depth_points(depth)
+    solid = valid & (points[:, 2] > _FLOOR_M) if level else valid
+    z = np.where(solid.reshape(height, width), metres(depth), np.nan)
+    view = CameraView(depth.camera, depth.root_from_sensor)
+    seeds = []
+    for place in places.values():
+        pixel, distance = view.project(place[None])
+        if not np.isfinite(pixel).all():
+            continue
+        u, v = np.rint(pixel[0]).astype(int)
+        if 0 <= u < width and 0 <= v < height and distance[0] - _IN_FRONT_M <= z[v, u] <= distance[0] + _BEHIND_M:
+            seeds.append((int(u), int(v)))
+    mask = _connected(z, seeds)
+    if scene is not None and seeds:
+        before = scene.before(z)
+        near = np.zeros(len(points), dtype=bool)
+        for place in places.values():
+            with np.errstate(invalid="ignore"):
+                near |= np.square(points - place).sum(axis=1) < _REACH_M**2
+        close = near.reshape(height, width)
+        mask = (mask & (before | close)) | (before & close)
+    return filled(without_specks(mask & np.isfinite(z), smallest=_SPECK_PX))
+
+
+def _nearest_of(scene: FloatArray) -> FloatArray:
+    """Depths [m] from which on a return belongs to a scene at depths [m]."""
+    return np.asarray(scene - _BEFORE[0] - _BEFORE[1] * scene)
+
+
+def _connected(z: FloatArray, seeds: Sequence[tuple[int, int]]) -> Mask:
+    """All (height, width) that hangs together with the pixels (u, v) of the seeds in depths (height, width) [m]."""
+    height, width = z.shape
+    # A share of the depth is a difference of its logarithm.
+    logarithm = np.log(np.where(np.isfinite(z), z, 1.0)).astype(np.float32)
+    reached = np.zeros((height + 2, width + 2), dtype=np.uint8)
+    reached[1:-1, 1:-1] = ~np.isfinite(z)
+    step = float(np.log1p(_STEP))
+    for u, v in seeds:
+        if reached[v + 1, u + 1] == 0:
+            flags = 4 | (2 << 8) | cv2.FLOODFILL_MASK_ONLY
+            cv2.floodFill(logarithm, reached, (u, v), 0.0, loDiff=(step,), upDiff=(step,), flags=flags)
+    return np.asarray(reached[1:-1, 1:-1] == 2, dtype=bool)

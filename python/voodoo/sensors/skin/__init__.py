@@ -1,0 +1,6 @@
+"""Skin colour as a cue for head and hands."""
+
+from voodoo.sensors.skin.settings import SkinSettings
+from voodoo.sensors.skin.tracker import SkinTracker
+
+__all__ = ["SkinSettings", "SkinTracker"]

@@ -1,0 +1,65 @@
+"""What a depth camera should see of a posed body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+import voodoo._core as _core
+from voodoo.model.body import Body, ordered_poses
+from voodoo.model.camera import Camera
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RenderedDepth:
+    """A predicted depth image.
+
+    Attributes:
+        depth: (height, width) float32, along the optical axis [m]; 0 where no limb is seen.
+        limb: (height, width) int16, index into `limb_names` of the limb that is seen; -1 where none is.
+        limb_names: names of the body's limbs.
+    """
+
+    depth: npt.NDArray[np.float32]
+    limb: npt.NDArray[np.int16]
+    limb_names: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Size, pixels that show the body, and limbs seen."""
+        seen = self.limb[self.limb >= 0]
+        height, width = self.depth.shape
+        return f"RenderedDepth({width}x{height}, {seen.size} pixels of {len(np.unique(seen))} limbs)"
+
+
+def render_depth(
+    body: Body,
+    world_from_limb: Mapping[str, npt.ArrayLike],
+    *,
+    camera: Camera,
+    world_from_sensor: npt.ArrayLike | None = None,
+) -> RenderedDepth:
+    """The depth image that a camera should see of a body: for every pixel the nearest limb on its ray.
+
+    Args:
+        body: its shapes; `tracker.body` has the current sizes.
+        world_from_limb: pose of every limb, rigid (4, 4), as in `Estimate.world_from_limb`.
+        camera: where pixels look; lens distortion is honoured.
+        world_from_sensor: pose of the camera's optical frame, rigid (4, 4); identity by default.
+
+    Raises:
+        BodyError: a limb is missing or unknown.
+        MeasurementError: a matrix is not rigid.
+    """
+    depth, limb = _core.render_depth(
+        body.core,
+        ordered_poses(body, world_from_limb),
+        width=camera.width,
+        height=camera.height,
+        intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
+        rays=camera.rays() if camera.distorted else None,
+        world_from_sensor=None if world_from_sensor is None else np.asarray(world_from_sensor, dtype=np.float64),
+    )
+    return RenderedDepth(depth, limb, body.limb_names)

@@ -1,0 +1,1 @@
+"""Pictures, films and Rerun: what the tracker sees and finds."""

@@ -1,0 +1,86 @@
+"""The body drawn into a picture: shaded limbs, joints and sites."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate, TaperedEllipticCylinder
+from voodoo.model.body import Body
+from voodoo.model.projection import View, limb_outline, limb_rings, transform
+from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, FloatArray, Picture, fixed, point, side_color
+
+_OPACITY = 0.62
+_FACETS = 64
+
+
+def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View) -> None:
+    """Draw limbs as shaded, half transparent solids with outlines, far ones first, then joints and sites."""
+    limbs = []
+    for limb in body.limbs:
+        root_from_limb = np.asarray(estimate.world_from_limb[limb.name], dtype=np.float64)
+        outline = limb_outline(limb.shape, root_from_limb, view)
+        if outline is not None:
+            centre = transform(root_from_limb, np.array([[0.0, 0.0, limb.shape.length / 2.0]]))
+            limbs.append((float(view.project(centre)[1][0]), limb, root_from_limb, outline))
+    layer, covered = picture.copy(), np.zeros(picture.shape[:2], dtype=np.uint8)
+    for _, limb, root_from_limb, outline in sorted(limbs, key=lambda item: -item[0]):
+        _draw_solid(layer, limb.shape, root_from_limb, view, side_color(limb.name))
+        border = fixed(outline)
+        cv2.polylines(layer, [border], True, PAPER, 1, cv2.LINE_AA, SUBPIXEL)
+        cv2.fillConvexPoly(covered, border, 255, cv2.LINE_8, SUBPIXEL)
+    inside = covered > 0
+    mixed = cv2.addWeighted(layer, _OPACITY, picture, 1.0 - _OPACITY, 0.0)
+    picture[inside] = mixed[inside]
+    for _, limb, _, outline in limbs:
+        cv2.polylines(picture, [fixed(outline)], True, side_color(limb.name), 1, cv2.LINE_AA, SUBPIXEL)
+    _draw_sites(picture, estimate, view)
+
+
+def _draw_solid(
+    layer: Picture,
+    shape: TaperedEllipticCylinder,
+    root_from_limb: FloatArray,
+    view: View,
+    color: tuple[int, int, int],
+) -> None:
+    """Fill the facets of a limb that face the viewer, brighter the more they do."""
+    rings = transform(root_from_limb, limb_rings(shape, samples=_FACETS))
+    pixels, depths = view.project(rings.reshape(-1, 3))
+    points = np.column_stack([pixels, depths]).reshape(2, _FACETS, 3)
+    following = np.roll(points, -1, axis=1)
+    sides = np.stack([points[0], points[1], following[1], following[0]], axis=1)[..., :2]
+    caps = np.stack([points[0], points[1][::-1]])[..., :2]
+    axis = transform(root_from_limb, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, shape.length]]))
+    middle = axis.mean(axis=0)
+    corners = np.concatenate([rings, np.roll(rings, -1, axis=1)])
+    normals = corners.mean(axis=0) - middle
+    normals -= np.outer(normals @ (axis[1] - axis[0]), axis[1] - axis[0]) / max(shape.length**2, 1e-12)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    # A light at the viewer: how far a normal points to the viewer is how far a small step along it reduces the depth.
+    step = 1e-3
+    towards = (view.project(middle[None])[1] - view.project(middle + step * normals)[1]) / step
+    lights = 0.35 + 0.65 * np.clip(towards, 0.0, 1.0)
+    for facets, shades in ((sides, lights), (caps, np.full(2, 0.8))):
+        # The others are seen from behind.
+        for facet, light in zip(fixed(facets[_ahead(facets)]), shades[_ahead(facets)].tolist(), strict=True):
+            cv2.fillConvexPoly(layer, facet, tuple(light * channel for channel in color), cv2.LINE_8, SUBPIXEL)
+
+
+def _ahead(facets: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which polygons (K, N, 2) in pixels run clockwise, and so face the viewer."""
+    x, y = facets[..., 0], facets[..., 1]
+    return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) > 0.0)
+
+
+def _draw_sites(picture: Picture, estimate: Estimate, view: View) -> None:
+    """Draw every joint and site as a dot with a dark rim."""
+    pixels, _ = view.project(np.array(list(estimate.joints.values()), dtype=np.float64))
+    radius = max(3, round(picture.shape[0] / 160))
+    for name, pixel in zip(estimate.joints, pixels, strict=True):
+        if np.isfinite(pixel).all() and np.abs(pixel).max() < 1e5:
+            centre = point(pixel)
+            cv2.circle(picture, centre, (radius + 2) << SUBPIXEL, PAPER, -1, cv2.LINE_AA, SUBPIXEL)
+            cv2.circle(picture, centre, (radius + 1) << SUBPIXEL, side_color(name), -1, cv2.LINE_AA, SUBPIXEL)
+            cv2.circle(picture, centre, (radius - 1) << SUBPIXEL, INK, -1, cv2.LINE_AA, SUBPIXEL)

@@ -1,0 +1,112 @@
+"""The picture that adapters draw their measurements on: of one camera, or from above."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate
+from voodoo.model.projection import View
+from voodoo.sensors.adapters.drawing import Pictured
+from voodoo.sensors.rays import SiteRay
+from voodoo.visualization.ink import RAY, SUBPIXEL, Color, FloatArray, Picture, point
+
+_RAY_HALF_M = 0.20
+
+
+@dataclass(frozen=True, eq=False)
+class OverlayCanvas:
+    """See `voodoo.sensors.adapters.Canvas`.
+
+    What lies in space is drawn at once; what belongs to the picture (rings, regions) waits for `finish`, so that rays do not
+    hide it.
+
+    Args:
+        picture: is drawn on.
+        view: projects the root frame into it.
+        camera: the measurement whose picture this is; None: a view from above.
+        scale: enlargement of the picture over the camera's image.
+    """
+
+    picture: Picture
+    view: View
+    camera: Pictured | None = None
+    scale: float = 1.0
+    _rings: list[tuple[FloatArray, FloatArray, Color]] = field(default_factory=list)
+    _regions: dict[str, tuple[npt.NDArray[np.bool_], FloatArray, Mapping[str, FloatArray], Color]] = field(
+        default_factory=dict
+    )
+
+    def dots(self, points_root: FloatArray, *, color: Color, radius: int) -> None:
+        """See Canvas."""
+        pixels, _ = self.view.project(points_root)
+        height, width = self.picture.shape[:2]
+        with np.errstate(invalid="ignore"):
+            visible = ((pixels >= 0.0) & (pixels < (width, height))).all(axis=1)
+        for pixel in pixels[visible]:
+            cv2.circle(self.picture, point(pixel), radius << SUBPIXEL, color, -1, cv2.LINE_AA, SUBPIXEL)
+
+    def rings(self, item: Pictured, pixels: FloatArray, strengths: FloatArray, *, color: Color) -> None:
+        """See Canvas."""
+        if self.camera is not None and same_place(item, self.camera):
+            self._rings.append((pixels, strengths, color))
+
+    def regions(
+        self,
+        item: Pictured,
+        mask: npt.NDArray[np.bool_],
+        *,
+        marks: Sequence[tuple[float, float]],
+        names: Mapping[str, tuple[float, float]],
+        color: Color,
+    ) -> None:
+        """See Canvas."""
+        if self.camera is not None and item.sensor == self.camera.sensor:
+            places = np.array(marks, dtype=np.float64).reshape(-1, 2)
+            self._regions[item.sensor] = (mask, places, {name: np.array(pixel) for name, pixel in names.items()}, color)
+
+    def rays(self, rays: Sequence[SiteRay], estimate: Estimate) -> None:
+        """Draw the part of each ray that passes its site, 20 cm to either side, with a cross where it is nearest."""
+        for ray in rays:
+            reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)
+            along = ray.origin + np.outer((reach - _RAY_HALF_M, reach, reach + _RAY_HALF_M), ray.direction)
+            pixels, _ = self.view.project(along)
+            if not (np.isfinite(pixels).all() and np.abs(pixels).max() < 1e5):
+                continue
+            start, middle, end = (point(pixel) for pixel in pixels)
+            cv2.line(self.picture, start, end, RAY, 1, cv2.LINE_AA, SUBPIXEL)
+            centre = tuple(value >> SUBPIXEL for value in middle)
+            cv2.drawMarker(self.picture, (centre[0], centre[1]), RAY, cv2.MARKER_TILTED_CROSS, 11, 1, cv2.LINE_AA)
+
+    def finish(self) -> None:
+        """Draw what belongs to the picture itself."""
+        for pixels, strengths, color in self._rings:
+            for pixel, confidence in zip(pixels, strengths, strict=True):
+                strength = 0.3 + 0.7 * min(float(confidence), 1.0)
+                ring = tuple(strength * channel for channel in color)
+                centre = point((pixel + 0.5) * self.scale)
+                cv2.circle(self.picture, centre, 4 << SUBPIXEL, ring, 2, cv2.LINE_AA, SUBPIXEL)
+        for mask, marks, names, color in self._regions.values():
+            self._draw_regions(mask, marks, names, color)
+
+    def _draw_regions(
+        self, mask: npt.NDArray[np.bool_], marks: FloatArray, names: Mapping[str, FloatArray], color: Color
+    ) -> None:
+        contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        outlines = [np.round((contour + 0.5) * self.scale).astype(np.int32) for contour in contours]
+        cv2.polylines(self.picture, outlines, True, color, 1, cv2.LINE_AA)
+        for mark in marks:
+            cv2.circle(self.picture, point((mark + 0.5) * self.scale), 3 << SUBPIXEL, color, -1, 0, SUBPIXEL)
+        for name, pixel in names.items():
+            u, v = (pixel * self.scale).astype(int)
+            place = (int(u) + 8, int(v) - 8)
+            cv2.putText(self.picture, name, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, color, 1, cv2.LINE_AA)
+
+
+def same_place(item: Pictured, other: Pictured) -> bool:
+    """Whether two measurements are of the same camera, or of two alike at one place."""
+    return item.camera == other.camera and np.allclose(item.root_from_sensor, other.root_from_sensor)

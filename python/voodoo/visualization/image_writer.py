@@ -1,0 +1,93 @@
+"""Where overlay pictures go: a folder of PNG files or an .mp4."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+
+from voodoo.errors import VoodooError
+from voodoo.visualization.ink import Picture
+
+
+class PictureWriter:
+    """Writes pictures of one size to DIR/frame_000000.png, ... or into an .mp4; use it in a `with` block.
+
+    Args:
+        path: ends in .mp4 for a film; otherwise a folder, made when it is missing.
+        rate_hz: frames a second of the film.
+
+    Raises:
+        VoodooError: another suffix that names a film or picture, or a file that cannot be written.
+    """
+
+    def __init__(self, path: Path, *, rate_hz: float) -> None:
+        """Refuse names that cannot be meant, make the folder."""
+        if path.suffix.lower() in (".avi", ".mkv", ".mov", ".webm", ".gif", ".png", ".jpg"):
+            raise VoodooError(f"{path}: expected a folder or a name that ends in .mp4, found {path.suffix!r}")
+        self._path = path
+        self._rate_hz = rate_hz
+        self._is_film = path.suffix.lower() == ".mp4"
+        self._film: cv2.VideoWriter | None = None
+        self._count = 0
+        folder = path.parent if self._is_film else path
+        if folder.exists() and not folder.is_dir():
+            raise VoodooError(f"{folder}: expected a folder, found a file")
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def write(self, picture: Picture) -> None:
+        """Add a picture.
+
+        Raises:
+            VoodooError: it could not be written.
+        """
+        if self._is_film:
+            if self._film is None:
+                self._film = self._open(picture)
+            self._film.write(picture)
+        else:
+            file = self._path / f"frame_{self._count:06d}.png"
+            save_picture(file, picture)
+        self._count += 1
+
+    def __enter__(self) -> PictureWriter:
+        """Nothing is opened before the first picture."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Finish the film and, when all went well, check that it can be read back."""
+        if self._film is not None:
+            self._film.release()
+            if error is None:
+                self._check()
+
+    def _open(self, picture: Picture) -> cv2.VideoWriter:
+        height, width = picture.shape[:2]
+        film = cv2.VideoWriter(str(self._path), cv2.VideoWriter.fourcc(*"mp4v"), self._rate_hz, (width, height))
+        if not film.isOpened():
+            raise VoodooError(f"{self._path}: expected a file that can be written as MPEG-4, found that OpenCV cannot")
+        return film
+
+    def _check(self) -> None:
+        film = cv2.VideoCapture(str(self._path))
+        try:
+            count = int(film.get(cv2.CAP_PROP_FRAME_COUNT)) if film.isOpened() else 0
+            readable, _ = film.read()
+        finally:
+            film.release()
+        if count != self._count or not readable:
+            raise VoodooError(f"{self._path}: expected a film of {self._count} pictures, found {count} readable ones")
+
+
+def save_picture(path: Path, picture: Picture) -> None:
+    """Write one picture in the format its name says.
+
+    Raises:
+        VoodooError: it could not be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(path), picture):
+        raise VoodooError(f"{path}: expected a file that can be written, found that OpenCV cannot")

@@ -1,0 +1,37 @@
+"""What all pictures share: their type, colours, and pixel coordinates as OpenCV draws them."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Picture: TypeAlias = npt.NDArray[np.uint8]
+"""(H, W, 3) BGR."""
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+Color: TypeAlias = tuple[int, int, int]
+"""BGR."""
+
+INK, PAPER = (250, 250, 250), (24, 20, 18)
+LEFT, RIGHT, MIDDLE = (235, 170, 60), (60, 140, 250), (190, 205, 190)
+"""Blue, orange, grey."""
+RAY = (120, 255, 60)
+SUBPIXEL = 4
+"""Bits of a pixel's fraction in OpenCV's fixed-point numbers."""
+
+
+def fixed(pixels: npt.NDArray[np.floating]) -> npt.NDArray[np.int32]:
+    """Pixel coordinates as OpenCV's fixed-point numbers."""
+    return np.round(pixels * (1 << SUBPIXEL)).astype(np.int32)
+
+
+def point(pixel: npt.NDArray[np.floating]) -> tuple[int, int]:
+    """One pixel (2,) as OpenCV's fixed-point numbers."""
+    x, y = (int(value) for value in fixed(pixel))
+    return x, y
+
+
+def side_color(name: str) -> Color:
+    """Blue for the person's left, orange for the right, grey for the middle."""
+    return LEFT if name.startswith("l_") else RIGHT if name.startswith("r_") else MIDDLE

@@ -1,0 +1,163 @@
+"""Pictures to look at: limbs, joints and measured points drawn over what the sensor saw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate
+from voodoo.measurements import RecordedFrame
+from voodoo.model.body import Body
+from voodoo.model.projection import Axes, CameraView, TopView
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.adapters import Memory, adapter_of
+from voodoo.sensors.adapters.drawing import Pictured
+from voodoo.visualization.body_drawing import draw_body
+from voodoo.visualization.canvas import OverlayCanvas, same_place
+from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Picture, point
+from voodoo.visualization.sheet import contact_sheet, side_by_side
+
+__all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
+
+_STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250)}
+_LOOK_AHEAD, _MOST_PANELS = 5, 4
+_TARGET_HEIGHT = 640
+_TOP_SIZE, _TOP_METRES = 720, 6.0
+
+
+class Overlay:
+    """Draws the frames of one recording, all of them with the same colours for the same depth.
+
+    Args:
+        recording: gives the number of frames and the root frame.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        """Look at the first frames for the cameras: every picture of a film has the same size."""
+        self._frames = len(recording)
+        self._axes: Axes = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
+        self._range: tuple[float, float] | None = None
+        self._origin: float | None = None
+        found: dict[str, Pictured] = {}
+        for recorded in islice(paired(recording), _LOOK_AHEAD):
+            for item in _pictured(recorded):
+                own = adapter_of(item).panel_of_its_own
+                if item.sensor not in found and (own or not any(same_place(item, other) for other in found.values())):
+                    found[item.sensor] = item
+        self._panels = dict(sorted(found.items(), key=lambda pair: adapter_of(pair[1]).panel or 0)[:_MOST_PANELS])
+
+    def draw(
+        self,
+        recorded: RecordedFrame,
+        body: Body,
+        estimate: Estimate,
+        *,
+        index: int,
+        front_end: FrontEnd | None = None,
+    ) -> Picture:
+        """Draw one frame over the picture of each camera, side by side, else as seen from above.
+
+        Args:
+            recorded: the measurements.
+            body: with the sizes it had in this frame.
+            estimate: the pose.
+            index: number of the frame, from 0, for the caption.
+            front_end: gives the rays and skin regions of the frame.
+        """
+        current = {item.sensor: item for item in _pictured(recorded)}
+        pictures: list[Picture] = []
+        for sensor, first in self._panels.items():
+            scale = _scale(first)
+            seen = self._background(current.get(sensor), first)
+            resized = cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+            item = current.get(sensor, first)
+            view = CameraView(item.camera, item.root_from_sensor, scale)
+            canvas = OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
+            pictures.append(_drawn(canvas, recorded, body, estimate, front_end))
+        if not pictures:
+            joints = np.array(list(estimate.joints.values()))
+            x, y, z = (float(value) for value in np.median(joints, axis=0))
+            top = TopView((x, y, z), _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
+            pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, body, estimate, front_end))
+        picture = side_by_side(pictures)
+        self._origin = estimate.stamp if self._origin is None else self._origin
+        caption(picture, f"{index + 1}/{self._frames}   {estimate.stamp - self._origin:.2f} s", estimate)
+        return picture
+
+    def _background(self, item: Pictured | None, first: Pictured) -> Picture:
+        """What the camera saw; dark paper when it saw nothing new, or only its keypoints are known."""
+        seen = None if item is None else adapter_of(item).picture(item)
+        if seen is None:
+            return np.full((first.camera.height, first.camera.width, 3), PAPER, dtype=np.uint8)
+        return np.array(seen) if seen.ndim == 3 else self._depth_picture(seen)
+
+    def _depth_picture(self, metres: npt.NDArray[np.float32]) -> Picture:
+        """Depth as colour: near is bright; nothing measured is dark."""
+        seen = np.isfinite(metres) & (metres > 0.0)
+        if self._range is None and seen.any():
+            near, far = np.percentile(metres[seen], [1.0, 97.0])
+            self._range = float(near) - 0.3, float(far) + 0.6
+        near, far = self._range or (0.5, 5.0)
+        level = np.where(seen, 1.0 - np.clip((metres - near) / (far - near), 0.0, 1.0), 0.0)
+        tone = (40.0 + 190.0 * level**1.3).astype(np.uint8)
+        picture = np.asarray(cv2.applyColorMap(tone, cv2.COLORMAP_BONE), dtype=np.uint8)
+        picture[~seen] = PAPER
+        return picture
+
+
+def _pictured(recorded: RecordedFrame) -> Sequence[Pictured]:
+    return [item for item in recorded.measurements if adapter_of(item).panel is not None]  # type: ignore[misc]
+
+
+def _drawn(
+    canvas: OverlayCanvas, recorded: RecordedFrame, body: Body, estimate: Estimate, front_end: FrontEnd | None
+) -> Picture:
+    draw_body(canvas.picture, body, estimate, canvas.view)
+    memory = Memory() if front_end is None else front_end.memory
+    for item in recorded.measurements:
+        adapter_of(item).draw(item, canvas, memory)
+    if front_end is not None:
+        canvas.rays(front_end.rays, estimate)
+    canvas.finish()
+    return canvas.picture
+
+
+def caption(picture: Picture, text: str, estimate: Estimate) -> None:
+    """Write frame number, status and residual into the top left corner."""
+    size = picture.shape[0] / 1100.0
+    status = str(estimate.status)
+    parts = [(text, INK), (status, _STATUS.get(status, INK)), (f"{1e3 * estimate.residual:.0f} mm", INK)]
+    x, y = round(22 * size), round(42 * size)
+    for part, color in parts:
+        for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):  # a dark rim keeps it legible over bright depth
+            cv2.putText(picture, part, (x + dx, y + dy), cv2.FONT_HERSHEY_DUPLEX, size, PAPER, 1, cv2.LINE_AA)
+        cv2.putText(picture, part, (x, y), cv2.FONT_HERSHEY_DUPLEX, size, color, 1, cv2.LINE_AA)
+        x += cv2.getTextSize(part, cv2.FONT_HERSHEY_DUPLEX, size, 1)[0][0] + round(28 * size)
+
+
+def _scale(item: Pictured) -> float:
+    """Small pictures are enlarged by a whole number, large ones reduced to the same height."""
+    height = item.camera.height
+    return float(-(-_TARGET_HEIGHT // height)) if height <= _TARGET_HEIGHT else _TARGET_HEIGHT / height
+
+
+def _grid(view: TopView) -> Picture:
+    """Dark paper with a line every metre."""
+    picture = np.full((view.size, view.size, 3), PAPER, dtype=np.uint8)
+    half = view.size * view.metres_per_pixel / 2.0
+    centre = np.array(view.centre)
+    horizontal = (0, 1) if view.axes == "rep103" else (0, 2)
+    for along, across in (horizontal, horizontal[::-1]):
+        for value in np.arange(np.ceil(centre[along] - half), centre[along] + half):
+            ends = np.repeat(centre[None], 2, axis=0)
+            ends[:, along] = value
+            ends[:, across] += (-half, half)
+            a, b = (point(pixel) for pixel in view.project(ends)[0])
+            cv2.line(picture, a, b, (62, 56, 52), 1, cv2.LINE_AA, SUBPIXEL)
+    return picture

@@ -1,0 +1,179 @@
+"""See what the tracker sees: measurements, limbs, rays, pictures and curves on one timeline, in Rerun.
+
+Rerun is an optional extra: `pip install voodoo[view]`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import Any
+
+import numpy as np
+
+from voodoo._core import Estimate, TaperedEllipticCylinder
+from voodoo.errors import VoodooError
+from voodoo.measurements import RecordedFrame
+from voodoo.model.body import Body
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.sensors.adapters import Memory, adapter_of
+from voodoo.visualization.body_geometry import bands, limb_colours, limb_mesh
+from voodoo.visualization.rerun_log import StepLog, entity
+
+_MOST_POINTS = 40_000
+_EPOCH_S = 1e9
+
+
+class Viewer:
+    """Writes what happens in a step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
+
+    Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/bands`, `world/points/<source>` (coloured by
+    the limb they lie on), `world/laser/<source>`, `world/markers/<source>`, `world/rays`, `world/cameras/<source>`
+    (pictures with the outlines of the projected limbs, skin candidates and keypoints; in depth images the person's
+    silhouette, limb by limb), `plots/...`; the timeline is `time`.
+
+    Args:
+        save: .rrd file to write; None opens the viewer.
+        name: of the recording, shown in the viewer.
+
+    Raises:
+        VoodooError: Rerun is not installed, another suffix, or a viewer that cannot open here.
+        OSError: the file cannot be written.
+    """
+
+    def __init__(self, *, save: str | Path | None = None, name: str = "voodoo") -> None:
+        """Open the file or the viewer."""
+        self._rr = _rerun()
+        if save is not None and Path(save).suffix != ".rrd":
+            raise VoodooError(f"{save}: expected a name that ends in .rrd, found {Path(save).suffix!r}")
+        self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None)
+        self._stream.send_recording_name(name)
+        if save is None:
+            self._open()
+        else:
+            Path(save).parent.mkdir(parents=True, exist_ok=True)
+            self._stream.save(str(save))
+        self._classes: tuple[str, ...] = ()
+        self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._shapes: dict[str, TaperedEllipticCylinder] = {}
+
+    def _open(self) -> None:
+        """Start the viewer; without a screen it would end unseen."""
+        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise VoodooError(
+                "view: expected a screen to open the viewer on, found none; --save FILE.rrd writes a file"
+            )
+        try:
+            self._stream.spawn()
+        except (RuntimeError, OSError) as error:
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+            raise VoodooError(f"view: the viewer did not start ({reason}); --save FILE.rrd writes a file") from error
+
+    def __enter__(self) -> Viewer:
+        """The viewer itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Finish the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Write what is still held back, and close the file."""
+        self._stream.flush()
+        self._stream.disconnect()
+
+    def log(
+        self,
+        estimate: Estimate,
+        body: Body,
+        *,
+        recorded: RecordedFrame | None = None,
+        front_end: FrontEnd | None = None,
+        seconds: float | None = None,
+    ) -> None:
+        """Show one step.
+
+        Args:
+            estimate: of the step.
+            body: with its current sizes (`Tracker.body`).
+            recorded: the measurements.
+            front_end: gives the rays and skin candidates of the step.
+            seconds: time the step took.
+        """
+        # Stamps of a robot count from 1970, those of other recordings from their start.
+        clock = "timestamp" if estimate.stamp > _EPOCH_S else "duration"
+        self._stream.set_time("time", **{clock: estimate.stamp})
+        self._log_body(estimate, body)
+        memory = Memory() if front_end is None else front_end.memory
+        log = StepLog(self._rr, self._stream, estimate, body, _MOST_POINTS)
+        for item in () if recorded is None else recorded.measurements:
+            adapter_of(item).log(item, log, memory)
+        if front_end is not None:
+            self._log_rays(front_end, estimate)
+        self._log_plots(estimate, seconds)
+
+    def _log_body(self, estimate: Estimate, body: Body) -> None:
+        rr, colours = self._rr, limb_colours(body)
+        if self._classes != body.limb_names:
+            # Names and colours of the silhouette's values; 0 is the background.
+            self._classes = body.limb_names
+            rows = [(0, "background", (0, 0, 0, 0))]
+            rows += [(index, name, (*colours[name], 255)) for index, name in enumerate(self._classes, start=1)]
+            self._stream.log("world", rr.AnnotationContext(rows), static=True)
+        for limb in body.limbs:
+            path = f"world/body/limbs/{limb.name}"
+            if self._shapes.get(limb.name) != limb.shape:
+                self._shapes[limb.name] = limb.shape
+                vertices, triangles, normals = limb_mesh(limb.shape)
+                self._stream.log(
+                    path,
+                    rr.Mesh3D(
+                        vertex_positions=vertices,
+                        triangle_indices=triangles,
+                        vertex_normals=normals,
+                        albedo_factor=(*colours[limb.name], 150),
+                    ),
+                )
+            pose = estimate.world_from_limb[limb.name]
+            self._stream.log(path, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+        self._stream.log(
+            "world/body/joints",
+            rr.Points3D(estimate.joint_positions, radii=0.012, labels=list(estimate.joint_names), show_labels=False),
+        )
+        self._stream.log("world/body/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
+
+    def _log_rays(self, front_end: FrontEnd, estimate: Estimate) -> None:
+        strips, colours, labels = [], [], []
+        for ray in front_end.rays:
+            reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)
+            strips.append(np.array([ray.origin, ray.origin + ray.direction * (reach + 0.3)]))
+            colours.append((0, 255, 120, round(60 + 195 * ray.trust)))
+            labels.append(f"{ray.site} ({ray.source})")
+        self._stream.log(
+            "world/rays", self._rr.LineStrips3D(strips, radii=0.004, colors=colours, labels=labels, show_labels=False)
+        )
+
+    def _log_plots(self, estimate: Estimate, seconds: float | None) -> None:
+        values: dict[str, float] = {"residual_mm": 1e3 * estimate.residual, "steps": float(estimate.steps)}
+        if seconds is not None:
+            values["step_ms"] = 1e3 * seconds
+        for source, (given, matched, residual) in estimate.sources.items():
+            values[f"sources/{entity(source)}/given"] = float(given)
+            values[f"sources/{entity(source)}/matched"] = float(matched)
+            values[f"sources/{entity(source)}/residual_mm"] = 1e3 * residual
+        for name, value in values.items():
+            if np.isfinite(value):
+                self._stream.log(f"plots/{name}", self._rr.Scalars(value))
+        self._stream.log("plots/status", self._rr.TextLog(estimate.status))
+
+
+def _rerun() -> ModuleType:
+    try:
+        import rerun
+    except ImportError as error:
+        raise VoodooError("the viewer needs Rerun, which is not installed: pip install voodoo[view]") from error
+    return rerun

@@ -1,0 +1,49 @@
+"""Several pictures in one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from voodoo.visualization.ink import INK, Picture
+
+
+def side_by_side(pictures: Sequence[Picture]) -> Picture:
+    """Pictures in a row, all as high as the first one."""
+    height = pictures[0].shape[0]
+    row = [
+        picture
+        if picture.shape[0] == height
+        else cv2.resize(
+            picture,
+            (round(picture.shape[1] * height / picture.shape[0]), height),
+            interpolation=cv2.INTER_AREA,
+        )
+        for picture in pictures
+    ]
+    return np.asarray(np.hstack(row), dtype=np.uint8)
+
+
+def contact_sheet(pictures: Sequence[Picture], *, columns: int, width: int = 1600, gap: int = 6) -> Picture:
+    """Pictures of one size side by side, row by row.
+
+    Args:
+        pictures: at least one.
+        columns: how many in a row.
+        width: of the sheet [px].
+        gap: between the pictures [px].
+    """
+    columns = min(columns, len(pictures))
+    rows = -(-len(pictures) // columns)
+    cell = (width - (columns - 1) * gap) // columns
+    height = round(pictures[0].shape[0] * cell / pictures[0].shape[1])
+    sheet = np.full((rows * height + (rows - 1) * gap, width, 3), INK, dtype=np.uint8)
+    for index, picture in enumerate(pictures):
+        row, column = divmod(index, columns)
+        top, left = row * (height + gap), column * (cell + gap)
+        sheet[top : top + height, left : left + cell] = cv2.resize(
+            picture, (cell, height), interpolation=cv2.INTER_AREA
+        )
+    return sheet
