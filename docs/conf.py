@@ -19,7 +19,7 @@ myst_enable_extensions = ["colon_fence", "deflist"]
 
 html_theme = "furo"
 html_title = f"voodoo {release}"
-smartquotes = False  # it would make a dash of the two hyphens of an option
+smartquotes_action = "D"  # dashes; quotes stay as they are written
 html_copy_source = False
 html_theme_options = {"navigation_with_keys": True}
 
@@ -28,6 +28,8 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike"}
+toc_object_entries_show_parents = "hide"
 python_maximum_signature_line_length = 88
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
@@ -35,4 +37,9 @@ napoleon_use_rtype = False
 
 # Every name that looks like ours has to resolve; types of other packages are not linked.
 nitpicky = True
-nitpick_ignore_regex = [("py:.*", r"(?!voodoo\.).*"), ("py:.*", r"voodoo\._core\..*")]
+nitpick_ignore_regex = [
+    ("py:.*", r"(?!voodoo\.).*"),
+    ("py:.*", r"voodoo\._core\..*"),
+    ("py:.*", r"voodoo\..*\.[A-Z]"),  # type variables
+    ("py:.*", r"voodoo\.sensors\.skin\.tracker\..*"),  # what a front end keeps for itself
+]

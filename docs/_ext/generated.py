@@ -6,6 +6,7 @@ A page says where by a line of its own, `% generated: NAME`; the line is replace
 from __future__ import annotations
 
 import re
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from voodoo.cli import app as command_line_app
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
+WIDTH = 80
 ROOT = Path(__file__).resolve().parents[2]
 MARK = re.compile(r"^% generated: (\S+)$", re.MULTILINE)
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((?!https?:|#)([^)]*)\)")
@@ -37,7 +39,7 @@ def _command(name: str, command: Any) -> list[str]:  # noqa: ANN401 - a class of
     lines = [f"## voodoo {name}", "", "```text", " ".join(usage.split()), "```", "", *_prose(command.help), ""]
     for item in [*arguments, *options]:
         words = [item.metavar or item.name.upper()] if item in arguments else [_spelling(item)]
-        lines += [f"`{words[0]}`", f": {_plain(item.help)}{_default(item)}", ""]
+        lines += [f"`{words[0]}`", f": {_marked(_plain(item.help))}{_default(item)}", ""]
     return lines
 
 
@@ -70,8 +72,22 @@ def _prose(text: str | None) -> list[str]:
         if words in ("Example", "Examples"):
             code = True
             continue
-        lines += ["```sh", words, "```", ""] if code else [words, ""]
+        lines += ["```sh", *_broken(words), "```", ""] if code else [_marked(words), ""]
     return lines
+
+
+def _broken(line: str) -> list[str]:
+    """A shell line that fits the page: a long one goes on before an option."""
+    lines = textwrap.wrap(
+        line.replace(" --", "\0--").replace(" ", "\1").replace("\0", " "), WIDTH, subsequent_indent="    "
+    )
+    lines = [part.replace("\1", " ") for part in lines]
+    return [f"{part} \\" for part in lines[:-1]] + lines[-1:]
+
+
+def _marked(text: str) -> str:
+    """Options in the text as code."""
+    return re.sub(r"(?<![\w`-])(--[a-z][\w-]*)(?!`)", r"`\1`", text)
 
 
 def _plain(text: str | None) -> str:
@@ -88,7 +104,11 @@ def configuration() -> str:
             continue
         words = [line.removeprefix("#").strip() for line in entry[1].strip().splitlines()]
         facts = words.pop().strip("()") if words[-1].startswith("(") else ""
-        lines += [f"`{entry[2]} = {entry[3]}`", f": {' '.join(words)}" + (f" {facts.capitalize()}." if facts else ""), ""]
+        lines += [
+            f"`{entry[2]} = {entry[3]}`",
+            f": {' '.join(words)}" + (f" {facts.capitalize()}." if facts else ""),
+            "",
+        ]
     return "\n".join(lines)
 
 
