@@ -288,8 +288,8 @@ def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path
 def test_a_depth_range_is_two_distances(run):
     assert_one_line(run("track", "bag", "--depth-range", "far"), 1, "depth-range: expected NEAR,FAR", "'far'")
     assert_one_line(run("track", "bag", "--depth-range", "5,1"), 1, "0 <= nearest < farthest")
-    assert common.depth_filter_of(None) is None
-    assert common.depth_filter_of("0.5, 4") == DepthFilter(nearest=0.5, farthest=4.0)
+    assert running.depth_filter_of(None) is None
+    assert running.depth_filter_of("0.5, 4") == DepthFilter(nearest=0.5, farthest=4.0)
     run.recording = FakeRecording(frames=3)
     result = run("track", "bag", "--depth-range", "0.5,4")
     assert result.exit_code == 0, result.output

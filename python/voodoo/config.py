@@ -1,15 +1,18 @@
-"""The parameters of the tracker: one schema, defined in the core, validated and documented here."""
+"""The parameters of the tracker: one schema, defined in the core, validated and documented here.
+
+Editors and type checkers see its fields in _config_fields.pyi, which scripts/config_stub.py makes from the same schema.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 import voodoo._core as _core
 from voodoo.errors import ConfigError
-from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.model.toml_io import commented, edited, parse_toml, read_text
 
 _FIELDS = {name: row for name, *row in _core.config_fields()}
 
@@ -43,11 +46,17 @@ def _message(what: str, error: ValidationError) -> str:
     return f"{what}: " + "; ".join(problems)
 
 
-_entries: Any = {name: (_annotation(row[2], row[3], row[4]), row[2]) for name, row in _FIELDS.items()}
-_Model: Any = create_model("_Model", __base__=_Base, **_entries)
+if TYPE_CHECKING:
+    from voodoo._config_fields import ConfigFields
+else:
+    ConfigFields = create_model(
+        "ConfigFields",
+        __base__=_Base,
+        **{name: (_annotation(row[2], row[3], row[4]), row[2]) for name, row in _FIELDS.items()},
+    )
 
 
-class Config(_Model):  # type: ignore[misc] # made from the table of the core
+class Config(ConfigFields, frozen=True):
     """Frozen parameters of a tracker, given by keyword; `Config().to_toml()` explains every one.
 
     Raises:
@@ -68,22 +77,29 @@ class Config(_Model):  # type: ignore[misc] # made from the table of the core
         """A configuration from a TOML file."""
         return cls.from_toml(read_text(path, error=ConfigError), source=str(path))
 
-    def to_toml(self) -> str:
-        """The configuration as TOML, each entry with its meaning, unit and range."""
-        lines = ["# Configuration of the voodoo tracker. Lengths in metres, times in seconds, angles in radians.", ""]
+    def to_toml(self, *, edit: str | None = None) -> str:
+        """The configuration as TOML, each entry with its meaning, unit and range.
+
+        Args:
+            edit: a configuration in TOML whose comments, order and layout are kept: only values that differ are changed, and
+                only entries that are not at their defaults are added.
+
+        Raises:
+            ConfigError: `edit` is not TOML.
+        """
+        if edit is not None:
+            defaults = type(self)().values()
+            return edited(edit, self.values(), defaults=defaults, source="edit", error=ConfigError)
+        notes = {}
         for name, (doc, unit, _, limits, words) in _FIELDS.items():
-            lines += [f"# {line}" for line in doc.splitlines()]
             facts = [f"unit: {unit}"] if unit else []
             if limits:
                 facts.append(f"range: {limits[0]:g} to {limits[1]:g}")
             if words:
                 facts.append("one of: " + ", ".join(words))
-            if facts:
-                lines.append(f"# ({'; '.join(facts)})")
-            value = getattr(self, name)
-            text = f'"{value}"' if isinstance(value, str) else str(value).lower()
-            lines += [f"{name} = {text}", ""]
-        return "\n".join(lines)
+            notes[name] = [*doc.splitlines(), *([f"({'; '.join(facts)})"] if facts else [])]
+        title = "Configuration of the voodoo tracker. Lengths in metres, times in seconds, angles in radians."
+        return commented(self.values(), title=title, notes=notes)
 
     @classmethod
     def words(cls, key: str) -> tuple[str, ...]:

@@ -8,12 +8,13 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from voodoo.config import Config
 from voodoo.evaluation.evaluate import evaluate_all
-from voodoo.evaluation.summary import Summary, summarize
 from voodoo.evaluation.score import Score
-from voodoo.names import INPUTS, HumanModel
+from voodoo.evaluation.summary import Summary, summarize
+from voodoo.names import HumanModel
 
 UNCHANGED = "as configured"
 # Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty weighs nothing.
@@ -62,7 +63,7 @@ class Ablation:
 def variants(base: Config) -> list[Variant]:
     """`base` itself, then every change of one entry: each switch turned over, each other solver, and each
     influence of a certain strength at none."""
-    values = base.values()
+    values: dict[str, Any] = dict(base.values())
     changes: list[tuple[str, bool | str | float]] = [
         (key, not value) for key, value in values.items() if isinstance(value, bool)
     ]
@@ -78,7 +79,7 @@ def ablate(
     config: Config | None = None,
     loader: str | None = None,
     model: HumanModel = "full",
-    use: Sequence[str] = INPUTS,
+    use: Sequence[str] | None = None,
     jobs: int = 1,
 ) -> Iterator[Ablation]:
     """Evaluate `paths` with every variant of `config`, one after another; each is yielded when it is done.

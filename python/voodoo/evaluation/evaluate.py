@@ -22,7 +22,7 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
-from voodoo.names import INPUTS, HumanModel
+from voodoo.names import HumanModel
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings.loaders import open_recording
@@ -48,9 +48,9 @@ def evaluate(
     config: Config | None = None,
     loader: str | None = None,
     model: HumanModel = "full",
-    use: Sequence[str] = INPUTS,
+    use: Sequence[str] | None = None,
 ) -> tuple[Score, FrameTable]:
-    """Track a recording from its own start and measure the result; `use` says from which of its inputs, see INPUTS.
+    """Track a recording from its own start and measure the result; `use` says from which of its inputs, None: all.
 
     Raises:
         VoodooError: it cannot be read, has no start, or a frame was refused.
@@ -108,7 +108,7 @@ def evaluate_all(
     config_file: Path | None = None,
     loader: str | None = None,
     model: HumanModel = "full",
-    use: Sequence[str] = INPUTS,
+    use: Sequence[str] | None = None,
     jobs: int = 1,
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
     """Evaluate recordings in parallel processes; (index in `paths`, score, frames) as each is done, in any order.
@@ -116,7 +116,14 @@ def evaluate_all(
     A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
     """
     tasks = [
-        (str(path), None if config_file is None else str(config_file), loader, model, tuple(use)) for path in paths
+        (
+            str(path),
+            None if config_file is None else str(config_file),
+            loader,
+            model,
+            None if use is None else tuple(use),
+        )
+        for path in paths
     ]
     if jobs == 1 or len(tasks) == 1:
         for index, task in enumerate(tasks):
@@ -141,7 +148,7 @@ def _one_thread() -> None:
 
 
 def _task(
-    path: str, config_file: str | None, loader: str | None, model: HumanModel, use: Sequence[str]
+    path: str, config_file: str | None, loader: str | None, model: HumanModel, use: Sequence[str] | None
 ) -> tuple[Score, FrameTable | None]:
     try:
         config = None if config_file is None else Config.load(config_file)

@@ -2,115 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, MeasurementError
-from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.model.body_toml import body_text, core_body
+from voodoo.model.joint import Joint, Place, short
+from voodoo.model.toml_io import read_text
+from voodoo.names import HumanModel
 
-_Number = Annotated[float, Field(allow_inf_nan=False)]
-_Vector = tuple[_Number, _Number, _Number]
-_Range = tuple[_Number, _Number]
-_ZERO = (0.0, 0.0, 0.0)
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class _ShapeSpec(_Strict):
-    length: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-    a0: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-    b0: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-    a1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-    b1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-
-
-class _Part(_Strict):
-    """What callers make themselves: what is wrong with it is a BodyError."""
-
-    if not TYPE_CHECKING:  # to type checkers the fields are the arguments
-
-        def __init__(self, **values: Any) -> None:  # noqa: ANN401 - checked here
-            try:
-                super().__init__(**values)
-            except ValidationError as error:
-                raise BodyError(f"{type(self).__name__}: {_problems(values, error)}") from None
-
-        # Not called for a part of a larger whole, whose error names the key from the top.
-        __init__.__pydantic_base_init__ = True
-
-
-class Place(_Part):
-    """Where a joint's ellipse is on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame.
-
-    Raises:
-        BodyError: not three finite numbers each.
-    """
-
-    position: _Vector = _ZERO
-    rotation: _Vector = _ZERO
-
-
-class Joint(_Part):
-    """An elastic-band joint of a limb to its parent (K07 section 4).
-
-    Attributes:
-        name: usually that of the site at its centre.
-        on_parent: the joint's ellipse in the parent's frame, e.g. `voodoo.Place(position=(0.0, 0.0, 0.2))`.
-        on_limb: the same in the limb's own frame; with the joint at rest the two coincide.
-        semi_axes: semi-axes of the ellipse along the joint frame's x and y [m]: (0, 0) universal, one positive: hinge
-            about that axis, both positive: elliptic.
-        weight: strength relative to the other joints of a limb.
-        limits: least and greatest value of each component of the joint's rotation vector [rad]; None: free.
-        motion: standard deviation of the joint's unexpected turn in 1/30 s [rad].
-
-    Raises:
-        BodyError: an entry that is missing, unknown or no such number.
-    """
-
-    name: str
-    on_parent: Place = Place()
-    on_limb: Place = Place()
-    semi_axes: tuple[_Number, _Number] = (0.0, 0.0)
-    weight: _Number = 1.0
-    limits: tuple[_Range, _Range, _Range] | None = None
-    motion: _Number = 0.3
-
-    def parts(self) -> tuple[Any, ...]:
-        """The joint as the core takes it."""
-        places = [(place.position, place.rotation) for place in (self.on_parent, self.on_limb)]
-        return (self.name, *places, self.semi_axes, self.weight, self.limits, self.motion)
-
-
-class _LimbSpec(_Strict):
-    name: str
-    parent: str | None = None
-    shape: _ShapeSpec
-    joint: Joint | None = None
-    match_caps: tuple[bool, bool] = (False, True)
-
-
-class _SiteSpec(_Strict):
-    name: str
-    limb: str
-    position: _Vector
-
-
-class _BodySpec(_Strict):
-    name: str
-    limbs: list[_LimbSpec]
-    sites: list[_SiteSpec] = []
+__all__ = ["Body", "Joint", "Limb", "Place", "checked_joints", "ordered_poses"]
 
 
 @dataclass(frozen=True)
@@ -147,7 +55,7 @@ class Body:
         return tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height: float = 1.75, *, model: Literal["papers", "full"] = "full") -> Body:
+    def human(cls, height: float = 1.75, *, model: HumanModel = "full") -> Body:
         """The default human.
 
         Args:
@@ -166,25 +74,7 @@ class Body:
         Raises:
             BodyError: it names the key, what was expected and what was found.
         """
-        values = parse_toml(text, source=source, error=BodyError)
-        try:
-            spec = _BodySpec.model_validate(values)
-        except ValidationError as error:
-            raise BodyError(f"{source}: {_problems(values, error)}") from None
-        limbs = []
-        for limb in spec.limbs:
-            shape = limb.shape
-            try:
-                cylinder = TaperedEllipticCylinder(shape.length, shape.a0, shape.b0, shape.a1, shape.b1)
-            except BodyError as error:
-                raise BodyError(f"{source}: limbs.{limb.name}.shape: {error}") from None
-            joint = None if limb.joint is None else limb.joint.parts()
-            limbs.append((limb.name, limb.parent, cylinder, joint, limb.match_caps))
-        sites = [(site.name, site.limb, site.position) for site in spec.sites]
-        try:
-            return cls(_core.Body(spec.name, limbs, sites))
-        except BodyError as error:
-            raise BodyError(f"{source}: {error}") from None
+        return cls(core_body(text, source=source))
 
     @classmethod
     def load(cls, path: str | Path) -> Body:
@@ -197,25 +87,7 @@ class Body:
 
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
-        name, limbs, sites = self._core.parts()
-        lines = [f"name = {_text(name)}"]
-        for limb, parent, shape, joint, match_caps in limbs:
-            lines += ["", "[[limbs]]", f"name = {_text(limb)}"]
-            lines += [f"parent = {_text(parent)}"] if parent is not None else []
-            sizes = {key: getattr(shape, key) for key in ("length", "a0", "b0", "a1", "b1")}
-            lines.append("shape = { " + ", ".join(f"{key} = {_number(value)}" for key, value in sizes.items()) + " }")
-            lines.append(f"match_caps = [{', '.join(str(flag).lower() for flag in match_caps)}]")
-            if joint is not None:
-                joint_name, on_parent, on_limb, semi_axes, weight, limits, motion = joint
-                lines += ["[limbs.joint]", f"name = {_text(joint_name)}", f"on_parent = {_place(on_parent)}"]
-                lines += [f"on_limb = {_place(on_limb)}", f"semi_axes = {_vector(semi_axes)}"]
-                lines += [f"weight = {_number(weight)}", f"motion = {_number(motion)}"]
-                if limits is not None:
-                    lines.append(f"limits = [{', '.join(_vector(pair) for pair in limits)}]")
-        for site, limb, position in sites:
-            lines += ["", "[[sites]]", f"name = {_text(site)}", f"limb = {_text(limb)}"]
-            lines.append(f"position = {_vector(position)}")
-        return "\n".join(lines) + "\n"
+        return body_text(self._core)
 
     def __reduce__(self) -> tuple[type[Body], tuple[_core.Body]]:
         """Pickles and copies have the same bits."""
@@ -275,48 +147,6 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
         try:
             poses.append(np.asarray(world_from_limb[name], dtype=np.float64))
         except (TypeError, ValueError):
-            found = _short(world_from_limb[name])
+            found = short(world_from_limb[name])
             raise MeasurementError(f"world_from_limb[{name}]: expected a rigid 4x4 transform, found {found}") from None
     return poses
-
-
-def _problems(values: dict[str, Any], error: ValidationError) -> str:
-    def key(location: tuple[str | int, ...]) -> str:
-        parts: list[str] = []
-        node: object = values
-        for part in location:
-            node = _child(node, part)
-            name = node.get("name") if isinstance(part, int) and isinstance(node, dict) else None
-            parts.append(str(name if isinstance(name, str) else part))
-        return ".".join(parts)
-
-    found = [f"{key(item['loc'])}: {item['msg'].lower()}, found {_short(item['input'])}" for item in error.errors()]
-    return "; ".join(found)
-
-
-def _child(node: object, part: str | int) -> object:
-    if isinstance(node, dict):
-        return node.get(part)
-    return node[part] if isinstance(node, list) and isinstance(part, int) and part < len(node) else None
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) < 80 else text[:77] + "..."
-
-
-def _text(value: str) -> str:
-    """A TOML string; JSON's escapes are TOML's, but for DEL, which TOML wants escaped."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _number(value: float) -> str:
-    return repr(round(value, 9) + 0.0)
-
-
-def _vector(values: Sequence[float]) -> str:
-    return "[" + ", ".join(_number(value) for value in values) + "]"
-
-
-def _place(place: tuple[Sequence[float], Sequence[float]]) -> str:
-    return f"{{ position = {_vector(place[0])}, rotation = {_vector(place[1])} }}"

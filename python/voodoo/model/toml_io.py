@@ -1,8 +1,9 @@
-"""Reading TOML with one clear error, of the caller's kind."""
+"""TOML: read with one clear error of the caller's kind, written by tomlkit, which keeps comments."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,3 +44,43 @@ def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
         return Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as cause:
         raise error(f"{path}: expected a readable TOML file, found: {cause}") from None
+
+
+def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequence[str]]) -> str:
+    """Entries as TOML, each below the lines of its note."""
+    import tomlkit
+
+    document = tomlkit.document()
+    document.add(tomlkit.comment(title))
+    document.add(tomlkit.nl())
+    for name, value in values.items():
+        for line in notes.get(name, ()):
+            document.add(tomlkit.comment(line))
+        document.add(name, value)
+        document.add(tomlkit.nl())
+    return tomlkit.dumps(document).rstrip("\n") + "\n"
+
+
+def edited(
+    text: str, values: Mapping[str, Any], *, defaults: Mapping[str, Any], source: str, error: type[VoodooError]
+) -> str:
+    """A TOML text with other values at its top level; comments, order and layout stay.
+
+    Args:
+        text: the TOML.
+        values: by key; keys that the text has not are added at its end, unless they are at their defaults.
+        defaults: of the keys.
+        source: where the text comes from, for the message.
+        error: what to raise.
+
+    Raises:
+        VoodooError: of the class `error`, see `parse_toml`.
+    """
+    import tomlkit
+
+    before = parse_toml(text, source=source, error=error)
+    document = tomlkit.parse(text)
+    for key, value in values.items():
+        if before[key] != value if key in before else value != defaults[key]:
+            document[key] = value
+    return tomlkit.dumps(document)

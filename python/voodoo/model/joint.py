@@ -1,0 +1,105 @@
+"""Joints of a body and where they are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from voodoo.errors import BodyError
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Vector = tuple[Number, Number, Number]
+Range = tuple[Number, Number]
+_ZERO = (0.0, 0.0, 0.0)
+
+
+class Strict(BaseModel):
+    """Frozen, and without entries that nobody knows."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _Part(Strict):
+    """What callers make themselves: what is wrong with it is a BodyError."""
+
+    if not TYPE_CHECKING:  # to type checkers the fields are the arguments
+
+        def __init__(self, **values: Any) -> None:  # noqa: ANN401 - checked here
+            try:
+                super().__init__(**values)
+            except ValidationError as error:
+                raise BodyError(f"{type(self).__name__}: {problems(values, error)}") from None
+
+        # Not called for a part of a larger whole, whose error names the key from the top.
+        __init__.__pydantic_base_init__ = True
+
+
+class Place(_Part):
+    """Where a joint's ellipse is on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame.
+
+    Raises:
+        BodyError: not three finite numbers each.
+    """
+
+    position: Vector = _ZERO
+    rotation: Vector = _ZERO
+
+
+class Joint(_Part):
+    """An elastic-band joint of a limb to its parent (K07 section 4).
+
+    Attributes:
+        name: usually that of the site at its centre.
+        on_parent: the joint's ellipse in the parent's frame, e.g. `voodoo.Place(position=(0.0, 0.0, 0.2))`.
+        on_limb: the same in the limb's own frame; with the joint at rest the two coincide.
+        semi_axes: semi-axes of the ellipse along the joint frame's x and y [m]: (0, 0) universal, one positive: hinge
+            about that axis, both positive: elliptic.
+        weight: strength relative to the other joints of a limb.
+        limits: least and greatest value of each component of the joint's rotation vector [rad]; None: free.
+        motion: standard deviation of the joint's unexpected turn in 1/30 s [rad].
+
+    Raises:
+        BodyError: an entry that is missing, unknown or no such number.
+    """
+
+    name: str
+    on_parent: Place = Place()
+    on_limb: Place = Place()
+    semi_axes: tuple[Number, Number] = (0.0, 0.0)
+    weight: Number = 1.0
+    limits: tuple[Range, Range, Range] | None = None
+    motion: Number = 0.3
+
+    def parts(self) -> tuple[Any, ...]:
+        """The joint as the core takes it."""
+        places = [(place.position, place.rotation) for place in (self.on_parent, self.on_limb)]
+        return (self.name, *places, self.semi_axes, self.weight, self.limits, self.motion)
+
+
+def problems(values: dict[str, Any], error: ValidationError) -> str:
+    """What pydantic complains about, each by its key; parts of lists by their names."""
+
+    def key(location: tuple[str | int, ...]) -> str:
+        parts: list[str] = []
+        node: object = values
+        for part in location:
+            node = _child(node, part)
+            name = node.get("name") if isinstance(part, int) and isinstance(node, dict) else None
+            parts.append(str(name if isinstance(name, str) else part))
+        return ".".join(parts)
+
+    found = [f"{key(item['loc'])}: {item['msg'].lower()}, found {short(item['input'])}" for item in error.errors()]
+    return "; ".join(found)
+
+
+def _child(node: object, part: str | int) -> object:
+    if isinstance(node, dict):
+        return node.get(part)
+    return node[part] if isinstance(node, list) and isinstance(part, int) and part < len(node) else None
+
+
+def short(value: object) -> str:
+    """A value as it is shown in a message."""
+    text = repr(value)
+    return text if len(text) < 80 else text[:77] + "..."
