@@ -137,8 +137,17 @@ def escape(_app: Sphinx, _what: str, _name: str, _object: object, _options: obje
     lines[:] = [re.sub(r"(`[^`]*`)|\|", lambda found: found[1] or r"\|", line) for line in lines]
 
 
+def plain_types(
+    _app: Sphinx, _what: str, _name: str, _object: object, _options: object, signature: str | None, result: str | None
+) -> tuple[str | None, str | None]:
+    """An alias within another type by its name alone."""
+    alias = re.compile(r"TypeAliasForwardRef\('([\w.]+)'\)")
+    return signature and alias.sub(r"\1", signature), result and alias.sub(r"\1", result)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register with Sphinx."""
     app.connect("source-read", fill)
     app.connect("autodoc-process-docstring", escape)
+    app.connect("autodoc-process-signature", plain_types)
     return {"parallel_read_safe": True}
