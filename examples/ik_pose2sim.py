@@ -136,6 +136,6 @@ def read(video: Path, camera: voodoo.Camera) -> tuple[list[np.ndarray], voodoo.C
 
 
 def stature(truth: Truth) -> float:
-    """Height [m] of a person with these legs, see Winter's share in voodoo.silhouettes."""
+    """Height [m] of a person with these legs, see Winter's share in voodoo.sensors.silhouettes."""
     lengths = limb_lengths(truth)
     return float(np.mean([np.median(lengths[f"{s}_knee"].sum(axis=1)) for s in "lr"]) / 0.491)

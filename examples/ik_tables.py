@@ -22,7 +22,7 @@ from ik_pose2sim import Trial, four_cameras
 
 import voodoo
 from voodoo import ik
-from voodoo.model.projection import CameraView, silhouette
+from voodoo.model.projection import CameraView, body_mask
 from voodoo.recordings import DepthImage
 from voodoo.sensors.depth import metres
 from voodoo.sensors.silhouettes.depth import StillScene, from_depth
@@ -89,7 +89,7 @@ def rendered(path: Path) -> Rendered:
         estimate = tracker.reset_pose(limbs_along(joints, estimate))
         pose = side_pose(joints["humanoid_root"])
         view = CameraView(SIDE_CAMERA, pose)
-        mask = silhouette(tracker.body, estimate, view, width=SIDE_CAMERA.width, height=SIDE_CAMERA.height).astype(
+        mask = body_mask(tracker.body, estimate, view, width=SIDE_CAMERA.width, height=SIDE_CAMERA.height).astype(
             np.uint8
         )
         # The model's limbs leave cracks at neck and shoulders that no person has.

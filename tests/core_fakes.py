@@ -7,7 +7,7 @@ import numpy as np
 
 from voodoo.errors import VoodooError
 from voodoo.model.camera import Camera
-from voodoo.model.projection import CameraView, silhouette
+from voodoo.model.projection import CameraView, body_mask
 from voodoo.recordings import DepthImage, LaserScan, RecordedFrame, Recording, RecordingInfo, Reference
 
 BONES = {
@@ -170,7 +170,7 @@ BASE_FROM_CAMERA = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 
 def depth_of(joints, stamp=0.0):
     """The body as a flat depth image at its mean distance, nothing around it."""
     body, estimate = pose(joints)
-    mask = silhouette(body, estimate, CameraView(CAMERA, BASE_FROM_CAMERA), width=80, height=60)
+    mask = body_mask(body, estimate, CameraView(CAMERA, BASE_FROM_CAMERA), width=80, height=60)
     millimetres = round(1000.0 * float(np.mean([position[0] for position in joints.values()])))
     image = np.where(mask, millimetres, 0).astype(np.uint16)
     return DepthImage("depth", stamp, image, 0.001, CAMERA, BASE_FROM_CAMERA)

@@ -14,7 +14,7 @@ from voodoo.evaluation.report import markdown, summarize, write_reports
 from voodoo.evaluation.score import Score
 from voodoo.evaluation.search import find_recordings
 from voodoo.export.track import Track
-from voodoo.model.projection import CameraView, silhouette
+from voodoo.model.projection import CameraView, body_mask
 from voodoo.recordings import RecordedFrame
 from voodoo.sensors.depth import depth_points
 
@@ -205,7 +205,7 @@ def test_silhouette_has_the_area_of_a_cylinder_seen_from_the_side():
     camera = replace(CAMERA, width=800, height=600, fx=600.0, fy=600.0, cx=399.5, cy=299.5)
     far = {"torso": estimate.world_from_limb["torso"].copy()}
     far["torso"][0, 3] = 30.0  # far away, perspective does not matter
-    mask = silhouette(
+    mask = body_mask(
         only_torso, replace(estimate, world_from_limb=far), CameraView(camera, BASE_FROM_CAMERA), width=800, height=600
     )
     widths = mask.sum(axis=1)[mask.any(axis=1)]

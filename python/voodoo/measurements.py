@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -169,7 +169,18 @@ class MarkerSet:
         return f"MarkerSet({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.positions)} sites)"
 
 
-Measurement: TypeAlias = DepthImage | PointCloud | LaserScan | ColorImage | KeypointImage | MarkerSet
+class Measurement(Protocol):
+    """What every measurement has: all of the above, and those that other adapters bring, are frozen dataclasses with it."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def sensor(self) -> str:
+        """Topic, file or folder it came from."""
+
+    @property
+    def stamp(self) -> float:
+        """Time of measurement [s]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,10 +54,10 @@ def voodoo_command(
 
 
 # In the order of `voodoo --help`.
-app.command("track")(track_command)
-app.command("demo")(demo_command)
-app.command("ik")(ik_command)
-app.command("eval")(eval_command)
-app.command("info")(info_command)
-app.command("config")(config_command)
-app.command("body")(body_command)
+app.command("track", short_help="Track the body through a recording: a row a frame.")(track_command)
+app.command("demo", short_help="Track the bundled recording and draw what is found.")(demo_command)
+app.command("ik", short_help="Find postures from a few known sites and silhouettes.")(ik_command)
+app.command("eval", short_help="Measure the tracker on recordings with a truth.")(eval_command)
+app.command("info", short_help="Say what is in a recording.")(info_command)
+app.command("config", short_help="Print the default configuration as commented TOML.")(config_command)
+app.command("body", short_help="Print a body as TOML: the default human, or a file.")(body_command)

@@ -21,7 +21,7 @@ from voodoo._core import Estimate
 from voodoo.evaluation.metrics import mean_or_nan, share_within
 from voodoo.measurements import DepthImage, PointCloud, RecordedFrame
 from voodoo.model.body import Body
-from voodoo.model.projection import CameraView, limb_rings, silhouette, transform
+from voodoo.model.projection import CameraView, body_mask, limb_rings, transform
 from voodoo.sensors.depth import depth_points
 from voodoo.tracker import Tracker
 
@@ -138,6 +138,6 @@ def _overlap(depth: DepthImage, person: BoolArray, body: Body, estimate: Estimat
         return float("nan")
     height, width = depth.image.shape
     view = CameraView(depth.camera, depth.root_from_sensor)
-    model = silhouette(body, estimate, view, width=width, height=height)
+    model = body_mask(body, estimate, view, width=width, height=height)
     seen = person.reshape(height, width)
     return float((model & seen).sum() / (model | seen).sum())

@@ -105,7 +105,7 @@ def limb_outline(
     return np.asarray(hull, dtype=np.float32).reshape(-1, 2)
 
 
-def silhouette(body: Body, estimate: Estimate, view: View, *, width: int, height: int) -> npt.NDArray[np.bool_]:
+def body_mask(body: Body, estimate: Estimate, view: View, *, width: int, height: int) -> npt.NDArray[np.bool_]:
     """Pixels (height, width) whose centres lie inside the outline of a limb."""
     mask = np.zeros((height, width), dtype=bool)
     for limb in body.limbs:

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from voodoo.errors import CameraError, RecordingError
+from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.toml_io import parse_toml, read_text
-from voodoo.sensors.pixels import FloatArray
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 

@@ -1,0 +1,89 @@
+"""A sensor is one adapter: front end, overlay and viewer know no types."""
+
+import ast
+from copy import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import voodoo
+from core_fakes import FakeRecording
+from ik_cases import load_example
+from voodoo.errors import MeasurementError
+from voodoo.measurements import MarkerSet, RecordedFrame
+from voodoo.names import INPUTS
+from voodoo.pipeline.front_end import FrontEnd, FrontEndSettings
+from voodoo.sensors import adapters
+from voodoo.sensors.adapters import Memory, adapter_of
+from voodoo.sensors.kinds import input_of, inputs
+from voodoo.visualization.overlay import Overlay
+
+PACKAGE = Path(voodoo.__file__).parent
+
+
+@pytest.fixture
+def uwb():
+    """The example of a new sensor, registered for one test."""
+    module = load_example("uwb_tag")
+    yield module
+    adapters.unregister("uwb")
+
+
+def test_a_new_sensor_in_one_file_tracks_a_body(uwb):
+    assert inputs() == (*INPUTS, "uwb") == FrontEndSettings().use and input_of("uwb") == "uwb"
+    assert uwb.main(frames=40) < 0.06, "no worse than the tags' own noise (mean length 8 cm)"
+
+
+def test_a_new_sensor_is_drawn_and_told_when_it_freezes(uwb):
+    sequence = uwb.VirtualSequence(body=voodoo.Body.human(model="full"), frames=3)
+    tracker = voodoo.Tracker(sequence.body)
+    tracker.reset_pose(sequence.truth(0.0)[0])
+    front_end = FrontEnd(tracker)
+    frames = [frame for frame, _ in uwb.recorded(sequence, np.random.default_rng(1))]
+    estimate = front_end.step(frames[0])
+    recording = FakeRecording(frames=3, depth=False)
+    with_tags = Overlay(recording).draw(frames[0], tracker.body, estimate, index=0, front_end=front_end)
+    without = Overlay(recording).draw(RecordedFrame(0.0, ()), tracker.body, estimate, index=0, front_end=front_end)
+    assert (with_tags == (40, 200, 255)).all(axis=2).sum() > 100 and not np.array_equal(with_tags, without)
+    first, *others = frames[1].measurements
+    repeated = uwb.UwbTag(first.sensor, first.stamp, first.site, frames[0].measurements[0].position, first.sigma)
+    front_end.step(RecordedFrame(frames[1].stamp, (repeated, *others)))
+    assert front_end.frozen == (first.sensor,)
+
+
+def test_what_has_no_adapter_is_refused():
+    tracker = voodoo.Tracker(voodoo.Body.human())
+    tracker.reset(joints={"l_shoulder": (0, 0.2, 1.4), "r_shoulder": (0, -0.2, 1.4), "l_hip": (0, 0.1, 0.9)})
+    front_end = FrontEnd(tracker)
+    with pytest.raises(MeasurementError, match=r"expected one of DepthImage, .*MarkerSet, found int"):
+        front_end.step(RecordedFrame(0.0, (3,)))
+    with pytest.raises(MeasurementError, match=r"use: expected some of depth, .*, found uwb"):
+        FrontEndSettings(use=("uwb",))
+
+
+def test_one_adapter_for_a_kind_and_a_measurement():
+    assert tuple(sorted(inputs())) == tuple(sorted(INPUTS))
+    known = adapter_of(MarkerSet("m", 0.0, {}))
+    with pytest.raises(MeasurementError, match="expected a new kind and measurement"):
+        adapters.register(known)
+
+
+def test_memory_is_copied_thing_by_thing():
+    memory = Memory()
+    memory.get("list", "a", list).append(1)
+
+    twin = copy(memory)
+    twin.get("list", "a", list).append(2)
+    assert (memory.all("list"), twin.all("list")) == ({"a": [1]}, {"a": [1, 2]})
+
+
+@pytest.mark.parametrize(
+    "path", ["pipeline/front_end.py", "pipeline/frozen.py", "visualization/overlay.py", "visualization/rerun_viewer.py"]
+)
+def test_who_knows_adapters_knows_no_types(path):
+    tree = ast.parse((PACKAGE / path).read_text(encoding="utf-8"))
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
+    assert not [call for call in calls if call.func.id == "isinstance"]
+    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert not names & {"DepthImage", "ColorImage", "KeypointImage", "LaserScan", "PointCloud", "MarkerSet"}

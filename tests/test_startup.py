@@ -1,0 +1,46 @@
+"""Help and version are there at once: what a command needs is imported when it runs."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "rosbags", "pydantic", "tomlkit", "rerun", "rich", "voodoo._core")
+TYPERS_OWN = "pydantic"
+"""Typer checks the options of a command with it, even for its help."""
+LIMIT_S = 0.2
+COMMANDS = ("track", "demo", "ik", "eval", "info", "config", "body")
+CALLS = [["--version"], ["--help"], *([command, "--help"] for command in COMMANDS)]
+
+
+@pytest.mark.parametrize("words", CALLS, ids=" ".join)
+def test_help_imports_nothing_heavy(words):
+    code = (
+        "import sys\nfrom voodoo.cli import main\n"
+        f"sys.argv = ['voodoo', *{words!r}]\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
+        f"print('HEAVY', [name for name in {HEAVY!r} if name in sys.modules])\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    *shown, heavy = run.stdout.splitlines()
+    own = [TYPERS_OWN] if len(words) > 1 and TYPERS_OWN in heavy else []
+    assert heavy == f"HEAVY {own}"
+    assert shown[0].startswith("voodoo " if words == ["--version"] else "Usage: ")
+
+
+@pytest.mark.parametrize("words", [["--version"], ["--help"]], ids=" ".join)
+def test_help_and_version_answer_in_a_fifth_of_a_second(words):
+    """By processor time, the best of several: other programs on the machine do not count."""
+    command = [sys.executable, "-c", "from voodoo.cli import main; main()", *words]
+    taken = []
+    for _ in range(8):
+        before, began = os.times(), time.perf_counter()
+        subprocess.run(command, capture_output=True, check=True)
+        after = os.times()
+        used = after.children_user + after.children_system - before.children_user - before.children_system
+        taken.append(min(used, time.perf_counter() - began))
+        if taken[-1] < LIMIT_S:
+            return
+    pytest.fail(f"{' '.join(words)}: {min(taken):.2f} s at best")
