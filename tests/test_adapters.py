@@ -8,10 +8,18 @@ import numpy as np
 import pytest
 
 import voodoo
-from core_fakes import FakeRecording
+from core_fakes import CAMERA, FakeRecording
 from ik_cases import load_example
 from voodoo.errors import MeasurementError
-from voodoo.measurements import MarkerSet, RecordedFrame
+from voodoo.measurements import (
+    ColorImage,
+    DepthImage,
+    KeypointImage,
+    LaserScan,
+    MarkerSet,
+    PointCloud,
+    RecordedFrame,
+)
 from voodoo.names import INPUTS
 from voodoo.pipeline.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors import adapters
@@ -63,7 +71,17 @@ def test_what_has_no_adapter_is_refused():
 
 
 def test_one_adapter_for_a_kind_and_a_measurement():
-    assert tuple(sorted(inputs())) == tuple(sorted(INPUTS))
+    items = (
+        DepthImage("d", 0.0, np.zeros((3, 4), np.uint16), 0.001, CAMERA, np.eye(4)),
+        PointCloud("p", 0.0, np.zeros((1, 3)), np.eye(4)),
+        LaserScan("s", 0.0, np.ones(3, np.float32), 0.0, 0.1, 0.1, 9.0, np.eye(4)),
+        KeypointImage("k", 0.0, (), "coco17", CAMERA, np.eye(4)),
+        ColorImage("c", 0.0, lambda: np.zeros((3, 4, 3), np.uint8), CAMERA, np.eye(4)),
+        MarkerSet("m", 0.0, {}),
+    )
+    assert tuple(adapter_of(item).kind for item in items) == INPUTS == inputs()
+    recorded = ("depth", "points", "scan", "keypoints", "color", "markers")
+    assert tuple(map(input_of, recorded)) == INPUTS and input_of("imu") is None
     known = adapter_of(MarkerSet("m", 0.0, {}))
     with pytest.raises(MeasurementError, match="expected a new kind and measurement"):
         adapters.register(known)

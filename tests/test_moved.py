@@ -1,10 +1,12 @@
 """Old module paths go on working: the same objects, a warning, and pickles that were made by them."""
 
+import ast
 import importlib
 import pickle
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import pytest
 
@@ -87,6 +89,19 @@ def test_pickles_that_name_the_old_path_can_be_read(old, value):
         forget(old)
     again = pickle.loads(named)
     assert again == value
+
+
+def test_nobody_here_uses_an_old_path():
+    here = Path(__file__).resolve().parent
+    folders = [Path(voodoo.__file__).parent, here, here.parent / "examples", here.parent / "benches"]
+    used = set()
+    for path in (path for folder in folders for path in folder.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in getattr(node, "names", ()) if isinstance(alias, ast.alias)]
+            if isinstance(node, ast.ImportFrom):
+                names = [str(node.module), *(f"{node.module}.{name}" for name in names)]
+            used |= {(path.name, name) for name in names if name in MOVED}
+    assert used == set()
 
 
 def test_attributes_of_the_package_are_imported_when_they_are_asked_for():

@@ -38,7 +38,7 @@ from voodoo.sensors.skin.hands import elsewhere, of_pieces, to_palm
 from voodoo.sensors.skin.regions import FACE_M, PALM_M, Candidate, candidates, joined
 from voodoo.sensors.skin.rules import allowed_sites
 from voodoo.sensors.skin.settings import SkinSettings
-from voodoo.sensors.skin.tracks import Blobs, Sight
+from voodoo.sensors.skin.tracks import Blob, Blobs, Sight
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
@@ -126,57 +126,33 @@ class SkinTracker:
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
         places = self._places(camera, pose, predicted)
-        self._colours = (image, Colours.of(image))
-        self._seen = self.colour.classify(self._colours[1])
-        skin = self._seen.copy()
-        self._body = None if body is None else body.mask
-        if body is not None:
-            skin &= body.mask
-        self._before = None if body is None else body.before
-        if self._static is not None and self._static.shape == skin.shape:
-            there = self._static < 0.5
-            # A hand before a wooden door is not the door.
-            skin &= there if self._before is None else there | self._before
-        # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
-        skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
         focal = math.sqrt(camera.fx * camera.fy)
         nearest = min((z for _, z in places.values()), default=1.0)
         palm_px = PALM_M * focal / nearest
-        skin = joined(skin, palm_px=palm_px)
-        if body is not None:
-            skin &= body.mask
-        self._skin = skin
+        self._skin = self._segmented(image, body, palm_px)
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
         self._stamp = stamp
         if not places or not self.settled:
             return []
-        self.candidates, labels = candidates(skin, palm_px=palm_px)
+        self.candidates, labels = candidates(self._skin, palm_px=palm_px)
         if not self.candidates:
             return []
         origin, directions = world_rays(camera, pose, [item.pixel for item in self.candidates])
-        axis = pose[:3, 2]
-        regions = None if body is None else body.sample(labels)
-        looked: list[tuple[float, bool] | None] = [None] * len(self.candidates)
-        if body is not None and regions is not None:
-            radius = 1.5 * PALM_M * focal / nearest
-            looked = [body.look_at(item.pixel, radius, among=regions == item.region) for item in self.candidates]
-        z = np.array([nearest if found is None else found[0] for found in looked])
-        surfaces = origin + directions * (z / (directions @ axis))[:, None]
-        sights = [
-            Sight(direction, place, found is not None, item.hand, item.region, found is not None and found[1])
-            for direction, place, found, item in zip(directions, surfaces, looked, self.candidates, strict=True)
-        ]
-        specks = np.array([item.area for item in self.candidates]) < SPECK * math.pi * (PALM_M * focal / z) ** 2
+        z, sights = self._sights(
+            body, labels, origin, directions, pose[:3, 2], nearest=nearest, radius=1.5 * PALM_M * focal / nearest
+        )
         seen = self.blobs.follow(sights, stamp)
+        # Where each site is when a sight is its surface, (S, B, 3).
         sites = list(places)
+        behind = np.array([FACE_BEHIND_M if site.startswith("head") else HAND_BEHIND_M for site in sites])
+        surfaces = np.array([sight.place for sight in sights])
+        inside = surfaces + directions * behind[:, None, None]
         deep = np.array([sight.deep for sight in sights])
         expected = np.array([predicted[site] for site in sites])[:, None]
-        # Where each site is when a sight is its surface, (S, B, 3).
-        behind = np.array([FACE_BEHIND_M if site.startswith("head") else HAND_BEHIND_M for site in sites])
-        inside = surfaces + directions * behind[:, None, None]
         distance = np.where(deep, lengths(inside - expected), ray_distance(origin, directions, expected))
         limbs = {} if surface is None else surface(surfaces)
+        specks = np.array([item.area for item in self.candidates]) < SPECK * math.pi * (PALM_M * focal / z) ** 2
         allowed = allowed_sites(
             sites,
             sights,
@@ -192,40 +168,96 @@ class SkinTracker:
         # A speck far from where the hand is expected is what is left of another region.
         allowed[(distance > self.settings.gate) & specks] = 0.0
         others = elsewhere(sites, sights, limbs, arm_lost)
-        found = self.blobs.name(
+        found = self._named(seen, distance, allowed, others, sites, deep_camera=body is not None, stamp=stamp)
+        free = (allowed > 0) & ~others & deep
+        free[:, list(found.values())] = False
+        rays = []
+        for site, column in found.items():
+            self.assigned[site] = self.candidates[column]
+            row = sites.index(site)
+            direction, place = directions[column], inside[row, column] if deep[column] else None
+            if place is not None and not site.startswith("head"):
+                place = of_pieces(place, list(inside[row, free[row]]), predicted[site])
+                direction = (place - origin) / float(np.linalg.norm(place - origin))
+            bias = self.settings.sites[site]
+            if site in head_visible:
+                bias = max(bias, self.settings.shown_bias.get(site, bias))
+            across = self.settings.noise.sigma(places[site][1], focal)
+            ray = SiteRay(site, origin, direction, across, source, bias=bias, place=place)
+            rays.append(ray.moved(to_palm(site, predicted)))
+        return rays
+
+    def _segmented(self, image: ByteImage, body: BodyView | None, palm_px: float) -> Mask:
+        """(H, W): skin, without what is nowhere near the body and what has been there for long."""
+        self._colours = (image, Colours.of(image))
+        self._seen = self.colour.classify(self._colours[1])
+        skin = self._seen.copy()
+        self._body = None if body is None else body.mask
+        if body is not None:
+            skin &= body.mask
+        self._before = None if body is None else body.before
+        if self._static is not None and self._static.shape == skin.shape:
+            there = self._static < 0.5
+            # A hand before a wooden door is not the door.
+            skin &= there if self._before is None else there | self._before
+        # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
+        skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
+        skin = joined(skin, palm_px=palm_px)
+        if body is not None:
+            skin &= body.mask
+        return skin
+
+    def _sights(
+        self,
+        body: BodyView | None,
+        labels: npt.NDArray[np.int32],
+        origin: FloatArray,
+        directions: FloatArray,
+        axis: FloatArray,
+        *,
+        nearest: float,
+        radius: float,
+    ) -> tuple[FloatArray, list[Sight]]:
+        """Depths (B,) along the optical axis and places of the candidates: as the depth camera has it, else `nearest`."""
+        regions = None if body is None else body.sample(labels)
+        looked: list[tuple[float, bool] | None] = [None] * len(self.candidates)
+        if body is not None and regions is not None:
+            looked = [body.look_at(item.pixel, radius, among=regions == item.region) for item in self.candidates]
+        z = np.array([nearest if found is None else found[0] for found in looked])
+        surfaces = origin + directions * (z / (directions @ axis))[:, None]
+        return z, [
+            Sight(direction, place, found is not None, item.hand, item.region, found is not None and found[1])
+            for direction, place, found, item in zip(directions, surfaces, looked, self.candidates, strict=True)
+        ]
+
+    def _named(
+        self,
+        seen: list[Blob],
+        distance: FloatArray,
+        allowed: FloatArray,
+        others: Mask,
+        sites: list[str],
+        *,
+        deep_camera: bool,
+        stamp: float,
+    ) -> dict[str, int]:
+        """Site -> candidate; gates widen farther for hands that a depth camera sees."""
+        chosen = self.settings
+        return self.blobs.name(
             seen,
             distance,
             allowed,
             others,
             sites=sites,
-            gates=dict.fromkeys(sites, self.settings.gate),
-            growth=self.settings.gate_growth,
+            gates=dict.fromkeys(sites, chosen.gate),
+            growth=chosen.gate_growth,
             widest={
-                site: self.settings.widest_gate
-                if body is not None and not site.startswith("head")
-                else self.settings.lost_gate
+                site: chosen.widest_gate if deep_camera and not site.startswith("head") else chosen.lost_gate
                 for site in sites
             },
-            ambiguity=self.settings.ambiguity,
+            ambiguity=chosen.ambiguity,
             stamp=stamp,
         )
-        rays = []
-        for site, column in found.items():
-            self.assigned[site] = self.candidates[column]
-            across = self.settings.noise.sigma(places[site][1], focal)
-            row = sites.index(site)
-            direction, place = directions[column], inside[row, column] if deep[column] else None
-            if place is not None and not site.startswith("head"):
-                able = (allowed[row] > 0) & ~others[row] & deep
-                able[list(found.values())] = False
-                place = of_pieces(place, list(inside[row, able]), predicted[site])
-                direction = (place - origin) / float(np.linalg.norm(place - origin))
-            bias = self.settings.sites[site]
-            if site in head_visible:
-                bias = max(bias, self.settings.shown_bias.get(site, bias))
-            ray = SiteRay(site, origin, direction, across, source, bias=bias, place=place)
-            rays.append(ray.moved(to_palm(site, predicted)))
-        return rays
 
     def learn(
         self,
