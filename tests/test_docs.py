@@ -231,6 +231,6 @@ def test_the_pages_build_without_a_warning(tmp_path: Path):
         "reference/command-line": "--depth-range",
         "reference/configuration": "motion_scale",
         "reference/python-api": "add_depth",
-        "project/architecture": "Direction",
+        "project/architecture": "crates",
     }.items():
         assert words in (tmp_path / f"{page}.html").read_text(encoding="utf-8"), page
