@@ -1,7 +1,8 @@
-//! Articulated body tracking: every measurement becomes a weighted pair of a body point and a target, and one step moves the
-//! body to fit all of them. No files, no Python, no drawing.
+//! Articulated body tracking: every measurement becomes a weighted pair of a body point and a target, and one step
+//! moves the body to fit all of them. No files, no Python, no drawing.
 //!
-//! A [`Body`] is what is tracked, a [`Frame`] what was measured at one instant, an [`Estimate`] what [`Tracker::step`] found:
+//! A [`Body`] is what is tracked, a [`Frame`] what was measured at one instant, an [`Estimate`] what
+//! [`Tracker::step`] found:
 //!
 //! ```
 //! use voodoo_core::body::HumanModel;
@@ -12,7 +13,8 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let body = Body::human(1.78, HumanModel::Full)?;
 //!
-//! // Where named sites are in the first frame: index of the site, position in the world. Here the body stands at the origin.
+//! // Where named sites are in the first frame: index of the site, position in the world.
+//! // Here the body stands at the origin.
 //! let standing = body.rest_pose(Pose::IDENTITY);
 //! let start: Vec<(usize, Vec3)> =
 //!     (0..body.sites().len()).map(|site| (site, body.site_position(&standing, site))).collect();
@@ -48,8 +50,8 @@
 //!
 //! The method is VooDoo (K06: Knoop, Vacek, Dillmann, "Sensor Fusion for 3D Human Body Tracking with an Articulated 3D
 //! Body Model", ICRA 2006; K07: the same authors, "A Human Body Model for Articulated 3D Pose Tracking", in "Humanoid
-//! Robots, New Developments", 2007). [`Tracker::step`] reads like the list in K06 IV-B. The modules are its stages; the order
-//! in which they may use each other is in ARCHITECTURE.md.
+//! Robots, New Developments", 2007). [`Tracker::step`] reads like the list in K06 IV-B. The modules are its stages;
+//! the order in which they may use each other is in ARCHITECTURE.md.
 
 pub mod associate;
 pub mod background;
