@@ -72,7 +72,7 @@ def shipped_human():
     counts = f"{len(body.limbs)} limbs and {len(body.limbs) - 1} joints"
     return (
         f"# The default human, stature 1.75 m: {counts}. The same as `voodoo.Body.human(1.75)`.\n"
-        f"# The format is explained in docs/body.md.\n\n{body.to_toml()}"
+        f"# The format is explained in docs/how-to/describe-a-body.md.\n\n{body.to_toml()}"
     )
 
 

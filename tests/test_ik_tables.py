@@ -95,7 +95,7 @@ def test_four_real_cameras(voodoo_data):
     )
     for found in (one, two, agreeing, four):
         assert found[0] < 0.5 * plain[0] and (found < 0.025).all()
-    # The mean over all inner joints is halved with two cameras and more; knees by themselves are not, see docs/ik.md.
+    # The mean over all inner joints is halved with two cameras and more; knees by themselves are not, see the record.
     for found in (two, agreeing, four):
         assert found.mean() < 0.5 * plain.mean()
     assert agreeing[1] < 0.6 * plain[1] and one.mean() < 0.6 * plain.mean()

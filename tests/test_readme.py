@@ -1,4 +1,4 @@
-"""What the README and the documentation tell a reader to run, runs."""
+"""What the README tells a reader to run, runs; the documentation has test_docs.py."""
 
 import re
 import subprocess
@@ -50,16 +50,8 @@ def test_the_commands_on_a_recording_run(tmp_path):
     assert (tmp_path / "pose.csv").stat().st_size > 1000 and (tmp_path / "look.mp4").stat().st_size > 1000
 
 
-def test_the_readme_fits_two_screens_and_its_links_lead_somewhere():
-    assert len(README.splitlines()) <= 110
-    for document in [ROOT / "README.md", ROOT / "ARCHITECTURE.md", *(ROOT / "docs").glob("*.md")]:
-        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)\)", document.read_text(encoding="utf-8")):
-            assert (document.parent / target).exists(), f"{document.name} links to {target}"
-
-
-def test_the_body_of_the_documentation_loads():
-    (text,) = blocks((ROOT / "docs" / "body.md").read_text(encoding="utf-8"), "toml")
-    assert voodoo.Body.from_toml(text).site_names == ("tip",)
+def test_the_readme_fits_two_screens():
+    assert len(README.splitlines()) <= 100
 
 
 def test_the_lamp_is_tracked():

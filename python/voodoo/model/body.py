@@ -69,7 +69,7 @@ class Body:
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = "body") -> Body:
-        """A body from TOML text; the format is that of `to_toml`, explained in docs/body.md.
+        """A body from TOML text; the format is that of `to_toml`, explained in docs/how-to/describe-a-body.md.
 
         Raises:
             BodyError: it names the key, what was expected and what was found.
