@@ -44,9 +44,9 @@ def stated(text: str, folder: str, side: str) -> Rooms:
             if words[0].endswith("/"):
                 room = words.pop(0)[:-1]
         if listing:
-            named, dash, _ = " ".join(words).partition(" - ")
-            rooms.files.setdefault(room, set()).update(word for word in named.split() if word != "-")
-            listing = not dash and "-" not in words[:1]
+            named, dash, _ = f" {' '.join(words)} ".partition(" - ")
+            rooms.files.setdefault(room, set()).update(named.split())
+            listing = not dash
     rooms.order = re.findall(r"`([^`]+)`", order.group(1))
     return rooms
 

@@ -89,3 +89,19 @@ pub(crate) fn turned(poses: &[Pose], centre: Vec3, axis: Vec3, angle: f64) -> Ve
 pub(crate) fn farthest(first: &[Pose], second: &[Pose]) -> f64 {
     first.iter().zip(second).map(|(a, b)| a.translation.distance(b.translation)).fold(0.0, f64::max)
 }
+
+/// A depth image in metres whose centre is that of its pixels, from a camera at the world's origin.
+pub(crate) fn image(pixels: &[f32], width: usize, focal: f64) -> DepthImage<'_> {
+    let height = pixels.len() / width;
+    DepthImage {
+        pixels: DepthPixels::F32(pixels),
+        width,
+        height,
+        metres_per_unit: 1.0,
+        intrinsics: [focal, focal, 0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)],
+        rays: None,
+        world_from_sensor: Pose::IDENTITY,
+        weight: 1.0,
+        source: 0,
+    }
+}

@@ -225,8 +225,8 @@ mod tests {
     use crate::observation::background::Backgrounds;
     use crate::observation::depth_view::DepthViews;
     use crate::observation::frame::{DepthImage, Frame};
-    use crate::observation::synthetic::image;
     use crate::shape::TaperedEllipticCylinder;
+    use crate::testing::image;
 
     const WIDTH: usize = 120;
     const FOCAL: f64 = 400.0;

@@ -1,8 +1,19 @@
 //! What is remembered of each arm and leg from frame to frame.
 
 use super::persistence::Persistence;
-use super::proposals::Basis;
 use crate::math::{Pose, Vec3};
+
+/// What a proposal rests on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Basis {
+    /// Unexplained points have drawn the arm or leg there.
+    #[default]
+    Points,
+    /// It ended there when all was well.
+    Rest,
+    /// The body leans: not the arm or leg alone is judged by it.
+    Lean,
+}
 
 /// The past of one arm or leg.
 #[derive(Clone, Debug, Default)]

@@ -193,7 +193,7 @@ mod tests {
     use super::*;
     use crate::math::Quat;
     use crate::observation::frame::Ground;
-    use crate::observation::synthetic::image;
+    use crate::testing::image;
 
     #[test]
     fn candidates_are_the_returns_in_the_box_above_the_floor_and_before_the_scene() {

@@ -108,7 +108,7 @@ pub fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::synthetic::image;
+    use crate::testing::image;
 
     /// Every pixel of this image has a depth of its own, metres.
     fn distinct(count: usize) -> Vec<f32> {

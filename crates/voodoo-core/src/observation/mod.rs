@@ -14,5 +14,3 @@ pub mod observer;
 pub(crate) mod pixels;
 pub mod registration;
 pub(crate) mod segments;
-#[cfg(test)]
-pub(crate) mod synthetic;

@@ -11,8 +11,18 @@ const TURNED: f64 = 120.0;
 const FREE_TURN: f64 = 0.5;
 const TURN_RATE: f64 = 2.0;
 
+/// What is known of a lost body.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known<'a> {
+    pub(super) postures: &'a Postures,
+    pub(super) motion: &'a SegmentMotion,
+    /// It is lost, not only looked at again.
+    pub(super) lost: bool,
+}
+
 /// Cost of a direction the root faces at `stamp`, in patches.
-pub(super) fn facing_cost(postures: &Postures, motion: &SegmentMotion, root: Quat, stamp: f64) -> f64 {
+pub(super) fn facing_cost(known: Known, root: Quat, stamp: f64) -> f64 {
+    let Known { postures, motion, .. } = known;
     let level = |v: Vec3| postures.level(v).normalize_or_zero();
     let ahead = level(root * Vec3::X);
     let mut cost = 0.0;
@@ -38,10 +48,14 @@ mod tests {
         postures.restart(&body, &poses);
         let (same, about) = (poses[0].rotation, Quat::from_rotation_z(std::f64::consts::PI) * poses[0].rotation);
         let motion = SegmentMotion::default();
-        assert_eq!(facing_cost(&postures, &motion, about, 1.0), 0.0, "nobody knows how it stood");
+        assert_eq!(
+            facing_cost(Known { postures: &postures, motion: &motion, lost: true }, about, 1.0),
+            0.0,
+            "nobody knows how it stood"
+        );
         postures.remember(&poses, 1.0);
-        assert!(facing_cost(&postures, &motion, same, 1.1) < 1e-9);
-        assert_eq!(facing_cost(&postures, &motion, about, 1.1), TURNED);
-        assert!(facing_cost(&postures, &motion, about, 6.0) < 0.2 * TURNED);
+        assert!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, same, 1.1) < 1e-9);
+        assert_eq!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, about, 1.1), TURNED);
+        assert!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, about, 6.0) < 0.2 * TURNED);
     }
 }

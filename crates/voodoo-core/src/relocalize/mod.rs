@@ -16,9 +16,10 @@ use crate::fit::{Context, Fit};
 use crate::math::{Aabb, Pose, Vec3};
 use crate::observation::candidates::Candidates;
 use crate::observation::segments::Segments;
-use posture::Postures;
+use facing::Known;
+use posture::{Place, Postures};
 use segment_motion::SegmentMotion;
-use trials::{Known, Trials};
+use trials::Trials;
 pub use watch::Sighting;
 use watch::Watch;
 
@@ -28,9 +29,6 @@ const MARGIN: f64 = 0.20;
 const MOST_SEGMENTS: usize = 2;
 /// While the body is searched its motion is so many times freer than between two frames.
 const FREEDOM: f64 = 6.0;
-
-/// Poses of the whole body, working frame.
-type Place = Vec<Pose>;
 
 /// Searches a lost body. Remembers how it stood, and how what may be it moves.
 #[derive(Debug, Default)]

@@ -10,6 +10,9 @@ const LEAST_SURFACE: f64 = 0.25;
 /// Its extents as shares of the body's height at rest: the longer one at least, the upright one and the others at most.
 const EXTENTS: [f64; 3] = [0.35, 1.4, 1.5];
 
+/// Poses of the whole body, working frame.
+pub(super) type Place = Vec<Pose>;
+
 /// How the body may stand, and how large it is.
 #[derive(Debug, Default)]
 pub(super) struct Postures {

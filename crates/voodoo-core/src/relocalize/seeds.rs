@@ -1,10 +1,8 @@
 //! Where and which way round a lost body may stand at a segment: rough looks at every direction, at rest and as it was last
 //! tracked.
 
-use super::Place;
-use super::facing::facing_cost;
-use super::posture::Postures;
-use super::trials::Known;
+use super::facing::{Known, facing_cost};
+use super::posture::{Place, Postures};
 use crate::fit::Context;
 use crate::hypotheses::explain;
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
@@ -133,7 +131,7 @@ fn rough_cost(rough: &mut RoughLook, context: Context, known: Known, seed: &Seed
     let unexplained = |(d, w): (&f32, &f64)| w * (f64::from(*d) / EXPLAINED_ROUGHLY).powi(2).min(1.0);
     let points: f64 = nearest.iter().zip(&sample.weights).map(unexplained).sum();
     let stamp = context.seen.frame().stamp;
-    points + visible.cost() + facing_cost(known.postures, known.motion, seed.root.rotation, stamp)
+    points + visible.cost() + facing_cost(known, seed.root.rotation, stamp)
 }
 
 /// Where a turned posture lies about its root: its middle, and its lowest and highest places along up.

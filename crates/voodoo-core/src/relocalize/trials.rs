@@ -1,10 +1,8 @@
 //! Whether a lost body stands at a segment: the best rough looks are refined and scored.
 
-use super::Place;
-use super::facing::facing_cost;
-use super::posture::Postures;
+use super::facing::{Known, facing_cost};
+use super::posture::Place;
 use super::seeds::{RoughLook, Seed, find_seeds, put};
-use super::segment_motion::SegmentMotion;
 use crate::body::Model;
 use crate::fit::{Context, Fit};
 use crate::hypotheses::{body_landmark_cost, explain, limit_strain, overall_cost};
@@ -25,15 +23,6 @@ const STRAY_DISTANCE: f64 = 0.07;
 const PLACE_GAIN: f64 = 40.0;
 /// What cameras have against a place counts at most this many times the weight of its points: so much says that it is wrong.
 const MOST_COST: f64 = 4.0;
-
-/// What is known of a lost body.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Known<'a> {
-    pub(super) postures: &'a Postures,
-    pub(super) motion: &'a SegmentMotion,
-    /// It is lost, not only looked at again.
-    pub(super) lost: bool,
-}
 
 /// What the trials at one segment gave.
 #[derive(Clone, Copy, Debug)]
@@ -137,7 +126,7 @@ fn place_score(context: Context, known: Known, fit: &Fit, poses: &[Pose], total:
     let matched = fit.matched(poses);
     let score = overall_cost(context, matched).total;
     score.min(MOST_COST * total)
-        + facing_cost(known.postures, known.motion, poses[0].rotation, context.seen.frame().stamp)
+        + facing_cost(known, poses[0].rotation, context.seen.frame().stamp)
         + body_landmark_cost(matched)
         + other_joints_strain(context.model, poses)
 }

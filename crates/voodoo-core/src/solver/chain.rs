@@ -34,15 +34,7 @@ impl ChainSolver {
     pub(super) fn assemble(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], damping: f64) {
         let Self { chain, screws, composite, h, step } = self;
         let n = chain.freedoms;
-        screws.clear();
-        screws.extend((0..6).map(|i| Vector6::ith(i, 1.0)));
-        for limb in &body.limbs()[1..] {
-            if let Some((parent, joint)) = &limb.parent {
-                let centre = poses[*parent] * joint.parent_from_joint.translation;
-                let (axes, count) = joint_axes(joint, &poses[*parent]);
-                screws.extend(axes[..count].iter().map(|axis| screw(*axis, centre)));
-            }
-        }
+        list_screws(body, poses, screws);
         // Blocks of a limb and all that hangs on it, leaf to root.
         composite.clear();
         composite.extend(normal.limbs.iter().map(|block| (block.h, block.g)));
@@ -128,6 +120,19 @@ impl ChainSolver {
                 poses[index] = place(joint, &poses[*parent], poses[index].rotation);
                 poses[index].rotation = poses[index].rotation.normalize();
             }
+        }
+    }
+}
+
+/// The twist of every unknown: six of the root, then those of the joints.
+fn list_screws(body: &Body, poses: &[Pose], screws: &mut Vec<Vector6<f64>>) {
+    screws.clear();
+    screws.extend((0..6).map(|i| Vector6::ith(i, 1.0)));
+    for limb in &body.limbs()[1..] {
+        if let Some((parent, joint)) = &limb.parent {
+            let centre = poses[*parent] * joint.parent_from_joint.translation;
+            let (axes, count) = joint_axes(joint, &poses[*parent]);
+            screws.extend(axes[..count].iter().map(|axis| screw(*axis, centre)));
         }
     }
 }

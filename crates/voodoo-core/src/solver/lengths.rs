@@ -3,6 +3,7 @@
 use nalgebra::Vector6;
 
 use super::ChainSolver;
+use crate::body::kinematics::Chain;
 use crate::body::{Body, Pair};
 use crate::math::{Pose, Vec3};
 use crate::math::{factor, solve_in_place, substitute};
@@ -34,9 +35,33 @@ impl ChainSolver {
     ) -> bool {
         self.chain.layout(body);
         self.assemble(body, normal, poses, 0.0);
-        let Self { chain, screws, composite, h, step } = self;
+        work.couple(self, body, poses, pairs);
+        if !work.eliminate(self, pairs.len()) {
+            return false;
+        }
+        let count = pairs.len();
+        for row in 0..count {
+            work.reduced[row * count + row] += inertia + pull;
+            change[row] = pull * change[row] - work.gradient[row];
+        }
+        solve_in_place(&mut work.reduced, change, count)
+    }
+}
+
+/// Lengthening its parent carries a limb along the parent's axis: the twist of a sliding joint below the turning one.
+fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
+    let Some((parent, joint)) = &body.limbs()[limb].parent else { return Vector6::zeros() };
+    let own = body.limbs()[*parent].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
+    let v = poses[*parent].rotation * Vec3::Z * (joint.parent_from_joint.translation.z - own);
+    Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
+}
+
+impl Lengths {
+    /// Second derivatives and gradient of the lengths, and the mixed ones with the pose's unknowns.
+    fn couple(&mut self, solver: &ChainSolver, body: &Body, poses: &[Pose], pairs: &[Pair]) {
+        let ChainSolver { chain, screws, composite, .. } = solver;
         let (n, count) = (chain.freedoms, pairs.len());
-        let Lengths { mixed, h: copy, column, reduced, gradient } = work;
+        let Self { mixed, reduced, gradient, .. } = self;
         mixed.clear();
         mixed.resize(count * n, 0.0);
         reduced.clear();
@@ -44,18 +69,9 @@ impl ChainSolver {
         gradient.clear();
         gradient.resize(count, 0.0);
         let group = |limb: usize| pairs.iter().position(|pair| pair.contains(&limb));
-        // Lengthening its parent carries a limb along the parent's axis: a sliding joint below the turning one.
-        let slide = |limb: usize| -> Vector6<f64> {
-            let Some((parent, joint)) = &body.limbs()[limb].parent else { return Vector6::zeros() };
-            let own =
-                body.limbs()[*parent].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
-            let v = poses[*parent].rotation * Vec3::Z * (joint.parent_from_joint.translation.z - own);
-            Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
-        };
         for limb in 1..composite.len() {
-            let parent = chain.parent[limb];
-            let Some(row) = group(parent) else { continue };
-            let slider = slide(limb);
+            let Some(row) = group(chain.parent[limb]) else { continue };
+            let slider = slide(body, poses, limb);
             let force = composite[limb].0 * slider;
             gradient[row] += slider.dot(&composite[limb].1);
             let mut ancestor = limb;
@@ -67,7 +83,7 @@ impl ChainSolver {
                     break;
                 }
                 if let Some(column) = group(chain.parent[ancestor]) {
-                    let value = force.dot(&slide(ancestor));
+                    let value = force.dot(&slide(body, poses, ancestor));
                     reduced[row * count + column] += value;
                     if ancestor != limb {
                         reduced[column * count + row] += value;
@@ -76,11 +92,7 @@ impl ChainSolver {
                 ancestor = chain.parent[ancestor];
             }
             for below in limb + 1..composite.len() {
-                let mut ancestor = below;
-                while ancestor > limb {
-                    ancestor = chain.parent[ancestor];
-                }
-                if ancestor == limb {
+                if hangs_on(&chain.parent, below, limb) {
                     let force = composite[below].0 * slider;
                     for unknown in chain.start[below]..chain.start[below] + chain.count[below] {
                         mixed[row * n + unknown] += force.dot(&screws[unknown]);
@@ -88,7 +100,13 @@ impl ChainSolver {
                 }
             }
         }
+    }
+
+    /// Eliminates the pose's unknowns; false when their matrix is not positive definite.
+    fn eliminate(&mut self, solver: &ChainSolver, count: usize) -> bool {
         // `step` holds the negative gradient of the pose's unknowns.
+        let ChainSolver { chain: Chain { freedoms: n, .. }, h, step, .. } = solver;
+        let (n, Self { mixed, h: copy, column, reduced, gradient }) = (*n, self);
         copy.clone_from(h);
         if !factor(copy, n) {
             return false;
@@ -105,10 +123,15 @@ impl ChainSolver {
             }
             gradient[row] += column.iter().zip(step.iter()).map(|(a, b)| a * b).sum::<f64>();
         }
-        for row in 0..count {
-            reduced[row * count + row] += inertia + pull;
-            change[row] = pull * change[row] - gradient[row];
-        }
-        solve_in_place(reduced, change, count)
+        true
     }
+}
+
+/// Whether a limb hangs on another, directly or not; parents come first.
+fn hangs_on(parent: &[usize], below: usize, limb: usize) -> bool {
+    let mut ancestor = below;
+    while ancestor > limb {
+        ancestor = parent[ancestor];
+    }
+    ancestor == limb
 }

@@ -1,9 +1,9 @@
 //! Where the arm or leg was a frame ago, carried along by its parent.
 
-use super::{Basis, Pool, Propose};
+use super::{Pool, Propose};
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::hypotheses::history::History;
+use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 

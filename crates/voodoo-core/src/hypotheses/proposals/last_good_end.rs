@@ -1,7 +1,7 @@
 //! The arm or leg ends where it did when all was well: a foot stands while the body moves over it.
 
-use super::{Basis, Pool, Propose};
-use crate::hypotheses::history::History;
+use super::{Pool, Propose};
+use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 
 /// Bends that are tried: twice as many as towards unexplained points, since nothing seen has to agree with them yet.

@@ -12,24 +12,12 @@ pub(super) use last_proposal::LastProposal;
 pub(super) use trunk_lean::TrunkLean;
 pub(super) use unexplained_cluster::UnexplainedCluster;
 
-use super::history::History;
+use super::history::{Basis, History};
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
 /// Bends of an arm or leg about the line from its root to its end that are tried.
 const SWIVELS: usize = 6;
-
-/// What a proposal rests on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Basis {
-    /// Unexplained points have drawn the arm or leg there.
-    #[default]
-    Points,
-    /// It ended there when all was well.
-    Rest,
-    /// The body leans: not the arm or leg alone is judged by it.
-    Lean,
-}
 
 /// Looks for one kind of other configuration of an arm or leg.
 pub(super) trait Propose {

@@ -3,11 +3,11 @@
 
 use std::f64::consts::TAU;
 
-use super::{Basis, Pool, Propose, SWIVELS};
+use super::{Pool, Propose, SWIVELS};
 use crate::body::Model;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
-use crate::hypotheses::history::History;
+use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::hypotheses::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};

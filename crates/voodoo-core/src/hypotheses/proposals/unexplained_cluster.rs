@@ -1,7 +1,7 @@
 //! The arm or leg ends at a cluster of points that no limb explains.
 
-use super::{Basis, Pool, Propose, SWIVELS};
-use crate::hypotheses::history::History;
+use super::{Pool, Propose, SWIVELS};
+use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
 
