@@ -2,7 +2,7 @@
 //!
 //! Everything is in the working frame: world axes, origin near the body.
 
-use crate::math::{Mat3, Points, Vec3, widest};
+use crate::math::{LANES, Mat3, Points, Vec3, widest};
 use crate::shape::SurfaceBatch;
 
 /// Surface matches of one limb: measured points and their closest points. Rejected pairs stay with weight zero.
@@ -126,8 +126,6 @@ impl LimbMatches {
 /// Sums of `values` over two columns in several lanes: no addition waits for the one before, and the order is always the same.
 #[inline(always)]
 fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, f32) -> [f64; N]) -> [f64; N] {
-    /// Sums side by side: one SIMD register of single precision.
-    const LANES: usize = 8;
     let mut sums = [[0.0; LANES]; N];
     let ((first, first_rest), (second, second_rest)) = (first.as_chunks::<LANES>(), second.as_chunks::<LANES>());
     for (first, second) in first.iter().zip(second) {

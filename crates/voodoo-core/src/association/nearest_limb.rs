@@ -4,15 +4,13 @@
 //! the nearest of one of them are looked at point by point.
 
 use crate::body::{Body, Limb};
-use crate::math::{Pose, Vec3, widest};
+use crate::math::{LANES, Pose, Vec3, widest};
 use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
 
 /// The limb of a point that lies in no box.
 pub const NONE: u32 = u32::MAX;
 /// Squared distance of a point that lies outside a limb's box.
 const OUTSIDE: f32 = f32::INFINITY;
-/// Limbs whose bounds are computed side by side: one SIMD register.
-const LANES: usize = 8;
 /// What single precision may err in the place of a box, metres, and as a share of the coordinates it was computed from; bounds
 /// are that much wider.
 const SINGLE_PRECISION: (f32, f32) = (1e-4, 1e-6);

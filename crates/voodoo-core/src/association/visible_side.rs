@@ -24,8 +24,8 @@ pub fn match_visible_side(
     for (end, camera) in &candidates.cameras {
         // The candidates of a limb ascend.
         let stop = start + matches.candidate[start..].partition_point(|candidate| candidate < end);
-        for first in (start..stop).step_by(LANES) {
-            let last = stop.min(first + LANES);
+        for first in (start..stop).step_by(MATCHES) {
+            let last = stop.min(first + MATCHES);
             let away = widest(
                 #[inline(always)]
                 || facing_away(matches, first..last, camera.as_vec3().to_array()),
@@ -42,13 +42,13 @@ pub fn match_visible_side(
 }
 
 /// Matches looked at together: a whole number of SIMD lanes.
-const LANES: usize = 32;
+const MATCHES: usize = 32;
 
 /// Which matches, of points inside, are on the side that faces away from a camera.
 #[inline(always)]
-fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) -> [bool; LANES] {
+fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) -> [bool; MATCHES] {
     let LimbMatches { measured, weight, surface, .. } = matches;
-    let mut away = [false; LANES];
+    let mut away = [false; MATCHES];
     let (px, py, pz) = (&measured.x[range.clone()], &measured.y[range.clone()], &measured.z[range.clone()]);
     let normals = &surface.normals;
     let (nx, ny, nz) = (&normals.x[range.clone()], &normals.y[range.clone()], &normals.z[range.clone()]);

@@ -7,15 +7,14 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
+use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
 
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
 /// are soft by some degrees; a joint may turn by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
-/// Places along an axis that are looked at, as shares of the limb's length, and how deep (metres) one lies in another limb when
-/// it is inside: surfaces touch.
-const AXIS_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+/// How deep (metres) a place of an axis lies in another limb when it is inside: surfaces touch.
 const INSIDE: f64 = 0.01;
 /// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
 const ROUGHLY: f64 = 0.08;
@@ -72,7 +71,7 @@ fn overlap_cost(body: &Body, chain: &TwoBone, poses: &[Pose]) -> f64 {
         let patches = 2.0 * shape.length() * shape.b0().max(shape.b1()) / REFERENCE_PATCH;
         // The joint of the upper limb lies inside its parent.
         let first = if limb == chain.upper { 2 } else { 0 };
-        for place in &AXIS_PLACES[first..] {
+        for place in &ALONG_LIMB[first..] {
             let point = poses[limb] * Vec3::new(0.0, 0.0, place * shape.length());
             let within = (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
                 let shape = &body.limbs()[other].shape;
@@ -81,7 +80,7 @@ fn overlap_cost(body: &Body, chain: &TwoBone, poses: &[Pose]) -> f64 {
                 (point - poses[other].translation).length_squared() < reach * reach
                     && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -INSIDE
             });
-            cost += if within { patches / AXIS_PLACES.len() as f64 } else { 0.0 };
+            cost += if within { patches / ALONG_LIMB.len() as f64 } else { 0.0 };
         }
     }
     cost

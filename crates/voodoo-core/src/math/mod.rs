@@ -9,5 +9,5 @@ mod weighted_points;
 pub use absolute_orientation::Moments;
 pub use cholesky::{factor, solve_in_place, substitute};
 pub use geometry::*;
-pub(crate) use simd::{has_avx512, widest};
+pub(crate) use simd::{LANES, has_avx512, widest};
 pub use weighted_points::WeightedPoints;

@@ -1,5 +1,8 @@
 //! Run-time choice of instruction set for loops that the compiler vectorises.
 
+/// Values of single precision that one SIMD register holds, in AVX2.
+pub const LANES: usize = 8;
+
 /// Runs `work`, compiled for AVX-512 or AVX2 where this processor has it; write `widest(#[inline(always)] || ...)`.
 ///
 /// Fused multiply-add is left out on purpose: without it the result is the same, bit by bit, on every processor.

@@ -1,6 +1,6 @@
 //! Neighbouring candidates together: what is true of all of them is then asked once.
 
-use crate::math::{Points, widest};
+use crate::math::{LANES, Points, widest};
 
 /// Points of a cluster: a whole number of SIMD lanes.
 pub const CLUSTER: usize = 32;
@@ -164,8 +164,6 @@ impl Axis {
 /// Least and greatest of some values, in lanes.
 #[inline(always)]
 fn range(values: &[f32]) -> [f32; 2] {
-    /// Values side by side: one SIMD register of single precision.
-    const LANES: usize = 8;
     let (mut low, mut high) = ([f32::MAX; LANES], [f32::MIN; LANES]);
     let (whole, rest) = values.as_chunks::<LANES>();
     for lanes in whole {

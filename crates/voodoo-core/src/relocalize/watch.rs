@@ -1,7 +1,7 @@
 //! When a body is searched: after some frames in which it was lost, and for a while after it was found.
 
 /// The body is searched from this many frames on in which it was lost: a blurred frame is no loss.
-const PATIENCE: usize = 3;
+const LOST_PATIENCE: usize = 3;
 /// After it was found, every so manyth frame is searched again for so long, seconds, or until it was seen to walk: another
 /// facing may prove better.
 const WATCH: f64 = 5.0;
@@ -40,7 +40,7 @@ impl Watch {
 
     /// In how many of the last frames the body was lost, from the one on in which the search began; `None` otherwise.
     pub(super) fn searched(&self) -> Option<usize> {
-        self.lost.checked_sub(PATIENCE)
+        self.lost.checked_sub(LOST_PATIENCE)
     }
 
     /// The body is lost, or was a moment ago.
@@ -57,12 +57,12 @@ impl Watch {
     pub(super) fn due(&mut self, sighting: Sighting) -> bool {
         if sighting.lost {
             self.lost += usize::from(!sighting.silent);
-        } else if self.lost < PATIENCE {
+        } else if self.lost < LOST_PATIENCE {
             self.lost = 0;
         }
         self.until = self.until.filter(|until| sighting.stamp < *until);
         self.frames += 1;
-        self.lost >= PATIENCE || (self.open() && self.frames.is_multiple_of(WATCHED))
+        self.lost >= LOST_PATIENCE || (self.open() && self.frames.is_multiple_of(WATCHED))
     }
 
     /// Ends the search of a frame; `ahead`: it walks where it faces. Whether the pose is to be given up.

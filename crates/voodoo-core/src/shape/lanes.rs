@@ -6,8 +6,7 @@ use super::ruling::{Angle, Foot};
 use super::{SurfacePoint, TaperedEllipticCylinder};
 use crate::math::{Vec3, widest};
 
-/// Queries that are worked on together.
-pub(super) const LANES: usize = 8;
+pub(super) use crate::math::LANES;
 type Lanes = [f64; LANES];
 
 /// One [`Foot`] a lane.

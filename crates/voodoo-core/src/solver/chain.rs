@@ -2,14 +2,12 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::LARGEST_TURN;
 use crate::body::Body;
 use crate::body::kinematics::{Chain, exp, joint_axes, joint_turn, place, screw};
 use crate::math::solve_in_place;
 use crate::math::{Pose, Quat, Vec3};
 use crate::terms::normal_equations::NormalEquations;
-
-/// Largest turn of a joint in one step, radians.
-const LARGEST_TURN: f64 = 0.5;
 
 /// Working memory of the chain solver.
 #[derive(Debug, Default)]

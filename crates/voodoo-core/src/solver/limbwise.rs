@@ -15,7 +15,7 @@ pub struct Limbwise {
 }
 
 /// Rounds in which the chain follows the sites: an arm is three joints long.
-const WARM_START_ROUNDS: usize = 3;
+const LIMBWISE_ROUNDS: usize = 3;
 
 impl Solver for Limbwise {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
@@ -49,7 +49,7 @@ impl Solver for Limbwise {
             return false;
         }
         self.warm_start.step(problem, poses);
-        problem.step + 1 < WARM_START_ROUNDS
+        problem.step + 1 < LIMBWISE_ROUNDS
     }
 
     fn schedule(&self, config: &Config) -> Schedule {
@@ -67,14 +67,15 @@ impl Solver for Limbwise {
 
 /// Moments of the surface matches of one limb about `centre`, four lanes wide so that they vectorise.
 fn surface_moments(matches: &LimbMatches, centre: Vec3) -> Moments {
-    const LANES: usize = 4;
+    /// Sums side by side: one SIMD register of double precision, in AVX2.
+    const WIDE: usize = 4;
     let c = centre.to_array().map(|value| value as f32);
     let (x, p) = (&matches.surface.points, &matches.measured);
     let count = matches.weight.len();
     // w, w x, w p, w p x^T
-    let mut sums = [[0.0_f64; LANES]; 16];
+    let mut sums = [[0.0_f64; WIDE]; 16];
     for index in 0..count {
-        let lane = index % LANES;
+        let lane = index % WIDE;
         let w = f64::from(matches.weight[index]);
         let xs = [x.x[index] - c[0], x.y[index] - c[1], x.z[index] - c[2]].map(f64::from);
         let ps = [p.x[index] - c[0], p.y[index] - c[1], p.z[index] - c[2]].map(f64::from);

@@ -3,13 +3,12 @@
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
 
+use super::LARGEST_TURN;
 use crate::body::kinematics::exp;
 use crate::body::{Body, Joint, JointKind};
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations, line};
 
-/// Largest turn of a limb in one step, radians.
-const LARGEST_TURN: f64 = 0.5;
 /// Information every unknown has from the start, so that nothing is singular.
 const FLOOR: f64 = 1e-6;
 

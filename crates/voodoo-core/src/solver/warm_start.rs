@@ -6,7 +6,7 @@
 //! With points the limbs on the way to a site follow their own along with it, and every other limb is held where it is by as
 //! many points as it has: an arm that can reach its hand leaves the trunk alone, and a leg that nothing measures is carried.
 
-use super::{ChainSolver, Problem};
+use super::{ChainSolver, DAMPING, LIMIT_SIGMA, Problem};
 use crate::association::correspondence::SitePair;
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
@@ -14,10 +14,6 @@ use crate::math::Pose;
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
 
-/// Standard deviation of a violated joint limit, radians.
-const LIMIT_SIGMA: f64 = 0.05;
-/// Relative damping of the normal matrix.
-const DAMPING: f64 = 1e-3;
 /// Information of the heaviest site in surface points of weight one. Only the proportions of weights matter in this solver,
 /// and the limbs' own points have their say afterwards.
 const DRIVING_INFORMATION: f64 = 2.0;

@@ -2,15 +2,16 @@
 
 use super::lengths::Lengths;
 use super::schedule::narrowed;
-use super::{ChainSolver, Gate, Problem, Reassociation, Schedule, Solver, TreeSolver, WarmStart, WarmStartInput};
+use super::{
+    ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Reassociation, Schedule, Solver, TreeSolver, WarmStart,
+    WarmStartInput,
+};
 use crate::body::Pair;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Contour, Limits, Penetration, Prior, Sites, Surface, Term};
 
-/// Standard deviation of a violated joint limit, radians: 3 degrees.
-const LIMIT_SIGMA: f64 = 0.05;
 /// Standard deviation of an axis that lies in another limb, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
@@ -18,7 +19,7 @@ const ROUGH: f64 = 0.35;
 /// From this step on, what is left of a deviation from the prediction may be noise: before, the body has to find its points.
 const CALM_FROM: usize = 3;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
-const SHOWN: f64 = 20.0;
+const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
@@ -27,8 +28,6 @@ const SITE_SCALE: f64 = 0.15;
 /// Sites farther than this from their measurement drive the chain before the points are assigned, metres; rounds of it.
 const DRIVEN_FROM: f64 = 0.25;
 const WARM_START_ROUNDS: usize = 4;
-/// Relative damping of the normal matrix.
-const DAMPING: f64 = 1e-3;
 
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
@@ -140,7 +139,7 @@ impl WholeBody {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb];
-            let shown = (measured / SHOWN).clamp(HIDDEN_MOTION, 1.0);
+            let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
     }

@@ -3,7 +3,7 @@
 use super::Term;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::body::Body;
-use crate::math::{Mat3, Pose, widest};
+use crate::math::{LANES, Mat3, Pose, widest};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 
 /// `W = w (n n^T + tangential_weight (I - n n^T))` under the Geman-McClure kernel of the signed distance.
@@ -38,8 +38,6 @@ impl Term for Surface<'_> {
     }
 }
 
-/// Points that are summed side by side: a whole number of SIMD lanes.
-const LANES: usize = 8;
 type Lanes = [f32; LANES];
 
 /// Sums over the points of a limb, each split into lanes. Points lie near the working frame's origin and are single

@@ -10,13 +10,11 @@ use rayon::prelude::*;
 
 use crate::body::Body;
 use crate::error::TrackError;
-use crate::math::{Pose, Vec3, widest};
+use crate::math::{LANES, Pose, Vec3, widest};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Mark of a pixel that shows no limb.
 pub const NO_LIMB: u16 = u16::MAX;
-/// Rays worked on together: one SIMD register of double precision.
-const LANES: usize = 8;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
 const ROWS_TOGETHER: usize = 16;
 /// Limbs nearer to the camera plane than this have no usable bounds in the image, metres; every ray is tried.
