@@ -3,7 +3,7 @@
     python examples/covered_camera.py ../shared/data/rendered/dev_0[1-7]* --seconds 1 2
 
 While it is covered, no pixel has a return. Prints the share of covered frames in which the track said `lost`, the mean error of
-the twelve joints half a second after, and the same with `recovery = false`, where nobody looks for a lost body.
+the twelve joints half a second after, and the same with `relocalization = false`, where nobody looks for a lost body.
 """
 
 import argparse
@@ -25,7 +25,7 @@ BACK_S = 0.5
 """So long after the cover is gone the error is taken, over three frames."""
 
 
-def run(path: Path, seconds: float, *, recovery: bool) -> tuple[float, float]:
+def run(path: Path, seconds: float, *, relocalization: bool) -> tuple[float, float]:
     """Share of the covered frames that are called lost; mean error [m] half a second later."""
     recording = voodoo.open_recording(path)
     if recording.reference is None or not recording.reference.exact:
@@ -36,7 +36,7 @@ def run(path: Path, seconds: float, *, recovery: bool) -> tuple[float, float]:
     covered = (stamps >= begins) & (stamps < begins + seconds)
     if begins <= stamps[0] or stamps[-1] < begins + seconds + BACK_S:
         raise SystemExit(f"{recording.name}: expected more than {seconds + 2 * BACK_S:g} s, found {np.ptp(stamps):.1f}")
-    tracker = start_tracker(recording, config=voodoo.Config(recovery=recovery))
+    tracker = start_tracker(recording, config=voodoo.Config(relocalization=relocalization))
     front_end = FrontEnd(tracker, settings=FrontEndSettings.of(recording, use=("depth",)))
     estimates = []
     for frame, hidden in zip(frames, covered, strict=True):
@@ -58,11 +58,11 @@ def main() -> None:
     parser.add_argument("recordings", nargs="+", type=Path)
     parser.add_argument("--seconds", nargs="+", type=float, default=[1.0, 2.0])
     options = parser.parse_args()
-    print("| recording | covered, s | called lost | error after, cm | without recovery |\n|---|---|---|---|---|")
+    print("| recording | covered, s | called lost | error after, cm | without relocalization |\n|---|---|---|---|---|")
     for path in options.recordings:
         for seconds in options.seconds:
-            lost, found = run(path, seconds, recovery=True)
-            _, without = run(path, seconds, recovery=False)
+            lost, found = run(path, seconds, relocalization=True)
+            _, without = run(path, seconds, relocalization=False)
             print(
                 f"| {path.name} | {seconds:g} | {100 * lost:.0f} % | {100 * found:.1f} | {100 * without:.1f} |",
                 flush=True,

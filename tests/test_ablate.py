@@ -51,10 +51,10 @@ def test_every_variant_differs_in_one_entry():
     switches = {key for key, value in base.values().items() if isinstance(value, bool)}
     assert {name.split(" = ")[0] for name in names} == switches | {
         "solver",
-        "slide",
+        "tangential_weight",
         "prediction",
         "motion_scale",
-        "calm",
+        "still_prior_gain",
     }
     assert "hypotheses = false" in names and 'solver = "limbwise"' in names and "prediction = 0.0" in names
     still = [variant.name for variant in variants(voodoo.Config(prediction=0.0))]

@@ -26,4 +26,4 @@ def test_a_covered_camera_is_called_lost_and_the_person_is_found_again(covered, 
 
 def test_a_recording_that_is_too_short_is_refused(covered):
     with pytest.raises(SystemExit, match="expected more than 61 s, found"):
-        covered.run(BUNDLED, 60.0, recovery=True)
+        covered.run(BUNDLED, 60.0, relocalization=True)

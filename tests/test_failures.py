@@ -22,7 +22,7 @@ def test_only_what_is_lost_gets_a_picture(monkeypatch):
 
     def blind(recording, **how):
         """A tracker whose body cannot move: it stays where it started."""
-        still = voodoo.Config(gate_start=0.001, gate_end=0.001, hypotheses=False, recovery=False, outline=False)
+        still = voodoo.Config(gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, outline=False)
         return running.start_tracker(recording, config=still, **how)
 
     monkeypatch.setattr(failures, "start_tracker", blind)

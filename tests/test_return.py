@@ -44,7 +44,7 @@ def test_walks_out_on_one_side_and_in_on_the_other(body):
     back = stamps > 5.5
     assert (status[back] != "lost").all()
     assert error[back].max() < 0.12 and (swapped[back] > error[back]).all()
-    *_, without, _ = follow(walk, recovery=False)
+    *_, without, _ = follow(walk, relocalization=False)
     assert without[-1] > 0.5, "it comes back without the search, too: the test shows nothing"
 
 

@@ -10,7 +10,7 @@ from voodoo.synthetic.render import render_depth
 from voodoo.synthetic.sequence import CAMERA, METRES_PER_UNIT, VirtualSequence
 
 WALL_M, NOISE_M = 3.6, 0.004
-HELD = {"gate_start": 0.001, "gate_end": 0.001, "hypotheses": False, "outline": False, "recovery": False}
+HELD = {"gate_start": 0.001, "gate_end": 0.001, "hypotheses": False, "outline": False, "relocalization": False}
 """Matches within a millimetre only, and no other corrections: the body stays where it was put, and is judged there."""
 LIMBS = ("upperarm", "forearm", "hand", "thigh", "calf", "foot")
 OUT = {"l_shoulder_ry": -0.9, "r_shoulder_ry": 0.9}

@@ -126,8 +126,8 @@ def test_calm_steadies_a_body_that_does_not_fit_well(body):
     """Rough surfaces make a standing body tremble; what deviates little from the prediction is held as noise."""
     source = sequence(body, speed=0.05, frames=40, noise_m=0.03)
     trembling = []
-    for calm in (voodoo.Config().calm, 0.0):
-        tracker = voodoo.Tracker(body, config=voodoo.Config(calm=calm))
+    for calm in (voodoo.Config().still_prior_gain, 0.0):
+        tracker = voodoo.Tracker(body, config=voodoo.Config(still_prior_gain=calm))
         errors, angles, _, _ = follow(list(source), source, tracker)
         assert errors.mean() < 0.01
         trembling.append(np.var(np.diff(angles, n=2, axis=0), axis=0).mean())

@@ -243,7 +243,7 @@ config! {
     point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
     /// Share of a surface point's information that holds it along the surface as well, for the whole-body solvers: 0 is
     /// point-to-plane, 1 point-to-point; a little stops limbs from sliding along themselves.
-    slide: f64 = 0.07, "", 0.0 ..= 1.0;
+    tangential_weight: f64 = 0.07, "", 0.0 ..= 1.0;
     /// Greatest distance of a matched point in the first step of a frame, for the whole-body solvers; it narrows.
     gate_start: f64 = 0.30, "m", 0.001 ..= 10.0;
     /// Greatest distance of a matched point once narrowed, for the whole-body solvers.
@@ -265,11 +265,11 @@ config! {
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
     /// A motion that hardly differs from the expected one is held tighter by this factor of information, as noise; 0: as any
     /// other. Greater is calmer at rest and later in slow turns (whole-body solvers).
-    calm: f64 = 30.0, "", 0.0 ..= 10000.0;
+    still_prior_gain: f64 = 30.0, "", 0.0 ..= 10000.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones (whole-body solvers).
     hypotheses: bool = true, "";
     /// Look for a lost body in everything that is not background (whole-body solvers).
-    recovery: bool = true, "";
+    relocalization: bool = true, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body solvers).
     outline: bool = true, "";
     /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).

@@ -165,7 +165,7 @@ fn a_warm_step_or_rendering_allocates_nothing() {
         // The step itself allocates nothing here either; the queue through which rayon hands work to its threads takes a
         // new block for every 63 jobs, and a frame hands over at most one job an ICP step and one more, or a hundred when a
         // lost body is searched.
-        let searched = if config.recovery { COUNTED / 4 * 100 } else { 0 };
+        let searched = if config.relocalization { COUNTED / 4 * 100 } else { 0 };
         let jobs = COUNTED * (config.max_steps + 1) + searched;
         let many = allocations(Config { threads: 2, ..config.clone() }, &frames);
         assert!(many <= jobs / 63 + 1, "{many} allocations in {COUNTED} frames, {config:?}");

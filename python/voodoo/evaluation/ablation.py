@@ -18,7 +18,7 @@ from voodoo.names import HumanModel
 
 UNCHANGED = "as configured"
 # Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty weighs nothing.
-_OFF = (("slide", 0.0), ("prediction", 0.0), ("motion_scale", 100.0), ("calm", 0.0))
+_OFF = (("tangential_weight", 0.0), ("prediction", 0.0), ("motion_scale", 100.0), ("still_prior_gain", 0.0))
 _MEASURES = (
     ("error_m", "error", 100.0, "cm", 2),
     ("within_10cm", "within 10 cm", 100.0, "%", 1),

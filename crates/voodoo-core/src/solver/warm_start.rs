@@ -125,7 +125,7 @@ impl WarmStart {
         let surface =
             |slide| Surface { correspondences, information, tangential_weight: slide, scale: config.kernel_start };
         // Limbs that follow may slide along themselves.
-        surface(config.slide).add(body, &self.closed, &mut self.normal);
+        surface(config.tangential_weight).add(body, &self.closed, &mut self.normal);
         self.held.clear(self.closed.len());
         surface(1.0).add(body, &self.closed, &mut self.held);
         let blocks = self.normal.limbs.iter_mut().zip(&self.held.limbs);

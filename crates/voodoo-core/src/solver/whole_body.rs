@@ -17,7 +17,7 @@ const OVERLAP_SIGMA: f64 = 0.03;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
 const ROUGH: f64 = 0.35;
 /// From this step on, what is left of a deviation from the prediction may be noise: before, the body has to find its points.
-const CALM_FROM: usize = 3;
+const STILL_FROM: usize = 3;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
@@ -96,7 +96,7 @@ impl WholeBody {
         let root = [config.root_turn_sigma, config.root_shift_sigma]
             .map(|sigma| sigma * problem.time_scale * config.motion_scale);
         let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
-        let surface = Surface { correspondences, information, tangential_weight: config.slide, scale };
+        let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
         let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
         let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
         let still_gain = still_prior_gain(problem, information);
@@ -149,8 +149,8 @@ impl WholeBody {
 fn still_prior_gain(problem: &Problem, information: f64) -> f64 {
     let Problem { correspondences, config, step, .. } = problem;
     // After the last step only lengths are asked for: a pose held tightly would let them bear every deviation.
-    let holds = (CALM_FROM..config.max_steps).contains(step);
+    let holds = (STILL_FROM..config.max_steps).contains(step);
     // Points that lie closer to the body than they are trusted to are not at rest by chance: what they show is motion.
     let scatter = if holds { correspondences.scatter(config.kernel_end).unwrap_or(0.0) } else { 0.0 };
-    config.calm * (scatter * information / (ROUGH * ROUGH)).min(1.0)
+    config.still_prior_gain * (scatter * information / (ROUGH * ROUGH)).min(1.0)
 }

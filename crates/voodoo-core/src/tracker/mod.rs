@@ -95,7 +95,7 @@ impl Tracker {
         let known = motion.stamp.is_some();
         // Where the body is expected, and what the frame shows there (1).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
-        let searched = relocalizer.searched().filter(|_| config.recovery);
+        let searched = relocalizer.searched().filter(|_| config.relocalization);
         let Motion { poses, previous, predicted, origin, .. } = motion;
         let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched };
         observer.observe(frame, expected, config);
@@ -114,7 +114,7 @@ impl Tracker {
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
         motion.commit(frame.stamp);
-        if self.config.recovery && schedule.whole_body {
+        if self.config.relocalization && schedule.whole_body {
             self.relocalize(frame);
         }
         self.remember();

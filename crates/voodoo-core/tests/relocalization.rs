@@ -52,7 +52,7 @@ fn lost_at_once_and_found_at_once_elsewhere() {
         assert!(off < 0.05, "{name} is off by {off} m");
     }
     // Without the search it stays where it was, and says so.
-    let (_, without) = cover_and_move(Config { recovery: false, ..Config::default() });
+    let (_, without) = cover_and_move(Config { relocalization: false, ..Config::default() });
     assert_eq!(without[29].status, Status::Lost);
 }
 
