@@ -8,7 +8,6 @@ use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, Po
 
 use crate::arrays::{PointArray, PointView};
 use crate::errors::IntoPy;
-use crate::frame::PyFrame;
 
 pub struct CloudData {
     pub points: PointArray,
@@ -95,9 +94,18 @@ impl Borrowed<'_> {
     }
 }
 
-impl PyFrame {
+/// What a `Frame` holds.
+#[derive(Clone, Copy)]
+pub struct Held<'a> {
+    pub clouds: &'a [CloudData],
+    pub images: &'a [ImageData],
+    pub sites: &'a [SiteData],
+    pub ground: Option<Ground>,
+}
+
+impl Held<'_> {
     /// Borrows the arrays and looks the names up in `body`.
-    pub fn borrow_for<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
+    pub fn borrow_for<'py>(self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
         let clouds = self
             .clouds
             .iter()
@@ -135,7 +143,7 @@ impl PyFrame {
             })
             .collect();
         let (mut positions, mut rays) = (Vec::new(), Vec::new());
-        for data in &self.sites {
+        for data in self.sites {
             let site = body.site_index(&data.site).map_err(|error| error.into_py(py))?;
             match data.direction {
                 None => positions.push(PositionRelation {

@@ -2,10 +2,11 @@
 
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use voodoo_core::Body;
 use voodoo_core::observation::frame::Ground;
 
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
-use crate::borrowed::{CloudData, DepthArray, ImageData, SiteData};
+use crate::borrowed::{Borrowed, CloudData, DepthArray, Held, ImageData, SiteData};
 use crate::errors::exception;
 
 /// All measurements of one instant, from any number of sensors.
@@ -28,6 +29,12 @@ pub struct PyFrame {
 }
 
 impl PyFrame {
+    /// Borrows the arrays and looks the names up in `body`.
+    pub fn borrow_for<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
+        let Self { clouds, images, sites, ground, .. } = self;
+        Held { clouds, images, sites, ground: *ground }.borrow_for(py, body)
+    }
+
     fn source(&mut self, name: &str) -> u16 {
         let index = self.sources.iter().position(|known| known == name).unwrap_or_else(|| {
             self.sources.push(name.to_owned());
