@@ -53,7 +53,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Standard deviation of a surface point of weight one, for the whole-body solvers. (unit: m; range: 0.0001
     to 1)
     """
-    slide: float = 0.07
+    tangential_weight: float = 0.07
     """Share of a surface point's information that holds it along the surface as well, for the whole-body
     solvers: 0 is point-to-plane, 1 point-to-point; a little stops limbs from sliding along themselves.
     (range: 0 to 1)
@@ -89,7 +89,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     eq. 18, 26). Smaller is smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
     (range: 0.01 to 100)
     """
-    calm: float = 30.0
+    still_prior_gain: float = 30.0
     """A motion that hardly differs from the expected one is held tighter by this factor of information, as
     noise; 0: as any other. Greater is calmer at rest and later in slow turns (whole-body solvers). (range: 0
     to 10000)
@@ -98,7 +98,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Try other configurations of arms and legs where the frame speaks against the current ones (whole-body
     solvers).
     """
-    recovery: bool = True
+    relocalization: bool = True
     """Look for a lost body in everything that is not background (whole-body solvers)."""
     outline: bool = True
     """Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body

@@ -205,7 +205,8 @@ impl Solver {
     /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
     /// are as good as before the phase.
     fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
-        let looking = std::mem::take(&mut self.looking);
+        let looking = self.looking;
+        self.looking = false;
         let mut moved = false;
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {

@@ -2,12 +2,13 @@
 //!
 //! A limb that lies on another explains points that the other explains as well, and the cameras see it where it is: neither
 //! proves it right. What only this limb explains, against what of it should show, does; and a camera that sees past it proves
-//! it wrong. For arms and legs, `limb_support` looks closer at what the depth images show; without any, an arm or leg is as good as
-//! what it hangs on.
+//! it wrong. For arms and legs, `limb_support` looks closer at what the depth images show; without any, an arm or leg is as
+//! good as what it hangs on.
 //!
-//! That is said twice. What the tracker goes by itself (where a limb ended when all was well, whose girth an outline shows) has to
-//! be proven along the whole limb and over several frames. What is reported of this frame has to be reported before the limb is far off,
-//! and it asks for both limbs of an arm or leg: a forearm on an arm that nothing proves may be anything that is seen there.
+//! That is said twice. What the tracker goes by itself (the internal status: where a limb ended when all was well, whose girth a
+//! contour shows) has to be proven along the whole limb and over several frames. What is reported of this frame has to be
+//! reported before the limb is far off, and it asks for both limbs of an arm or leg: a forearm on an arm that nothing proves may
+//! be anything that is seen there.
 //!
 //! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
 //! body is called tracked of which more than a quarter of the limbs is not measured.
