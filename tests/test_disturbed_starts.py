@@ -45,7 +45,9 @@ def test_a_lost_joint_is_named(disturbed, monkeypatch):
         """It stays where it started: nothing is near enough to be matched."""
 
         def __init__(self, body):
-            blind = voodoo.Config(gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, outline=False)
+            blind = voodoo.Config(
+                gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, outline=False
+            )
             super().__init__(body, config=blind)
 
     monkeypatch.setattr(voodoo, "Tracker", Still)

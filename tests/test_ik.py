@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import voodoo
-from ik_cases import EXAMPLES, front_camera, shoulder, within
+from ik_cases import front_camera, shoulder, within
 from voodoo import ik
 
 
@@ -175,14 +175,6 @@ def test_follower_starts_from_the_last_posture(arm):
 def test_bad_input_is_named(arm, call, words):
     with pytest.raises(voodoo.VoodooError, match=words):
         call(arm)
-
-
-def test_the_example_of_the_documentation_runs():
-    text = (EXAMPLES.parent / "docs" / "ik.md").read_text(encoding="utf-8")
-    camera, pose = front_camera()
-    names = {"mask": np.ones((120, 160)), "camera": camera, "pose": pose, "hand": (0.3, 0.2, 0.1), "thorax": np.eye(4)}
-    exec(text.split("```python\n")[1].split("```")[0], names)
-    assert names["posture"].images == 1 and len(names["posture"].angles) == 7
 
 
 @settings(max_examples=25, deadline=None)

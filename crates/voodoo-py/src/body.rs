@@ -1,4 +1,4 @@
-//! `Body`: made by `voodoo.body` from validated parts.
+//! `Body`: made by `voodoo.model.body` from validated parts.
 
 use pyo3::prelude::*;
 use voodoo_core::Body;
