@@ -18,14 +18,22 @@ const VIEW: Viewpoint<'static> = Viewpoint {
     world_from_sensor: Pose::IDENTITY,
 };
 
+/// Depth of the wall behind the body, millimetres.
+const WALL: u16 = 4500;
+
 /// A human who stands 2.6 m before the camera and faces it.
 pub(crate) fn standing() -> (Model, Vec<Pose>) {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let poses = stand(&body);
+    (Model::new(body), poses)
+}
+
+/// Any body as it stands there.
+pub(crate) fn stand(body: &Body) -> Vec<Pose> {
     // The body's x looks forward and z up; the camera's y points down.
     let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
     let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
-    let poses = body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces));
-    (Model::new(body), poses)
+    body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces))
 }
 
 /// Depth in millimetres, as the camera sees a posed body before nothing.
@@ -33,6 +41,24 @@ pub(crate) fn depth(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
     rendering.render(body, poses, &VIEW, None).unwrap();
     rendering.depth().iter().map(|depth| (depth * 1000.0) as u16).collect()
+}
+
+/// The same before a wall.
+pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
+    depth(body, poses).into_iter().map(|depth| if depth == 0 { WALL } else { depth }).collect()
+}
+
+/// Puts a board that faces the camera before what an image shows; half its width and height, metres.
+pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64; 2]) {
+    let [fx, fy, cx, cy] = VIEW.intrinsics;
+    for (index, pixel) in pixels.iter_mut().enumerate() {
+        let (column, row) = ((index % VIEW.width) as f64, (index / VIEW.width) as f64);
+        let (x, y) = (centre.z * (column - cx) / fx, centre.z * (row - cy) / fy);
+        let depth = (1000.0 * centre.z) as u16;
+        if (x - centre.x).abs() < width && (y - centre.y).abs() < height && (*pixel == 0 || depth < *pixel) {
+            *pixel = depth;
+        }
+    }
 }
 
 /// A frame of one depth image.
@@ -83,6 +109,32 @@ pub(crate) fn turned(poses: &[Pose], centre: Vec3, axis: Vec3, angle: f64) -> Ve
     let turn = Quat::from_axis_angle(axis, angle);
     let place = |pose: &Pose| Pose::from_parts(centre + turn * (pose.translation - centre), turn * pose.rotation);
     poses.iter().map(place).collect()
+}
+
+/// Poses moved by `shift`.
+pub(crate) fn moved(poses: &[Pose], shift: Vec3) -> Vec<Pose> {
+    poses.iter().map(|pose| Pose::from_parts(pose.translation + shift, pose.rotation)).collect()
+}
+
+/// Number of the first arm among the extremities of a model.
+pub(crate) fn first_arm(model: &Model) -> usize {
+    model.extremities.iter().position(|chain| !chain.leg).unwrap()
+}
+
+/// Poses with the first arm stretched out to its side, upwards by `rise` metres, and the place where it ends.
+pub(crate) fn raised(model: &Model, poses: &[Pose], rise: f64) -> (Vec<Pose>, Vec3) {
+    let arm = &model.extremities[first_arm(model)];
+    let root = arm.root(&model.body, poses);
+    let aside = (root.x - poses[0].translation.x).signum();
+    let mut raised = poses.to_vec();
+    arm.reach(&model.body, &mut raised, root + Vec3::new(0.5 * aside, -rise, 0.0), 0.0);
+    let end = arm.end(&raised);
+    (raised, end)
+}
+
+/// Parameters with which nothing is learnt of the scene, and candidates reach as far as the body does.
+pub(crate) fn without_background() -> Config {
+    Config { background: false, body_box_margin: 0.6, ..Config::default() }
 }
 
 /// Greatest distance between the limbs of two poses, metres.

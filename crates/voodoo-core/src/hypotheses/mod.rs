@@ -231,3 +231,101 @@ impl Refined {
         false
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
+
+    /// Shows what is seen in `frames` to hypotheses that start with the arms hanging; the poses after every frame, and the steps.
+    fn improved(frames: &[&Vec<Pose>]) -> Vec<(Vec<Pose>, usize)> {
+        let (model, mut poses) = standing();
+        let config = without_background();
+        let (mut hypotheses, mut fit) = (Hypotheses::default(), Fit::new(&config).unwrap());
+        hypotheses.restart(&model);
+        let mut found = Vec::new();
+        for seen in frames {
+            let (pixels, previous) = (before_wall(&model.body, seen), poses.clone());
+            let mut predicted = previous.clone();
+            with_context(&pixels, &config, &model, &previous, |context| {
+                fit.match_last(context, &poses);
+                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted);
+                assert_eq!(poses == previous, predicted == previous, "what is taken is what is expected");
+                found.push((poses.clone(), steps));
+            });
+        }
+        found
+    }
+
+    #[test]
+    fn a_right_pose_is_left_alone_bit_by_bit() {
+        let (_, poses) = standing();
+        for (found, steps) in improved(&[&poses; 4]) {
+            assert_eq!((found, steps), (poses.clone(), 0));
+        }
+    }
+
+    #[test]
+    fn a_raised_arm_is_found_when_two_frames_in_a_row_ask_for_it() {
+        let (model, poses) = standing();
+        let (seen, _) = raised(&model, &poses, 0.2);
+        let found = improved(&[&seen; 5]);
+        let steps: Vec<usize> = found.iter().map(|(_, steps)| *steps).collect();
+        assert_eq!(steps, [0, REFINE, REFINE, 0, 0], "one frame is waited for, two ask, and then all is well");
+        assert!(found[..2].iter().all(|(found, _)| *found == poses));
+        assert!(farthest(&found[2].0, &seen) < 0.01, "{}", farthest(&found[2].0, &seen));
+    }
+
+    #[test]
+    fn two_disturbed_frames_before_one_in_order_change_nothing() {
+        let (model, poses) = standing();
+        let (seen, _) = raised(&model, &poses, 0.2);
+        for (found, _) in improved(&[&seen, &seen, &poses, &seen, &seen, &poses]) {
+            assert_eq!(found, poses);
+        }
+    }
+
+    #[test]
+    fn what_does_not_explain_the_frame_better_is_refused_and_leaves_no_trace() {
+        let (model, poses) = standing();
+        let (pixels, config) = (before_wall(&model.body, &poses), without_background());
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let (mut fit, mut refined, mut suspicion) =
+                (Fit::new(&config).unwrap(), Refined::default(), Suspicion::default());
+            fit.match_last(context, &poses);
+            let before = format!("{:?}", fit.correspondences());
+            let (wrong, _) = raised(&model, &poses, 0.2);
+            assert!(!refined.refine(context, first_arm(&model), &mut fit, &poses, &wrong, &mut suspicion, Basis::Rest));
+            assert_eq!(format!("{:?}", fit.correspondences()), before);
+        });
+    }
+
+    #[test]
+    fn ends_are_remembered_of_arms_that_a_frame_proves_right_until_the_body_is_lost() {
+        let (model, poses) = standing();
+        let mut hypotheses = Hypotheses::default();
+        hypotheses.restart(&model);
+        let origin = Vec3::new(3.0, -1.0, 2.0);
+        let mut motion = Motion::default();
+        (motion.poses, motion.origin) = (poses, origin);
+        let (arm, legs) = (first_arm(&model), model.extremities.iter().filter(|chain| chain.leg).count());
+        let known =
+            |hypotheses: &Hypotheses| hypotheses.history.iter().filter(|own| own.last_good_end.is_some()).count();
+        assert_eq!(legs, 2);
+        // One arm is not measured, and something spoke against one that is.
+        hypotheses.history[arm + 1].persistence.observe(Some(PATIENCE));
+        hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
+        assert_eq!(known(&hypotheses), 2, "the legs");
+        hypotheses.history[arm + 1].persistence.observe(None);
+        hypotheses.remember(&model, &motion, false, |_| true);
+        for (own, chain) in hypotheses.history.iter().zip(&model.extremities) {
+            assert_eq!(own.last_good_end, Some(chain.end(&motion.poses) + origin));
+        }
+        hypotheses.remember(&model, &motion, false, |_| false);
+        assert_eq!(known(&hypotheses), 4, "who is not measured now has been");
+        hypotheses.remember(&model, &motion, true, |_| false);
+        assert_eq!(known(&hypotheses), 0);
+    }
+}

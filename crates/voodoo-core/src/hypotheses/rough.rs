@@ -146,3 +146,45 @@ impl RoughSearch {
         least
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::fit::Fit;
+    use crate::hypotheses::unexplained::Unexplained;
+    use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
+
+    #[test]
+    fn the_raised_hand_is_where_an_arm_ends_at_least_cost() {
+        let (model, poses) = standing();
+        let (seen, end) = raised(&model, &poses, 0.2);
+        let (pixels, config) = (before_wall(&model.body, &seen), without_background());
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, &poses);
+            let at = Extremity { context, matched: fit.matched(&poses), index: first_arm(&model) };
+            let mut unexplained = Unexplained::default();
+            unexplained.collect(context, at.matched);
+            let mut rough = RoughSearch::default();
+            unexplained.near(at.root(), at.chain().stretched_length(), &mut rough.score.unexplained);
+            rough.score.begin(at, &WeightedPoints::default());
+            let hanging = rough.score.cost(at, &poses, f64::INFINITY);
+            let truth = rough.score.cost(at, &seen, f64::INFINITY);
+            let mut best = Vec::new();
+            let least = rough.end_at(at, end, 6, hanging, &mut best);
+            assert!(truth < 0.3 * hanging && least < 0.5 * hanging, "{truth} and {least} of {hanging}");
+            assert!(at.chain().end(&best).distance(end) < 0.02, "the best ends there");
+            // Nothing is found that costs no less than asked for, and the best stays.
+            let before = best.clone();
+            let mirrored = at.root() - (end - at.root());
+            assert_eq!(rough.end_at(at, mirrored, 6, least, &mut best), least);
+            assert_eq!(best, before);
+            // Another change is taken only where it costs less.
+            assert_eq!(rough.changed(at, |_| (), least, &mut best), least);
+            assert_eq!(best, before);
+            assert_eq!(rough.changed(at, |trial| trial.copy_from_slice(&seen), hanging, &mut best), truth);
+            assert_eq!(best, seen);
+        });
+    }
+}

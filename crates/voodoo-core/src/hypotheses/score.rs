@@ -109,3 +109,96 @@ pub fn explain(body: &Body, limb: usize, poses: &[Pose], points: &Points, least:
 pub fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
     distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum()
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::Model;
+    use crate::fit::Fit;
+    use crate::testing::{before_wall, first_arm, moved, raised, standing, turned, with_context, without_background};
+
+    /// Costs of poses before an image of the standing body.
+    fn costs(model: &Model, seen: &[Pose], tried: &[Vec<Pose>]) -> Vec<Cost> {
+        let (pixels, config) = (before_wall(&model.body, seen), without_background());
+        with_context(&pixels, &config, model, seen, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            let mut cost = |poses: &Vec<Pose>| {
+                fit.match_last(context, poses);
+                let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences()));
+                let cost = overall_cost(context, fit.matched(poses));
+                let again = overall_cost(context, fit.matched(poses));
+                let bits = |cost: Cost| [cost.evidence, cost.total].map(f64::to_bits);
+                assert_eq!(bits(cost), bits(again), "the same inputs, another score");
+                assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences())));
+                cost
+            };
+            tried.iter().map(&mut cost).collect()
+        })
+    }
+
+    #[test]
+    fn a_right_pose_costs_less_than_any_disturbed_one_and_a_score_changes_nothing() {
+        let (model, poses) = standing();
+        let root = poses[0].translation;
+        let mut tried = vec![poses.clone()];
+        for shift in [0.1 * Vec3::X, -0.1 * Vec3::X, 0.1 * Vec3::Y, 0.15 * Vec3::Z, -0.15 * Vec3::Z] {
+            tried.push(moved(&poses, shift));
+        }
+        for (axis, angle) in [(Vec3::Z, 0.15), (Vec3::Z, -0.15), (Vec3::X, 0.2), (Vec3::Y, 0.8)] {
+            tried.push(turned(&poses, root, axis, angle));
+        }
+        tried.push(raised(&model, &poses, 0.2).0);
+        let costs = costs(&model, &poses, &tried);
+        assert!(costs[0].total < GAIN, "{:?}", costs[0]);
+        for (index, cost) in costs.iter().enumerate().skip(1) {
+            assert!(cost.total > costs[0].total + GAIN && cost.evidence > costs[0].evidence, "{index}: {cost:?}");
+        }
+    }
+
+    #[test]
+    fn an_elbow_bent_backwards_costs_what_its_limit_is_broken_by() {
+        let (model, poses) = standing();
+        let chain = &model.extremities[first_arm(&model)];
+        assert!(limit_strain(&model.body, &poses, chain.lower) < 1e-9);
+        let (_, joint) = model.body.limbs()[chain.lower].parent.as_ref().unwrap();
+        let [[least, _], ..] = joint.limits.unwrap();
+        let axis = crate::body::kinematics::hinge_axis(joint);
+        for beyond in [0.2, 0.4] {
+            let turn = crate::math::Quat::from_axis_angle(axis, least - beyond);
+            let mut bent = poses.clone();
+            bent[chain.lower] = crate::body::kinematics::place(joint, &poses[chain.upper], turn);
+            let strain = limit_strain(&model.body, &bent, chain.lower);
+            assert!((strain - (beyond / LIMIT_STRAIN).powi(2)).abs() < 1e-6, "{strain} for {beyond} rad");
+        }
+    }
+
+    #[test]
+    fn an_arm_inside_the_trunk_costs_its_patches_and_one_beside_it_nothing() {
+        let (model, poses) = standing();
+        let (body, chain) = (&model.body, &model.extremities[first_arm(&model)]);
+        assert_eq!(overlap_cost(body, chain, &poses), 0.0);
+        assert_eq!(overlap_cost(body, chain, &raised(&model, &poses, 0.2).0), 0.0);
+        let mut inside = poses.clone();
+        let middle = 0.5 * (poses[0].translation + chain.root(body, &poses));
+        chain.reach(body, &mut inside, middle, 0.0);
+        let cost = overlap_cost(body, chain, &inside);
+        assert!(cost > 10.0, "{cost} patches");
+    }
+
+    #[test]
+    fn motion_costs_only_where_something_is_known_of_it() {
+        let (model, poses) = standing();
+        let (raised, _) = raised(&model, &poses, 0.2);
+        let (pixels, config) = (before_wall(&model.body, &poses), without_background());
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, &poses);
+            let chain = &model.extremities[first_arm(&model)];
+            let cost = |previous| strain(Context { previous, ..context }, fit.matched(&poses), chain, &raised);
+            let (unknown, hung, stayed) = (cost(&[]), cost(&poses), cost(&raised));
+            assert_eq!(unknown, stayed);
+            assert!(hung > unknown + 1.0, "{hung} after {unknown}");
+        });
+    }
+}

@@ -104,3 +104,76 @@ pub(super) fn distances_to_others(
         explain(&context.model.body, limb, poses, points, others, distances);
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+    use crate::body::kinematics::{hinge_axis, place};
+    use crate::fit::Fit;
+    use crate::math::{Quat, Vec3};
+    use crate::testing::{before_wall, first_arm, raised, standing, turned, with_context, without_background};
+
+    /// What is said of the first arm at `poses` when the body is seen in `seen`: all of it, and beyond its hinge.
+    fn suspect(seen: &[Pose], poses: &[Pose], drawn: bool) -> [bool; 2] {
+        let (model, _) = standing();
+        let (pixels, config) = (before_wall(&model.body, seen), without_background());
+        with_context(&pixels, &config, &model, poses, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, poses);
+            Suspicion::default().of(context, fit.matched(poses), &model.extremities[first_arm(&model)], drawn)
+        })
+    }
+
+    #[test]
+    fn an_arm_where_it_is_seen_is_not_suspect() {
+        let (model, poses) = standing();
+        let (raised, _) = raised(&model, &poses, 0.2);
+        for pose in [&poses, &raised] {
+            assert_eq!([false, true].map(|drawn| suspect(pose, pose, drawn)), [[false; 2]; 2]);
+        }
+    }
+
+    #[test]
+    fn an_arm_that_the_camera_sees_past_is_suspect() {
+        let (model, poses) = standing();
+        assert_eq!(suspect(&poses, &raised(&model, &poses, 0.2).0, false), [true; 2]);
+        assert_eq!(suspect(&raised(&model, &poses, 0.2).0, &poses, false), [true; 2]);
+    }
+
+    #[test]
+    fn an_arm_behind_the_trunk_explains_nothing_alone() {
+        let (model, poses) = standing();
+        let arm = &model.extremities[first_arm(&model)];
+        let mut hidden = poses.clone();
+        let aside = (arm.root(&model.body, &poses).x - poses[0].translation.x).signum();
+        arm.reach(&model.body, &mut hidden, poses[0].translation + Vec3::new(0.02 * aside, 0.0, 0.16), 0.0);
+        assert_eq!(suspect(&hidden, &hidden, false), [true; 2]);
+    }
+
+    #[test]
+    fn a_forearm_alone_may_be_wrong() {
+        let (model, poses) = standing();
+        let arm = &model.extremities[first_arm(&model)];
+        let (seen, _) = raised(&model, &poses, 0.2);
+        let all = turned(&seen, seen[arm.lower].translation, Vec3::Z, -1.6);
+        let mut bent = seen.clone();
+        arm.limbs().skip(1).for_each(|limb| bent[limb] = all[limb]);
+        assert_eq!(suspect(&seen, &bent, false), [false, true]);
+    }
+
+    #[test]
+    fn a_forearm_along_the_ray_is_suspect_where_points_have_drawn_it() {
+        let (model, poses) = standing();
+        let arm = &model.extremities[first_arm(&model)];
+        let (_, joint) = model.body.limbs()[arm.lower].parent.as_ref().unwrap();
+        let mut bent = poses.clone();
+        let turn = Quat::from_axis_angle(hinge_axis(joint), FRAC_PI_2);
+        bent[arm.lower] = place(joint, &poses[arm.upper], turn);
+        let hand = poses[arm.lower].inverse() * poses[arm.ends[0]];
+        bent[arm.ends[0]] = bent[arm.lower] * hand;
+        assert_eq!([false, true].map(|drawn| suspect(&poses, &bent, drawn)), [[false, true], [true; 2]]);
+    }
+}

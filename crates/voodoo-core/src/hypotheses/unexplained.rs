@@ -55,3 +55,55 @@ impl Unexplained {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::fit::Fit;
+    use crate::math::Pose;
+    use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
+
+    /// What the hanging arms leave unexplained when the body is seen in `seen`.
+    fn collected(seen: &[Pose], look: impl FnOnce(&Unexplained)) {
+        let (model, poses) = standing();
+        let (pixels, config) = (before_wall(&model.body, seen), without_background());
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, &poses);
+            let mut unexplained = Unexplained::default();
+            unexplained.collect(context, fit.matched(&poses));
+            look(&unexplained);
+        });
+    }
+
+    #[test]
+    fn a_right_pose_leaves_hardly_a_point_unexplained() {
+        let (_, poses) = standing();
+        collected(&poses, |unexplained| {
+            assert!(unexplained.points.total() < 5.0 && !unexplained.cluttered);
+        });
+    }
+
+    #[test]
+    fn a_raised_arm_is_what_the_hanging_one_leaves_and_lies_about_the_shoulder() {
+        let (model, poses) = standing();
+        let (seen, end) = raised(&model, &poses, 0.2);
+        let chain = &model.extremities[first_arm(&model)];
+        let root = chain.root(&model.body, &poses);
+        collected(&seen, |unexplained| {
+            let all = unexplained.points.total();
+            let mut near = WeightedPoints::default();
+            unexplained.near(end, 0.15, &mut near);
+            let hand = near.total();
+            unexplained.near(root, 1.2 * chain.stretched_length(), &mut near);
+            let arm = near.total();
+            assert!(
+                hand > 20.0 && arm > 0.95 * all && arm > 1.5 * hand,
+                "{hand} of the hand, {arm} of the arm, {all} in all"
+            );
+            unexplained.near(root - 2.0 * (end - root), 0.15, &mut near);
+            assert!(near.is_empty());
+        });
+    }
+}

@@ -113,3 +113,59 @@ impl Relocalizer {
         self.watch.conclude(found, sighting, ahead)
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::testing::{depth, farthest, moved, put_board, standing, turned, with_context, without_background};
+
+    /// Where a lost body is found, which was last tracked half a metre to one side of the camera's axis.
+    fn found(pixels: &[u16]) -> Option<Vec<Pose>> {
+        let (model, poses) = standing();
+        let present = moved(&poses, -0.5 * Vec3::X);
+        let config = without_background();
+        let mut relocalizer = Relocalizer::default();
+        relocalizer.restart(&model, &present);
+        let sighting = |stamp, lost| Sighting { stamp, lost, tracked: !lost, silent: false };
+        assert!(!relocalizer.observe(sighting(-0.4, false), &present));
+        let due: Vec<bool> =
+            [-0.3, -0.2, -0.1].into_iter().map(|stamp| relocalizer.observe(sighting(stamp, true), &present)).collect();
+        assert_eq!(due, [false, false, true]);
+        with_context(pixels, &config, &model, &present, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, &present);
+            let before = format!("{:?}", fit.correspondences());
+            let found = relocalizer.search(context, &mut fit, &present).map(<[Pose]>::to_vec);
+            assert_eq!(format!("{:?}", fit.correspondences()), before);
+            found
+        })
+    }
+
+    #[test]
+    fn a_body_a_metre_beside_its_last_place_is_found() {
+        let (model, poses) = standing();
+        for turn in [0.0, 0.4] {
+            let place = turned(&moved(&poses, 0.5 * Vec3::X), poses[0].translation + 0.5 * Vec3::X, Vec3::Y, turn);
+            let found = found(&depth(&model.body, &place)).unwrap();
+            assert!(farthest(&found, &place) < 0.03, "{} m off", farthest(&found, &place));
+        }
+    }
+
+    #[test]
+    fn nothing_is_found_where_nothing_is_seen_or_what_is_seen_is_too_small_or_too_large() {
+        let empty = vec![0; depth(&standing().0.body, &standing().1).len()];
+        assert!(found(&empty).is_none());
+        for size in [[0.15, 0.2], [1.2, 1.2]] {
+            let mut pixels = empty.clone();
+            put_board(&mut pixels, Vec3::new(0.5, 0.0, 2.6), size);
+            assert!(found(&pixels).is_none(), "{size:?}");
+        }
+    }
+
+    #[test]
+    fn a_body_where_it_is_expected_is_not_moved() {
+        let (model, poses) = standing();
+        assert!(found(&depth(&model.body, &moved(&poses, -0.5 * Vec3::X))).is_none());
+    }
+}

@@ -218,3 +218,119 @@ fn start_cost(setting: Setting, model: &Model, poses: &[Pose], fit: &mut Fit) ->
     fit.match_points(setting.of(model), poses, &START_GATE);
     overall_cost(setting.of(model), fit.matched(poses)).evidence
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::Body;
+    use crate::shape::TaperedEllipticCylinder;
+    use crate::testing::{before_wall, stand, standing, with_setting};
+
+    /// A body some of whose limbs have other lengths and girths.
+    fn changed(body: &Body, limbs: &[&str], length: f64, girth: f64) -> Body {
+        limbs.iter().fold(body.clone(), |body, name| {
+            let s = body.limbs()[body.limb_index(name).unwrap()].shape;
+            let [a0, b0, a1, b1] = [s.a0(), s.b0(), s.a1(), s.b1()].map(|axis| girth * axis);
+            let shape = TaperedEllipticCylinder::new(length * s.length(), a0, b0, a1, b1).unwrap();
+            body.with_shape(name, shape).unwrap()
+        })
+    }
+
+    /// The body after the first frame, which shows `person`; it was set as `set`, the feet where the person's are.
+    fn first_frame(person: &Body, set: &Body, config: &Config) -> Body {
+        let pixels = before_wall(person, &stand(person));
+        let (mut model, mut poses) = (Model::new(set.clone()), stand(set));
+        let (before, start) = (model.clone(), poses.clone());
+        let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
+        sizes.restart(&model, true, config);
+        with_setting(&pixels, config, &before, &start, |setting| {
+            sizes.initialise(setting, &mut model, &mut poses, &mut fit);
+            // The next frame is not the first.
+            let fitted = (model.body.clone(), poses.clone());
+            sizes.initialise(setting, &mut model, &mut poses, &mut fit);
+            assert_eq!((&model.body, &poses), (&fitted.0, &fitted.1));
+        });
+        model.body
+    }
+
+    fn girth(body: &Body, limb: &str) -> f64 {
+        let s = body.limbs()[body.limb_index(limb).unwrap()].shape;
+        s.a0() + s.b0() + s.a1() + s.b1()
+    }
+
+    fn length(body: &Body, limb: &str) -> f64 {
+        body.limbs()[body.limb_index(limb).unwrap()].shape.length()
+    }
+
+    #[test]
+    fn the_first_frame_fits_girths_to_a_thicker_person() {
+        let body = standing().0.body;
+        let limbs = ["l_thigh", "r_thigh", "l_calf", "r_calf"];
+        let person = changed(&body, &limbs, 1.0, 1.2);
+        let found = first_frame(&person, &body, &Config::default());
+        for limb in body.limbs() {
+            let ratio = girth(&found, &limb.name) / girth(&body, &limb.name);
+            let thicker = ["l_thigh", "r_thigh", "l_calf", "r_calf"].contains(&limb.name.as_str());
+            // What anthropometry knows holds it back: it takes half of the difference at least.
+            assert!(
+                if thicker { (1.08..1.22).contains(&ratio) } else { (0.95..1.08).contains(&ratio) },
+                "{}: {ratio}",
+                limb.name
+            );
+        }
+        let same = first_frame(&person, &body, &Config { fit_girths: false, ..Config::default() });
+        assert_eq!(same, body);
+    }
+
+    #[test]
+    fn a_leg_set_too_short_takes_the_lengths_of_the_other_and_legs_that_differ_stay() {
+        let body = standing().0.body;
+        let left = ["l_thigh", "l_calf"];
+        let short = changed(&body, &left, 0.85, 1.0);
+        let config = Config { fit_girths: false, ..Config::default() };
+        let ratios = |found: &Body| {
+            ["thigh", "calf"].map(|name| length(found, &format!("l_{name}")) / length(&body, &format!("r_{name}")))
+        };
+        let near = |ratios: [f64; 2], wanted: f64| ratios.iter().all(|ratio| (ratio - wanted).abs() < 1e-6);
+        let (wrong, real) =
+            (ratios(&first_frame(&body, &short, &config)), ratios(&first_frame(&short, &short, &config)));
+        let asked = ratios(&first_frame(&body, &short, &Config { fit_lengths: false, ..config.clone() }));
+        // What differs by less may be a person's.
+        let little = ratios(&first_frame(&body, &changed(&body, &left, 0.9, 1.0), &config));
+        assert!(near(wrong, 1.0) && near(real, 0.85) && near(asked, 0.85) && near(little, 0.9));
+    }
+
+    /// The body after some frames of a person, from the sizes and the place it was set in.
+    fn followed(person: &Body, set: &Body, config: &Config, lost: bool, frames: usize) -> Body {
+        let pixels = before_wall(person, &stand(person));
+        let mut model = Model::new(set.clone());
+        let mut poses = stand(set);
+        let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
+        sizes.restart(&model, true, config);
+        for _ in 0..frames {
+            let (before, predicted) = (model.clone(), poses.clone());
+            with_setting(&pixels, config, &before, &predicted, |setting| {
+                fit.run(setting.of(&model), &predicted, &mut poses);
+                let reliance = Reliance { lost, girths: true, limb: |_| true };
+                sizes.refine(setting, &mut model, &mut poses, &predicted, &mut fit, reliance);
+            });
+        }
+        model.body
+    }
+
+    #[test]
+    fn frames_draw_the_lengths_to_what_is_seen() {
+        let body = standing().0.body;
+        let names = ["l_thigh", "r_thigh", "l_calf", "r_calf"];
+        for wrong in [0.92, 1.08] {
+            let set = changed(&body, &names, wrong, 1.0);
+            let found = followed(&body, &set, &Config::default(), false, 20);
+            for name in names {
+                let off = length(&found, name) / length(&body, name) - 1.0;
+                assert!(off.abs() < 0.05, "{name} is off by {off} after {}", wrong - 1.0);
+            }
+            assert_eq!(followed(&body, &set, &Config::default(), true, 3), set, "a lost body teaches nothing");
+        }
+    }
+}

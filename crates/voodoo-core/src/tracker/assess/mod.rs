@@ -213,3 +213,137 @@ fn overall(limbs: &[LimbStatus]) -> Status {
         Status::Tracking
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::fit::Fit;
+    use crate::math::{Pose, Vec3};
+    use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};
+
+    /// Lets an assessor look at poses in an image, in so many frames.
+    fn look(assessor: &mut Assessor, pixels: &[u16], poses: &[Pose], frames: usize) {
+        let (model, config) = (standing().0, without_background());
+        with_context(pixels, &config, &model, poses, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, poses);
+            (0..frames).for_each(|_| assessor.assess(context, fit.matched(poses)));
+        });
+    }
+
+    fn trusting() -> Assessor {
+        let mut assessor = Assessor::default();
+        assessor.trust_pose();
+        assessor
+    }
+
+    fn reported(assessor: &Assessor) -> Estimate {
+        let mut estimate = Estimate::default();
+        assessor.report_status(&standing().0, &mut estimate);
+        estimate
+    }
+
+    #[test]
+    fn a_pose_that_was_set_is_trusted_before_anything_is_seen() {
+        let estimate = reported(&trusting());
+        assert_eq!(estimate.status, Status::Tracking);
+        assert_eq!(estimate.limb_status, vec![LimbStatus::Inferred; standing().1.len()]);
+        assert!(!trusting().relied_on(0), "nothing was seen");
+        assert_eq!(reported(&Assessor::default()).status, Status::Lost);
+    }
+
+    #[test]
+    fn a_right_pose_is_tracked_and_what_is_seen_of_it_is_measured() {
+        let (model, poses) = standing();
+        let mut assessor = trusting();
+        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+        let estimate = reported(&assessor);
+        assert_eq!((assessor.status(), estimate.status), (Status::Tracking, Status::Tracking));
+        // Clavicles and a neck show little that the trunk would not explain.
+        let small = |name: &str| name.ends_with("clavicle") || name == "neck";
+        for (limb, (own, status)) in model.body.limbs().iter().zip(&estimate.limb_status).enumerate() {
+            if small(&own.name) {
+                continue;
+            }
+            assert_eq!((*status, assessor.relied_on(limb)), (LimbStatus::Measured, true), "{}", own.name);
+        }
+    }
+
+    #[test]
+    fn a_body_beside_what_is_seen_is_lost_and_so_is_one_before_nothing() {
+        let (model, poses) = standing();
+        let nothing = vec![0; before_wall(&model.body, &poses).len()];
+        for pixels in [before_wall(&model.body, &poses), nothing] {
+            let mut assessor = trusting();
+            look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+            look(&mut assessor, &pixels, &moved(&poses, 0.5 * Vec3::X), 3);
+            let estimate = reported(&assessor);
+            assert_eq!(estimate.status, Status::Lost);
+            assert!(estimate.limb_status.iter().all(|status| *status != LimbStatus::Measured), "{estimate:?}");
+        }
+    }
+
+    #[test]
+    fn an_arm_behind_the_trunk_is_inferred_and_the_body_is_tracked() {
+        let (model, mut poses) = standing();
+        let arm = &model.extremities[first_arm(&model)];
+        let aside = (arm.root(&model.body, &poses).x - poses[0].translation.x).signum();
+        let behind = poses[0].translation + Vec3::new(0.02 * aside, -0.1, 0.16);
+        arm.reach(&model.body, &mut poses, behind, 0.0);
+        let mut assessor = trusting();
+        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 3);
+        let estimate = reported(&assessor);
+        assert_eq!(estimate.status, Status::Tracking);
+        for limb in [arm.lower, arm.ends[0]] {
+            assert_eq!((estimate.limb_status[limb], assessor.relied_on(limb)), (LimbStatus::Inferred, false));
+        }
+    }
+
+    #[test]
+    fn what_is_flat_is_lost_in_time_and_at_once_where_nobody_vouches_for_it() {
+        let (model, poses) = standing();
+        let mut pixels = vec![0; depth(&model.body, &poses).len()];
+        put_board(&mut pixels, Vec3::new(0.0, 0.0, 2.5), [0.35, 0.9]);
+        let mut assessor = trusting();
+        look(&mut assessor, &pixels, &poses, 10);
+        assert_ne!(assessor.status(), Status::Lost, "a blurred frame is flat, too");
+        look(&mut assessor, &pixels, &poses, 10);
+        assert_eq!(reported(&assessor).status, Status::Lost);
+        // A body that comes back does so in time.
+        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+        assert_eq!(assessor.status(), Status::Lost);
+        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 4);
+        assert_eq!(assessor.status(), Status::Tracking);
+        assessor.moved();
+        look(&mut assessor, &pixels, &poses, 1);
+        assert_eq!(assessor.status(), Status::Lost);
+    }
+
+    #[test]
+    fn a_body_given_up_has_no_limb_and_one_that_moved_is_judged_anew() {
+        let (model, poses) = standing();
+        let pixels = before_wall(&model.body, &poses);
+        let mut assessor = trusting();
+        look(&mut assessor, &pixels, &poses, 1);
+        assessor.give_up();
+        assert_eq!(reported(&assessor).status, Status::Lost);
+        assert!((0..poses.len()).all(|limb| !assessor.relied_on(limb)));
+        assert_eq!(reported(&assessor).limb_status, vec![LimbStatus::Lost; poses.len()]);
+        assessor.moved();
+        look(&mut assessor, &pixels, &poses, 1);
+        assert_eq!(reported(&assessor).status, Status::Tracking);
+    }
+
+    #[test]
+    fn shares_of_limbs_decide_what_the_body_is() {
+        let (measured, other) = (LimbStatus::Measured, LimbStatus::Inferred);
+        let first = |count: usize| [vec![measured; count], vec![other; 16 - count]].concat();
+        assert_eq!(
+            [16, 12, 11, 4, 3].map(|count| overall(&first(count))),
+            [Status::Tracking, Status::Tracking, Status::Degraded, Status::Degraded, Status::Lost]
+        );
+        let last = |count: usize| first(count).into_iter().rev().collect::<Vec<_>>();
+        assert_eq!([8, 7].map(|count| overall(&last(count))), [Status::Degraded, Status::Lost], "without the root");
+    }
+}
