@@ -273,10 +273,12 @@ mod tests {
     fn a_body_beside_what_is_seen_is_lost_and_so_is_one_before_nothing() {
         let (model, poses) = standing();
         let nothing = vec![0; before_wall(&model.body, &poses).len()];
-        for pixels in [before_wall(&model.body, &poses), nothing] {
+        let seen = before_wall(&model.body, &poses);
+        // What no longer shows at all is lost at once.
+        for (pixels, off, frames) in [(&seen, 0.5, 3), (&nothing, 0.0, 1)] {
             let mut assessor = trusting();
-            look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
-            look(&mut assessor, &pixels, &moved(&poses, 0.5 * Vec3::X), 3);
+            look(&mut assessor, &seen, &poses, 5);
+            look(&mut assessor, pixels, &moved(&poses, off * Vec3::X), frames);
             let estimate = reported(&assessor);
             assert_eq!(estimate.status, Status::Lost);
             assert!(estimate.limb_status.iter().all(|status| *status != LimbStatus::Measured), "{estimate:?}");
