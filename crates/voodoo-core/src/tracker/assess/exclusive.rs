@@ -64,7 +64,8 @@ impl Exclusive {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
+    use crate::math::Vec3;
+    use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
 
     /// Weight of what each limb alone explains of an image of `seen`, at `poses`; the weight of all candidates.
     fn counted(seen: &[Pose], poses: &[Pose], change: impl Fn(&Candidates, &mut Exclusive)) -> (Vec<f64>, f64) {
@@ -102,5 +103,7 @@ mod tests {
         twice[other] = poses[arm.lower];
         assert!(on(&right) > 10.0 && on(&counted(&poses, &twice, |_, _| ())) < 0.1 * on(&right));
         assert_eq!(on(&counted(&raised, &poses, |_, _| ())), 0.0);
+        let (weight, all) = counted(&poses, &moved(&poses, Vec3::new(0.0, 0.0, 0.5)), |_, _| ());
+        assert!(all > 1000.0 && weight.iter().sum::<f64>() == 0.0, "{weight:?}");
     }
 }
