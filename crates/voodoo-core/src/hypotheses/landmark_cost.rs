@@ -28,3 +28,53 @@ fn landmark_cost(pair: &SitePair, x: Vec3) -> f64 {
     let apart = (pair.across * (x - pair.p)).length() - pair.bias;
     pair.base_weight * (apart.max(0.0) / APART).powi(2).min(1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::association::correspondence::Correspondences;
+    use crate::math::Mat3;
+    use crate::testing::{first_arm, moved, standing};
+
+    /// A site in the middle of a limb that was seen `off` from there.
+    fn seen(poses: &[Pose], limb: usize, off: Vec3) -> SitePair {
+        let x = poses[limb].translation;
+        let (across, information) = (Mat3::IDENTITY, 2.0 * Mat3::IDENTITY);
+        SitePair { limb, x, p: x + off, weight: 2.0, base_weight: 2.0, bias: 0.0, across, information, source: 0 }
+    }
+
+    #[test]
+    fn a_site_costs_its_weight_when_it_is_a_hand_off_and_what_hangs_on_the_other_arm_costs_nothing() {
+        let (model, poses) = standing();
+        let arm = &model.extremities[first_arm(&model)];
+        let cost = |pair: SitePair| {
+            let correspondences = Correspondences { sites: vec![pair], ..Correspondences::default() };
+            let matched = Matched { correspondences: &correspondences, poses: &poses };
+            let costs = model.extremities.iter().map(|chain| extremity_landmark_cost(matched, chain, &poses));
+            let own = extremity_landmark_cost(matched, arm, &poses);
+            assert_eq!(costs.sum::<f64>(), own, "no other arm or leg pays");
+            assert_eq!(body_landmark_cost(matched), own);
+            own
+        };
+        let right = seen(&poses, arm.lower, Vec3::ZERO);
+        assert_eq!(cost(right), 0.0);
+        assert!((cost(seen(&poses, arm.lower, 0.5 * APART * Vec3::Y)) - 2.0 * 0.25).abs() < 1e-9);
+        assert_eq!(cost(seen(&poses, arm.lower, 3.0 * APART * Vec3::Y)), 2.0, "wholly contradicted, no more");
+        // Within its bias nothing is said, and along a ray neither.
+        let off = seen(&poses, arm.lower, 0.5 * APART * Vec3::Z);
+        assert_eq!(cost(SitePair { bias: APART, ..off }), 0.0);
+        assert_eq!(cost(SitePair { across: Mat3::from_diagonal(Vec3::new(1.0, 1.0, 0.0)), ..off }), 0.0);
+    }
+
+    #[test]
+    fn a_site_is_looked_at_where_other_poses_would_put_it() {
+        let (model, poses) = standing();
+        let arm = &model.extremities[first_arm(&model)];
+        let shift = 0.5 * APART * Vec3::X;
+        let correspondences =
+            Correspondences { sites: vec![seen(&poses, arm.upper, shift)], ..Correspondences::default() };
+        let matched = Matched { correspondences: &correspondences, poses: &poses };
+        assert!(extremity_landmark_cost(matched, arm, &moved(&poses, shift)) < 1e-12);
+        assert!((extremity_landmark_cost(matched, arm, &moved(&poses, -shift)) - 2.0).abs() < 1e-9);
+    }
+}

@@ -156,6 +156,33 @@ mod tests {
     use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
 
     #[test]
+    fn an_arm_is_bent_the_way_it_is_seen() {
+        let (model, poses) = standing();
+        let (stretched, end) = raised(&model, &poses, 0.2);
+        let (config, index) = (without_background(), first_arm(&model));
+        let arm = &model.extremities[index];
+        let root = arm.root(&model.body, &stretched);
+        let place = root + 0.6 * (end - root);
+        for bend in [0, 2, 5] {
+            let mut seen = poses.clone();
+            arm.reach(&model.body, &mut seen, place, TAU * f64::from(bend) / 6.0);
+            with_context(&before_wall(&model.body, &seen), &config, &model, &poses, |context| {
+                let mut fit = Fit::new(&config).unwrap();
+                fit.match_last(context, &poses);
+                let at = Extremity { context, matched: fit.matched(&poses), index };
+                let (mut unexplained, mut rough) = (Unexplained::default(), RoughSearch::default());
+                unexplained.collect(context, at.matched);
+                unexplained.near(root, arm.stretched_length(), &mut rough.score.unexplained);
+                rough.score.begin(at, &WeightedPoints::default());
+                let mut best = Vec::new();
+                rough.end_at(at, place, 6, f64::INFINITY, &mut best);
+                let elbow = best[arm.lower].translation.distance(seen[arm.lower].translation);
+                assert!(elbow < 1e-6, "bend {bend}: the elbow is {elbow} m off");
+            });
+        }
+    }
+
+    #[test]
     fn the_raised_hand_is_where_an_arm_ends_at_least_cost() {
         let (model, poses) = standing();
         let (seen, end) = raised(&model, &poses, 0.2);

@@ -114,9 +114,14 @@ pub fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use crate::association::correspondence::Correspondences;
     use crate::body::Model;
+    use crate::body::kinematics::{hinge_axis, place};
     use crate::fit::Fit;
-    use crate::testing::{before_wall, first_arm, moved, raised, standing, turned, with_context, without_background};
+    use crate::math::Quat;
+    use crate::testing::{
+        before_wall, first_arm, moved, put_board, raised, standing, turned, with_context, without_background,
+    };
 
     /// Costs of poses before an image of the standing body.
     fn costs(model: &Model, seen: &[Pose], tried: &[Vec<Pose>]) -> Vec<Cost> {
@@ -157,20 +162,53 @@ mod tests {
     }
 
     #[test]
+    fn what_cameras_see_past_and_what_no_limb_explains_cost_their_area() {
+        let (model, poses) = standing();
+        let config = without_background();
+        let cost = |pixels: &[u16]| {
+            with_context(pixels, &config, &model, &poses, |context| {
+                let mut fit = Fit::new(&config).unwrap();
+                fit.match_last(context, &poses);
+                let all: f32 = context.seen.candidates.weight.iter().sum();
+                (overall_cost(context, fit.matched(&poses)), f64::from(all))
+            })
+        };
+        let alone = before_wall(&model.body, &poses);
+        let (right, body) = cost(&alone);
+        // An empty room: all that should show is seen past.
+        let (past, points) = cost(&vec![4500; alone.len()]);
+        assert!(points == 0.0 && past.evidence > 0.8 * body && past.total >= past.evidence, "{past:?} of {body}");
+        // Before a wall everything is hidden: possible, and no evidence.
+        let (hidden, _) = cost(&vec![1000; alone.len()]);
+        assert!(hidden.evidence == 0.0 && hidden.total > 0.0 && hidden.total < past.total, "{hidden:?}");
+        // A board beside the body.
+        let mut pixels = alone.clone();
+        put_board(&mut pixels, Vec3::new(0.75, 0.0, 2.6), [0.1; 2]);
+        let (beside, all) = cost(&pixels);
+        let board = all - body;
+        assert!(board > 20.0 && (beside.evidence - right.evidence - board).abs() < 0.1 * board, "{beside:?}, {board}");
+    }
+
+    #[test]
     fn an_elbow_bent_backwards_costs_what_its_limit_is_broken_by() {
         let (model, poses) = standing();
         let chain = &model.extremities[first_arm(&model)];
-        assert!(limit_strain(&model.body, &poses, chain.lower) < 1e-9);
         let (_, joint) = model.body.limbs()[chain.lower].parent.as_ref().unwrap();
         let [[least, _], ..] = joint.limits.unwrap();
-        let axis = crate::body::kinematics::hinge_axis(joint);
-        for beyond in [0.2, 0.4] {
-            let turn = crate::math::Quat::from_axis_angle(axis, least - beyond);
-            let mut bent = poses.clone();
-            bent[chain.lower] = crate::body::kinematics::place(joint, &poses[chain.upper], turn);
-            let strain = limit_strain(&model.body, &bent, chain.lower);
-            assert!((strain - (beyond / LIMIT_STRAIN).powi(2)).abs() < 1e-6, "{strain} for {beyond} rad");
-        }
+        let matched = Matched { correspondences: &Correspondences::default(), poses: &poses };
+        let (pixels, config) = (before_wall(&model.body, &poses), without_background());
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let own = |poses: &[Pose]| strain(Context { previous: &[], ..context }, matched, chain, poses);
+            assert!(limit_strain(&model.body, &poses, chain.lower) < 1e-9);
+            for beyond in [0.2, 0.4] {
+                let mut bent = poses.clone();
+                let turn = Quat::from_axis_angle(hinge_axis(joint), least - beyond);
+                bent[chain.lower] = place(joint, &poses[chain.upper], turn);
+                let wanted = (beyond / LIMIT_STRAIN).powi(2);
+                let (limit, all) = (limit_strain(&model.body, &bent, chain.lower), own(&bent) - own(&poses));
+                assert!((limit - wanted).abs() < 1e-6 && (all - wanted).abs() < 1e-6, "{limit} and {all} for {beyond}");
+            }
+        });
     }
 
     #[test]
@@ -199,6 +237,10 @@ mod tests {
             let (unknown, hung, stayed) = (cost(&[]), cost(&poses), cost(&raised));
             assert_eq!(unknown, stayed);
             assert!(hung > unknown + 1.0, "{hung} after {unknown}");
+            // The strain of all arms and legs is part of the total, and no evidence.
+            let overall = |previous| overall_cost(Context { previous, ..context }, fit.matched(&poses));
+            let (still, moved) = (overall(&poses), overall(&raised));
+            assert!(moved.total > still.total + 1.0 && moved.evidence == still.evidence, "{moved:?} and {still:?}");
         });
     }
 }

@@ -333,4 +333,32 @@ mod tests {
             assert_eq!(followed(&body, &set, &Config::default(), true, 3), set, "a lost body teaches nothing");
         }
     }
+
+    #[test]
+    fn girths_follow_the_contour_of_limbs_that_are_relied_on() {
+        let body = standing().0.body;
+        let names = ["l_thigh", "r_thigh", "l_calf", "r_calf"];
+        let (person, config) = (changed(&body, &names, 1.0, 1.2), Config { fit_lengths: false, ..Config::default() });
+        let pixels = before_wall(&person, &stand(&person));
+        let (mut model, mut poses) = (Model::new(body.clone()), stand(&body));
+        let (mut sizes, mut fit) = (Sizes::default(), Fit::new(&config).unwrap());
+        // As if a first frame had fitted girths to what it showed.
+        sizes.restart(&model, true, &config);
+        (sizes.open, sizes.girths) = (false, vec![Girth::default(); poses.len()]);
+        let left = |limb: usize| body.limbs()[limb].name.starts_with("l_");
+        for _ in 0..20 {
+            let (before, predicted) = (model.clone(), poses.clone());
+            with_setting(&pixels, &config, &before, &predicted, |setting| {
+                fit.run(setting.of(&model), &predicted, &mut poses);
+                let reliance = Reliance { lost: false, girths: true, limb: left };
+                sizes.refine(setting, &mut model, &mut poses, &predicted, &mut fit, reliance);
+            });
+        }
+        for (index, limb) in body.limbs().iter().enumerate() {
+            let ratio = girth(&model.body, &limb.name) / girth(&body, &limb.name);
+            assert!(left(index) || ratio == 1.0, "{} is not relied on: {ratio}", limb.name);
+            let thicker = names[..3].contains(&limb.name.as_str()) && left(index);
+            assert!(!thicker || (1.05..1.22).contains(&ratio), "{}: {ratio}", limb.name);
+        }
+    }
 }

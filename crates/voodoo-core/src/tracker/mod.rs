@@ -273,13 +273,15 @@ mod tests {
         let nothing = vec![4500; empty.len()];
         let aside = moved(&poses, 0.7 * Vec3::X);
         let person = before_wall(&model.body, &aside);
-        let mut board = nothing.clone();
-        put_board(&mut board, Vec3::new(-0.7, 0.1, 2.6), [0.3, 0.85]);
         for frame in 3..8 {
             assert_eq!(show(&mut tracker, &nothing, frame), Status::Lost);
         }
-        for frame in 8..20 {
-            assert_eq!(show(&mut tracker, &board, frame), Status::Lost, "a board, frame {frame}");
+        for (frame, width) in [0.15, 0.2, 0.25].into_iter().flat_map(|width| [width; 3]).enumerate() {
+            let mut board = nothing.clone();
+            put_board(&mut board, Vec3::new(-0.7, 0.1, 2.6), [width, 0.85]);
+            assert_eq!(show(&mut tracker, &board, 8 + frame), Status::Lost, "{width} m wide");
+            let moved = poses[0].translation.distance(tracker.estimate().world_from_limb[0].translation);
+            assert!(moved < 0.1, "{width} m wide: moved by {moved} m");
         }
         for frame in 20..30 {
             show(&mut tracker, &person, frame);

@@ -79,3 +79,59 @@ impl SourceReport {
         self.residual = (self.residual / self.weight).sqrt();
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::fit::Fit;
+    use crate::math::Vec3;
+    use crate::testing::{before_wall, moved, standing, with_context, without_background};
+
+    /// What is reported of the standing body, seen `off` metres behind where it is thought to be.
+    fn filled(off: f64) -> (Estimate, usize) {
+        let (model, poses) = standing();
+        let config = without_background();
+        let pixels = before_wall(&model.body, &moved(&poses, off * Vec3::Z));
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, &poses);
+            let mut motion = Motion::default();
+            (motion.poses, motion.origin) = (poses.clone(), Vec3::new(1.0, 2.0, 3.0));
+            let mut estimate = Estimate::default();
+            // Nothing of an earlier frame is left.
+            for _ in 0..2 {
+                estimate.fill(&model.body, &motion, fit.correspondences(), context.seen.candidates);
+            }
+            (estimate, context.seen.candidates.len())
+        })
+    }
+
+    #[test]
+    fn poses_and_sites_are_in_the_world_and_joints_are_closed() {
+        let (model, poses) = standing();
+        let (estimate, _) = filled(0.0);
+        let origin = Vec3::new(1.0, 2.0, 3.0);
+        for (found, pose) in estimate.world_from_limb.iter().zip(&poses) {
+            assert!(found.translation.distance(pose.translation + origin) < 1e-12);
+        }
+        for (index, site) in estimate.sites.iter().enumerate() {
+            assert!(site.distance(model.body.site_position(&poses, index) + origin) < 1e-9);
+        }
+        assert!(estimate.joint_gaps.len() == poses.len() && estimate.joint_gaps.iter().all(|gap| *gap < 1e-9));
+    }
+
+    #[test]
+    fn a_source_is_reported_once_with_all_it_gave_and_what_of_it_fits() {
+        let [near, far] = [0.0, 0.04].map(|off| {
+            let (estimate, candidates) = filled(off);
+            assert_eq!(estimate.sources.len(), 1);
+            let source = estimate.sources[0];
+            assert_eq!((source.count, source.inliers), (candidates, estimate.limb_points.iter().sum()));
+            assert!(source.inliers > 0 && source.inliers <= source.count);
+            assert!((source.residual.powi(2) - estimate.mean_squared_distance).abs() < 1e-6);
+            source.residual
+        });
+        assert!(near < 0.005 && (0.02..0.06).contains(&far), "{near} and {far} m");
+    }
+}

@@ -21,3 +21,37 @@ impl Propose for LastGoodEnd {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::fit::Fit;
+    use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
+
+    #[test]
+    fn an_arm_is_proposed_where_it_ended_when_all_was_well() {
+        let (model, poses) = standing();
+        let (wrong, _) = raised(&model, &poses, 0.2);
+        let index = first_arm(&model);
+        let wanted = model.extremities[index].end(&poses);
+        let (pixels, config) = (before_wall(&model.body, &poses), without_background());
+        with_context(&pixels, &config, &model, &wrong, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, &wrong);
+            let at = Extremity { context, matched: fit.matched(&wrong), index };
+            let mut history = vec![History::default(); model.extremities.len()];
+            let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
+            LastGoodEnd.propose(at, &history, &mut rough, &mut pool);
+            assert_eq!(pool.found().count(), 0, "nobody knows where");
+            history[index].last_good_end = Some(wanted);
+            LastGoodEnd.propose(at, &history, &mut rough, &mut pool);
+            let found: Vec<_> = pool.found().collect();
+            assert_eq!((found.len(), found[0].basis), (1, Basis::Rest));
+            assert!(model.extremities[index].end(&found[0].poses).distance(wanted) < 0.005);
+            for limb in (0..poses.len()).filter(|limb| !model.extremities[index].limbs().any(|own| own == *limb)) {
+                assert_eq!(found[0].poses[limb], wrong[limb]);
+            }
+        });
+    }
+}

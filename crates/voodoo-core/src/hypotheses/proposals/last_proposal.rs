@@ -21,3 +21,39 @@ impl Propose for LastProposal {
         pool.again.set(own.last_basis);
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::fit::{Context, Fit};
+    use crate::hypotheses::history::Basis;
+    use crate::math::Vec3;
+    use crate::testing::{before_wall, farthest, first_arm, moved, raised, standing, with_context, without_background};
+
+    #[test]
+    fn what_the_frame_before_asked_for_is_proposed_again_in_the_frame_of_now() {
+        let (model, poses) = standing();
+        let (wanted, _) = raised(&model, &poses, 0.2);
+        let (pixels, config, index) = (before_wall(&model.body, &poses), without_background(), first_arm(&model));
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let mut seen = context.seen;
+            seen.views.origin = Vec3::new(2.0, -1.0, 0.5);
+            let fit = Fit::new(&config).unwrap();
+            let at = Extremity { context: Context { seen, ..context }, matched: fit.matched(&poses), index };
+            let mut history = vec![History::default(); model.extremities.len()];
+            let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
+            history[index].last_proposal = wanted.clone();
+            history[index].last_basis = Basis::Lean;
+            history[index].persistence.observe(Some(1));
+            LastProposal.propose(at, &history, &mut rough, &mut pool);
+            assert_eq!(pool.found().count(), 0, "nobody asked for it");
+            history[index].persistence.vote();
+            history[index].persistence.observe(Some(1));
+            LastProposal.propose(at, &history, &mut rough, &mut pool);
+            let found: Vec<_> = pool.found().collect();
+            assert_eq!((found.len(), found[0].basis), (1, Basis::Lean));
+            assert!(farthest(&found[0].poses, &moved(&wanted, -seen.views.origin)) < 1e-12);
+        });
+    }
+}

@@ -59,3 +59,51 @@ impl Exclusive {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
+
+    /// Weight of what each limb alone explains of an image of `seen`, at `poses`; the weight of all candidates.
+    fn counted(seen: &[Pose], poses: &[Pose], change: impl Fn(&Candidates, &mut Exclusive)) -> (Vec<f64>, f64) {
+        let (model, config) = (standing().0, without_background());
+        with_context(&before_wall(&model.body, seen), &config, &model, poses, |context| {
+            let candidates = context.seen.candidates;
+            let mut exclusive = Exclusive::default();
+            // What was counted before is forgotten.
+            exclusive.count(&model.body, poses, candidates);
+            exclusive.count(&model.body, poses, candidates);
+            change(candidates, &mut exclusive);
+            let all = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+            (exclusive.weight, all)
+        })
+    }
+
+    #[test]
+    fn limbs_explain_most_of_a_body_alone_and_depth_images_are_no_clouds() {
+        let (_, poses) = standing();
+        let (weight, all) = counted(&poses, &poses, |_, exclusive| assert!(exclusive.clouds.iter().all(|w| *w == 0.0)));
+        let sum: f64 = weight.iter().sum();
+        assert!(sum > 0.6 * all && sum < 1.1 * all, "{sum} of {all}");
+    }
+
+    #[test]
+    fn what_two_limbs_explain_is_no_merit_of_either_and_what_none_explains_counts_for_nothing() {
+        let (model, poses) = standing();
+        let arm = &model.extremities[first_arm(&model)];
+        let (raised, _) = raised(&model, &poses, 0.2);
+        let on = |(weight, _): &(Vec<f64>, f64)| weight[arm.lower];
+        let right = counted(&poses, &poses, |_, _| ());
+        // The other forearm put on this one.
+        let mut twice = poses.clone();
+        let other = model.extremities.iter().find(|chain| !chain.leg && chain.lower != arm.lower).unwrap().lower;
+        twice[other] = poses[arm.lower];
+        assert!(on(&right) > 10.0 && on(&counted(&poses, &twice, |_, _| ())) < 0.1 * on(&right));
+        assert_eq!(on(&counted(&raised, &poses, |_, _| ())), 0.0);
+        let (weight, all) = counted(&poses, &moved(&poses, Vec3::new(0.0, 0.0, 0.5)), |_, _| ());
+        assert!(all > 1000.0 && weight.iter().sum::<f64>() == 0.0, "{weight:?}");
+    }
+}

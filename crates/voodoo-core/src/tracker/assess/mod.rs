@@ -218,8 +218,11 @@ fn overall(limbs: &[LimbStatus]) -> Status {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use crate::association::correspondence::Correspondences;
     use crate::fit::Fit;
     use crate::math::{Pose, Vec3};
+    use crate::observation::candidates::Candidates;
+    use crate::observation::frame::Frame;
     use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};
 
     /// Lets an assessor look at poses in an image, in so many frames.
@@ -274,14 +277,33 @@ mod tests {
     fn a_body_beside_what_is_seen_is_lost_and_so_is_one_before_nothing() {
         let (model, poses) = standing();
         let nothing = vec![0; before_wall(&model.body, &poses).len()];
-        for pixels in [before_wall(&model.body, &poses), nothing] {
+        let seen = before_wall(&model.body, &poses);
+        // What no longer shows at all is lost at once.
+        for (pixels, off, frames) in [(&seen, 0.5, 3), (&nothing, 0.0, 1)] {
             let mut assessor = trusting();
-            look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
-            look(&mut assessor, &pixels, &moved(&poses, 0.5 * Vec3::X), 3);
+            look(&mut assessor, &seen, &poses, 5);
+            look(&mut assessor, pixels, &moved(&poses, off * Vec3::X), frames);
             let estimate = reported(&assessor);
             assert_eq!(estimate.status, Status::Lost);
             assert!(estimate.limb_status.iter().all(|status| *status != LimbStatus::Measured), "{estimate:?}");
         }
+    }
+
+    #[test]
+    fn a_frame_that_measures_nothing_loses_the_body_whatever_was_seen_before() {
+        let (model, poses) = standing();
+        let pixels = before_wall(&model.body, &poses);
+        let mut assessor = trusting();
+        look(&mut assessor, &pixels, &poses, 5);
+        assert_eq!(reported(&assessor).status, Status::Tracking);
+        with_context(&pixels, &without_background(), &model, &poses, |context| {
+            let (frame, candidates) = (Frame::empty(1.0), Candidates::default());
+            let mut seen = context.seen.with(&candidates);
+            (seen.views.frame, seen.views.segmented) = (&frame, &[]);
+            let matched = Matched { correspondences: &Correspondences::default(), poses: &poses };
+            assessor.assess(Context { seen, ..context }, matched);
+        });
+        assert_eq!(reported(&assessor).status, Status::Lost);
     }
 
     #[test]
