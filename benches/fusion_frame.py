@@ -9,6 +9,7 @@ frames that have a picture.
 
 import argparse
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,11 +17,12 @@ import cv2
 import numpy as np
 
 import voodoo
-import voodoo.pipeline.front_end as front_end_module
+import voodoo.sensors.adapters.skin as skin_adapter
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings import ColorImage, KeypointImage, RecordedFrame, Recording, open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import LAYOUTS
+from voodoo.sensors.adapters.keypoints import KeypointsAdapter
 from voodoo.sensors.pixels import in_sensor
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.sensors.skin.tracker import SkinTracker
@@ -44,6 +46,21 @@ def keypoints(item: ColorImage, positions: dict[str, np.ndarray], chance: np.ran
     )
 
 
+def with_keypoints(recording: Recording, recorded: Iterable[RecordedFrame]) -> list[RecordedFrame]:
+    """Frames whose pictures are decoded, with keypoints of the reference in each."""
+    chance = np.random.default_rng(3)
+    frames: list[RecordedFrame] = []
+    for index, frame in enumerate(recorded):
+        items = list(frame.measurements)
+        for item in frame.measurements:
+            if isinstance(item, ColorImage):
+                _ = item.image
+                names, places = recording.reference.names, recording.reference.positions[index]
+                items.append(keypoints(item, dict(zip(names, places, strict=True)), chance))
+        frames.append(replace(frame, measurements=tuple(items)))
+    return frames
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recording", type=Path, nargs="?", default=sample_path())
@@ -52,16 +69,7 @@ def main() -> None:
     if "coco17" not in LAYOUTS:
         raise SystemExit("expected the layout coco17")
     recording = open_recording(options.recording)
-    chance = np.random.default_rng(3)
-    frames: list[RecordedFrame] = []
-    for index, recorded in enumerate(paired(recording)):
-        items = list(recorded.measurements)
-        for item in recorded.measurements:
-            if isinstance(item, ColorImage):
-                _ = item.image
-                names, places = recording.reference.names, recording.reference.positions[index]
-                items.append(keypoints(item, dict(zip(names, places, strict=True)), chance))
-        frames.append(replace(recorded, measurements=tuple(items)))
+    frames = with_keypoints(recording, paired(recording))
     # The clock of CPU time is slow on some machines: the whole is timed without looking at its parts.
     began = time.process_time()
     run(recording, frames)
@@ -102,10 +110,10 @@ def parts(recording: Recording, frames: list[RecordedFrame]) -> dict[str, float]
 
     owners = {
         "of it the tracker's step": (voodoo.Tracker, "step"),
-        "skin: body in the picture": (front_end_module, "body_view"),
+        "skin: body in the picture": (skin_adapter, "body_view"),
         "skin: regions and their names": (SkinTracker, "observe"),
         "skin: learning": (SkinTracker, "learn"),
-        "keypoints": (FrontEnd, "_add_keypoints"),
+        "keypoints": (KeypointsAdapter, "add"),
     }
     before = {label: getattr(owner, name) for label, (owner, name) in owners.items()}
     for label, (owner, name) in owners.items():
