@@ -14,6 +14,7 @@ pub use landmark_cost::body_landmark_cost;
 pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
 use crate::association::correspondence::Correspondences;
+use crate::body::Model;
 use crate::fit::{Context, Fit, Matched, Motion};
 use crate::math::{Pose, shifted};
 use history::{Basis, History};
@@ -62,7 +63,7 @@ struct Refined {
 
 impl Hypotheses {
     /// Forgets everything and makes room for another body.
-    pub fn restart(&mut self, model: &crate::body::Model) {
+    pub fn restart(&mut self, model: &Model) {
         let limbs = model.body.limbs().len();
         self.history.clear();
         self.history.resize_with(model.extremities.len(), || History {
@@ -105,13 +106,7 @@ impl Hypotheses {
     }
 
     /// Remembers where the arms and legs end that this frame proves right; a lost body has been anywhere.
-    pub fn remember(
-        &mut self,
-        model: &crate::body::Model,
-        motion: &Motion,
-        lost: bool,
-        measured: impl Fn(usize) -> bool,
-    ) {
+    pub fn remember(&mut self, model: &Model, motion: &Motion, lost: bool, measured: impl Fn(usize) -> bool) {
         if lost {
             self.history.iter_mut().for_each(|own| own.last_good_end = None);
         }

@@ -70,8 +70,8 @@ impl Relocalizer {
         false
     }
 
-    /// Looks for the body at everything of its size; its poses where it explains the frame better than at `present`.
-    /// `predicted` were expected for this frame, and `fit` is as before when it returns.
+    /// Looks for the body at everything of its size; its poses where it explains the frame better than at `present`. What `fit`
+    /// has matched is as before when it returns.
     pub fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
         let (frame, origin) = (context.seen.frame(), context.seen.origin());
         let backgrounds = context.seen.views.backgrounds;

@@ -23,14 +23,14 @@ impl Solver {
         let Some(failed) = self.first_failure(n, count, image, slack, last) else {
             for level in 0..count {
                 // Slow progress is the sign of a goal out of reach, where less damping would overshoot.
-                let shrink = if self.trial_cost[level] < 0.9 * self.cost[level] { 0.3 } else { 0.8 };
-                self.trust[level] = (shrink * self.trust[level]).max(1e-6);
+                let shrink = if self.trial.cost[level] < 0.9 * self.here.cost[level] { 0.3 } else { 0.8 };
+                self.levels.trust[level] = (shrink * self.levels.trust[level]).max(1e-6);
             }
             self.gain = (1.5 * self.gain).min(problem.options.gain);
             return self.take_trial(angles);
         };
         if failed < count {
-            self.trust[failed] = (4.0 * self.trust[failed]).min(1e6);
+            self.levels.trust[failed] = (4.0 * self.levels.trust[failed]).min(1e6);
         } else {
             self.gain *= 0.5;
         }
@@ -48,7 +48,7 @@ impl Solver {
             }
         }
         // A refused step is not rest: more damping comes next.
-        if self.trust.first().is_none_or(|trust| *trust < 1e5) { f64::INFINITY } else { 0.0 }
+        if self.levels.trust.first().is_none_or(|trust| *trust < 1e5) { f64::INFINITY } else { 0.0 }
     }
 
     fn propose(&mut self, problem: &Problem, angles: &[f64], stage: usize, share: f64) {
@@ -58,7 +58,7 @@ impl Solver {
             let above = if stage == 0 { 0.0 } else { self.stages[(stage - 1) * n + i] };
             let step = above + share * (self.stages[stage * n + i] - above);
             // The clamp only takes off rounding: stages end at the limits.
-            self.trial[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
+            self.trial_angles[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
         }
     }
 
@@ -75,27 +75,28 @@ impl Solver {
                 0 => length(Some(0)),
                 _ => length(None),
             };
-            let limit = match self.best.get(level) {
-                Some(best) if !slack => (best + 0.1 * SETTLED).max(self.before[level]),
-                _ => self.before[level] + rise + 1e-13,
+            let limit = match self.levels.best.get(level) {
+                Some(best) if !slack => (best + 0.1 * SETTLED).max(self.levels.before[level]),
+                _ => self.levels.before[level] + rise + 1e-13,
             };
-            let residual = self.trial_cost[level].sqrt();
+            let residual = self.trial.cost[level].sqrt();
             if residual.is_nan() || residual > limit {
                 return Some(level);
             }
         }
-        if image && stage == self.levels.len() {
-            let above = if stage == 0 { 0.0 } else { dot(&self.gradient, &self.stages[(stage - 1) * n..stage * n]) };
-            if self.trial_h.is_nan() || self.trial_h > self.h + above.max(0.0) + 1e-9 {
-                return Some(self.levels.len());
+        if image && stage == self.levels.ranges.len() {
+            let above =
+                if stage == 0 { 0.0 } else { dot(&self.here.gradient, &self.stages[(stage - 1) * n..stage * n]) };
+            if self.trial.h.is_nan() || self.trial.h > self.here.h + above.max(0.0) + 1e-9 {
+                return Some(self.levels.ranges.len());
             }
         }
         None
     }
 
     fn take_trial(&mut self, angles: &mut [f64]) -> f64 {
-        let moved = angles.iter().zip(&self.trial).fold(0.0_f64, |most, (old, new)| most.max((old - new).abs()));
-        angles.copy_from_slice(&self.trial);
+        let moved = angles.iter().zip(&self.trial_angles).fold(0.0_f64, |most, (old, new)| most.max((old - new).abs()));
+        angles.copy_from_slice(&self.trial_angles);
         self.accept();
         moved
     }

@@ -69,20 +69,50 @@ pub struct Report {
 /// Working memory, and the posture at rest; nothing is allocated after the first call with a problem of the same size.
 #[derive(Clone, Debug, Default)]
 pub struct Solver {
+    /// The posture so far, and the one that is tried.
+    here: Posture,
+    trial: Posture,
+    trial_angles: Vec<f64>,
+    levels: Levels,
+    linear: Linear,
+    /// The step after each level, and after the image: `stages x freedoms`.
+    stages: Vec<f64>,
+    /// Share of the image step.
+    gain: f64,
+    phase_start: Vec<f64>,
+    /// From before a nudge.
+    saved: Saved,
+    looks: Looks,
+    /// What angles are drawn to below all else; empty: nothing.
+    rest: Vec<Rest>,
+    /// Gradients of the criterion where the images refused a step to rest.
+    objections: Vec<f64>,
+}
+
+/// A posture, and what it costs: each level, and the images with their gradient.
+#[derive(Clone, Debug, Default)]
+struct Posture {
     at: Kinematics,
-    trial_at: Kinematics,
-    levels: Vec<Range<usize>>,
+    cost: Vec<f64>,
+    gradient: Vec<f64>,
+    h: f64,
+}
+
+/// The levels of goals.
+#[derive(Clone, Debug, Default)]
+struct Levels {
+    ranges: Vec<Range<usize>>,
     /// Damping over the squared residual, each level.
     trust: Vec<f64>,
-    cost: Vec<f64>,
-    trial_cost: Vec<f64>,
     /// Residual each level would have before its own part of the step.
     before: Vec<f64>,
-    gradient: Vec<f64>,
-    trial_gradient: Vec<f64>,
-    h: f64,
-    trial_h: f64,
-    gain: f64,
+    /// Residual of the levels whose turn is over.
+    best: Vec<f64>,
+}
+
+/// The linear system of one level, and its solution.
+#[derive(Clone, Debug, Default)]
+struct Linear {
     taken: Taken,
     damped: Damped,
     jacobian: Vec<f64>,
@@ -90,22 +120,21 @@ pub struct Solver {
     residual: Vec<f64>,
     wanted: Vec<f64>,
     part: Vec<f64>,
-    /// The step after each level, and after the image: `stages x freedoms`.
-    stages: Vec<f64>,
-    trial: Vec<f64>,
-    /// Residual of the levels whose turn is over.
-    best: Vec<f64>,
-    phase_start: Vec<f64>,
-    saved: Vec<f64>,
-    saved_cost: Vec<f64>,
+}
+
+/// Angles and their costs.
+#[derive(Clone, Debug, Default)]
+struct Saved {
+    angles: Vec<f64>,
+    cost: Vec<f64>,
+}
+
+/// Postures that were tried, how many of them were compared with the images, and whether it is the images' turn.
+#[derive(Clone, Debug, Default)]
+struct Looks {
     tried: usize,
-    /// How many of them were compared with the images.
     looked: usize,
     looking: bool,
-    /// What angles are drawn to below all else; empty: nothing.
-    rest: Vec<Rest>,
-    /// Gradients of the criterion where the images refused a step to rest.
-    objections: Vec<f64>,
 }
 
 struct Problem<'a> {
@@ -133,13 +162,13 @@ impl Solver {
         let criterion = criterion.filter(|criterion| !criterion.views.is_empty() && !criterion.segments.is_empty());
         let problem = Problem { model, base: world_from_base, goals, criterion, options };
         self.start(&problem, angles);
-        let count = self.levels.len();
+        let count = self.levels.ranges.len();
         let mut report = Report { converged: true, ..Report::default() };
         // One level after the other joins, the image last: what a level reaches does not depend on those below it.
         for phase in 0..count + usize::from(criterion.is_some()) {
             // The images are looked at when it is their turn: what the levels above do does not depend on them.
-            self.looking = phase == count;
-            if self.looking {
+            self.looks.looking = phase == count;
+            if self.looks.looking {
                 self.evaluate_here(&problem, angles);
             }
             self.phase_start.clear();
@@ -152,40 +181,40 @@ impl Solver {
                 self.phase(&problem, phase, false, angles, &mut report);
             }
             if phase < count {
-                self.best.push(self.cost[phase].sqrt());
+                self.levels.best.push(self.here.cost[phase].sqrt());
             }
         }
         if !self.rest.is_empty() {
             self.draw(&problem, angles, &mut report);
         }
-        report.h = self.h;
-        (report.tried, report.looked) = (self.tried, self.looked);
+        report.h = self.here.h;
+        (report.tried, report.looked) = (self.looks.tried, self.looks.looked);
         report
     }
 
     /// Steps with the first `phase + 1` levels, or all and the image. `slack`: levels above may rise by the second order of a
     /// step, to be made good by the next.
     fn phase(&mut self, problem: &Problem, phase: usize, slack: bool, angles: &mut [f64], report: &mut Report) {
-        let (count, options) = (self.levels.len(), problem.options);
+        let (count, options) = (self.levels.ranges.len(), problem.options);
         let image = phase == count;
         let active = if image { count } else { phase + 1 };
         let mut nudged = false;
         let mut idle = 0;
         let mut rest = false;
         for step in 0..options.steps {
-            let reached = self.cost[..active].iter().all(|cost| cost.sqrt() < options.tolerance);
-            if reached && (!image || self.h <= 0.0) {
+            let reached = self.here.cost[..active].iter().all(|cost| cost.sqrt() < options.tolerance);
+            if reached && (!image || self.here.h <= 0.0) {
                 rest = true;
                 break;
             }
             report.steps += 1;
-            let before = self.h;
+            let before = self.here.h;
             let moved = self.step(problem, active, image, slack, angles);
-            idle = if image && before - self.h < LEAST_FALL * before { idle + 1 } else { 0 };
+            idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
             if moved >= options.still && idle < STALLED_STEPS {
                 continue;
             }
-            let stuck = !image && self.cost[phase].sqrt() > options.tolerance;
+            let stuck = !image && self.here.cost[phase].sqrt() > options.tolerance;
             if nudged || !stuck || step + 1 == options.steps {
                 rest = true;
                 break;
@@ -195,7 +224,7 @@ impl Solver {
             self.nudge(problem, angles);
         }
         if nudged && self.worse_than_saved() {
-            angles.copy_from_slice(&self.saved);
+            angles.copy_from_slice(&self.saved.angles);
             self.evaluate_here(problem, angles);
             rest = true;
         }
@@ -205,12 +234,12 @@ impl Solver {
     /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
     /// are as good as before the phase.
     fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
-        let looking = self.looking;
-        self.looking = false;
+        let looking = self.looks.looking;
+        self.looks.looking = false;
         let mut moved = false;
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
-                let reached = self.cost[..active].iter().all(|cost| *cost < SETTLED * SETTLED);
+                let reached = self.here.cost[..active].iter().all(|cost| *cost < SETTLED * SETTLED);
                 if reached {
                     break;
                 }
@@ -220,16 +249,16 @@ impl Solver {
                 }
             }
         }
-        self.looking = looking;
+        self.looks.looking = looking;
         if looking && moved {
             self.evaluate_here(problem, angles);
         }
-        self.cost.iter().zip(&self.best).all(|(cost, best)| cost.sqrt() <= best + SETTLED)
+        self.here.cost.iter().zip(&self.levels.best).all(|(cost, best)| cost.sqrt() <= best + SETTLED)
     }
 
     /// Poses and derivatives at the last solution.
     pub fn kinematics(&self) -> &Kinematics {
-        &self.at
+        &self.here.at
     }
 
     fn start(&mut self, problem: &Problem, angles: &mut [f64]) {
@@ -238,70 +267,68 @@ impl Solver {
             *angle = angle.clamp(*low, *high);
         }
         problem.model.normalise(angles);
-        level_ranges(problem.goals, &mut self.levels);
-        let count = self.levels.len();
-        self.trust.clear();
-        self.trust.resize(count, 0.1);
-        self.before.clear();
-        self.before.resize(count, 0.0);
-        for vector in [&mut self.part, &mut self.gradient, &mut self.trial_gradient, &mut self.trial] {
+        level_ranges(problem.goals, &mut self.levels.ranges);
+        let count = self.levels.ranges.len();
+        self.levels.trust.clear();
+        self.levels.trust.resize(count, 0.1);
+        self.levels.before.clear();
+        self.levels.before.resize(count, 0.0);
+        for vector in [&mut self.linear.part, &mut self.here.gradient, &mut self.trial.gradient, &mut self.trial_angles]
+        {
             vector.clear();
             vector.resize(n, 0.0);
         }
         self.stages.clear();
         self.stages.resize((count + 1) * n, 0.0);
-        self.best.clear();
-        (self.tried, self.looked, self.looking) = (0, 0, false);
+        self.levels.best.clear();
+        (self.looks.tried, self.looks.looked, self.looks.looking) = (0, 0, false);
         self.gain = problem.options.gain;
         self.evaluate_here(problem, angles);
     }
 
     fn evaluate_here(&mut self, problem: &Problem, angles: &[f64]) {
-        self.trial.copy_from_slice(angles);
+        self.trial_angles.copy_from_slice(angles);
         self.evaluate(problem);
         self.accept();
     }
 
     /// Costs and kinematics at the trial angles, and the criterion if it is the images' turn.
     fn evaluate(&mut self, problem: &Problem) {
-        self.tried += 1;
-        problem.model.place(problem.base, &self.trial, &mut self.trial_at);
-        self.trial_cost.clear();
-        let costs = self.levels.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial_at));
-        self.trial_cost.extend(costs);
-        self.trial_h = match problem.criterion {
-            Some(criterion) if self.looking => {
-                self.looked += 1;
-                criterion.evaluate(problem.model, &self.trial_at, &mut self.trial_gradient)
+        self.looks.tried += 1;
+        problem.model.place(problem.base, &self.trial_angles, &mut self.trial.at);
+        self.trial.cost.clear();
+        let costs = self.levels.ranges.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial.at));
+        self.trial.cost.extend(costs);
+        self.trial.h = match problem.criterion {
+            Some(criterion) if self.looks.looking => {
+                self.looks.looked += 1;
+                criterion.evaluate(problem.model, &self.trial.at, &mut self.trial.gradient)
             }
             _ => 0.0,
         };
     }
 
     fn accept(&mut self) {
-        std::mem::swap(&mut self.at, &mut self.trial_at);
-        std::mem::swap(&mut self.cost, &mut self.trial_cost);
-        std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
-        self.h = self.trial_h;
+        std::mem::swap(&mut self.here, &mut self.trial);
     }
 
     fn nudge(&mut self, problem: &Problem, angles: &mut [f64]) {
-        self.saved.clear();
-        self.saved.extend_from_slice(angles);
-        self.saved_cost.clear();
-        self.saved_cost.extend_from_slice(&self.cost);
+        self.saved.angles.clear();
+        self.saved.angles.extend_from_slice(angles);
+        self.saved.cost.clear();
+        self.saved.cost.extend_from_slice(&self.here.cost);
         for (i, (angle, [low, high])) in angles.iter_mut().zip(problem.model.limits()).enumerate() {
             // Uneven, so that symmetric chains leave their symmetry; away from the nearer limit.
             let at_limit = *angle <= *low || *angle >= *high;
             let by = if at_limit { NUDGE_AT_LIMIT } else { NUDGE } * (1.0 + 0.37 * (i % 3) as f64);
             *angle = if *high - *angle < *angle - *low { *angle - by } else { *angle + by }.clamp(*low, *high);
         }
-        self.trust.fill(0.1);
+        self.levels.trust.fill(0.1);
         self.evaluate_here(problem, angles);
     }
 
     fn worse_than_saved(&self) -> bool {
-        for (now, saved) in self.cost.iter().zip(&self.saved_cost) {
+        for (now, saved) in self.here.cost.iter().zip(&self.saved.cost) {
             if *now > saved + 1e-13 {
                 return true;
             }

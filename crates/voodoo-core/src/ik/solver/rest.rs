@@ -30,9 +30,9 @@ impl Solver {
     #[inline(never)]
     pub(super) fn draw(&mut self, problem: &Problem, angles: &mut [f64], report: &mut Report) {
         // What lower levels improved in higher ones on their way counts, too.
-        self.best.clear();
-        self.best.extend(self.cost.iter().map(|cost| cost.sqrt()));
-        let most = self.h + LEVEL;
+        self.levels.best.clear();
+        self.levels.best.extend(self.here.cost.iter().map(|cost| cost.sqrt()));
+        let most = self.here.h + LEVEL;
         let mut rest = false;
         for _ in 0..problem.options.steps {
             report.steps += 1;
@@ -46,7 +46,7 @@ impl Solver {
 
     /// One step, `h` at most `most`; the largest change of an unknown, zero if there is none to be taken.
     fn draw_once(&mut self, problem: &Problem, most: f64, angles: &mut [f64]) -> f64 {
-        let (n, count, limits) = (angles.len(), self.levels.len(), problem.model.limits());
+        let (n, count, limits) = (angles.len(), self.levels.ranges.len(), problem.model.limits());
         self.phase_start.clear();
         self.phase_start.extend_from_slice(angles);
         let off = self.off(angles);
@@ -62,20 +62,20 @@ impl Solver {
                     angles[i] = (self.phase_start[i] + share * self.stages[count * n + i]).clamp(*low, *high);
                 }
                 problem.model.normalise(angles);
-                self.looking = false;
+                self.looks.looking = false;
                 self.evaluate_here(problem, angles);
                 let kept = self.settle(problem, count, angles);
                 self.objections.truncate(refused * n);
                 if kept && self.off(angles) < off {
                     if problem.criterion.is_some() {
-                        self.looking = true;
+                        self.looks.looking = true;
                         self.evaluate_here(problem, angles);
                     }
-                    if self.h <= most {
+                    if self.here.h <= most {
                         let moves = angles.iter().zip(&self.phase_start).map(|(new, old)| (new - old).abs());
                         return moves.fold(0.0, f64::max);
                     }
-                    self.objections.extend_from_slice(&self.gradient);
+                    self.objections.extend_from_slice(&self.here.gradient);
                 }
                 angles.copy_from_slice(&self.phase_start);
                 // A border of the images is met nearer than this by going along it.
@@ -83,7 +83,7 @@ impl Solver {
                     break;
                 }
             }
-            self.looking = problem.criterion.is_some();
+            self.looks.looking = problem.criterion.is_some();
             self.evaluate_here(problem, angles);
             // Along the border of where the images are content, if it is they who object to the least step.
             if self.objections.len() == refused * n {
@@ -96,25 +96,25 @@ impl Solver {
     /// The step to rest in the null space of all goals and of what the images objected to, within the limits. Its stage is
     /// the one after those of the goals.
     fn rest_part(&mut self, problem: &Problem, angles: &[f64]) {
-        let (n, count) = (angles.len(), self.levels.len());
-        self.taken.clear(n);
-        for level in &self.levels {
+        let (n, count) = (angles.len(), self.levels.ranges.len());
+        self.linear.taken.clear(n);
+        for level in &self.levels.ranges {
             let goals = &problem.goals[level.clone()];
-            level_rows(problem.model, goals, &self.at, &mut self.jacobian, &mut self.residual);
-            self.taken.take(&self.jacobian);
+            level_rows(problem.model, goals, &self.here.at, &mut self.linear.jacobian, &mut self.linear.residual);
+            self.linear.taken.take(&self.linear.jacobian);
         }
         // One by one: the images may object more or less strongly, but each objection counts.
         for gradient in self.objections.chunks_exact(n.max(1)) {
-            self.taken.take(gradient);
+            self.linear.taken.take(gradient);
         }
         self.stages[count * n..].fill(0.0);
         for _ in 0..=n {
-            self.part.fill(0.0);
+            self.linear.part.fill(0.0);
             for rest in self.rest.iter().filter(|rest| rest.unknown < n) {
                 let now = angles[rest.unknown] + self.stages[count * n + rest.unknown];
-                self.part[rest.unknown] = rest.angle - now;
+                self.linear.part[rest.unknown] = rest.angle - now;
             }
-            self.taken.project(&mut self.part);
+            self.linear.taken.project(&mut self.linear.part);
             if !self.add_part(problem, count, angles) {
                 break;
             }

@@ -18,11 +18,11 @@ impl Solver {
         angles: &mut [f64],
     ) -> f64 {
         let n = angles.len();
-        self.taken.clear(n);
+        self.linear.taken.clear(n);
         for level in 0..count {
             self.level_part(problem, level, angles);
             if level + 1 < count || image {
-                self.taken.take(&self.jacobian);
+                self.linear.taken.take(&self.linear.jacobian);
             }
         }
         if image {
@@ -37,25 +37,25 @@ impl Solver {
     /// the limits and solved again without the unknowns that stand there.
     fn level_part(&mut self, problem: &Problem, level: usize, angles: &[f64]) {
         let n = angles.len();
-        let goals = &problem.goals[self.levels[level].clone()];
-        level_rows(problem.model, goals, &self.at, &mut self.jacobian, &mut self.residual);
+        let goals = &problem.goals[self.levels.ranges[level].clone()];
+        level_rows(problem.model, goals, &self.here.at, &mut self.linear.jacobian, &mut self.linear.residual);
         self.inherit(level, n);
-        let damping = self.trust[level] * self.cost[level] + LEAST_DAMPING;
+        let damping = self.levels.trust[level] * self.here.cost[level] + LEAST_DAMPING;
         for attempt in 0..=n {
             let stage = &self.stages[level * n..(level + 1) * n];
-            self.wanted.clear();
-            let rows = self.jacobian.chunks_exact(n).zip(&self.residual);
-            self.wanted.extend(rows.map(|(row, e)| -e - dot(row, stage)));
+            self.linear.wanted.clear();
+            let rows = self.linear.jacobian.chunks_exact(n).zip(&self.linear.residual);
+            self.linear.wanted.extend(rows.map(|(row, e)| -e - dot(row, stage)));
             if attempt == 0 {
-                self.before[level] = dot(&self.wanted, &self.wanted).sqrt();
+                self.levels.before[level] = dot(&self.linear.wanted, &self.linear.wanted).sqrt();
             }
-            if self.taken.is_empty() {
-                self.damped.solve(&self.jacobian, &self.wanted, damping, &mut self.part);
+            if self.linear.taken.is_empty() {
+                self.linear.damped.solve(&self.linear.jacobian, &self.linear.wanted, damping, &mut self.linear.part);
             } else {
-                self.projected.clear();
-                self.projected.extend_from_slice(&self.jacobian);
-                self.projected.chunks_exact_mut(n).for_each(|row| self.taken.project(row));
-                self.damped.solve(&self.projected, &self.wanted, damping, &mut self.part);
+                self.linear.projected.clear();
+                self.linear.projected.extend_from_slice(&self.linear.jacobian);
+                self.linear.projected.chunks_exact_mut(n).for_each(|row| self.linear.taken.project(row));
+                self.linear.damped.solve(&self.linear.projected, &self.linear.wanted, damping, &mut self.linear.part);
             }
             if !self.add_part(problem, level, angles) {
                 break;
@@ -69,16 +69,16 @@ impl Solver {
     fn image_part(&mut self, problem: &Problem, count: usize, angles: &[f64]) {
         let n = angles.len();
         self.inherit(count, n);
-        let blind = problem.options.caution * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.at));
+        let blind = problem.options.caution * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.here.at));
         for _ in 0..=n {
-            self.part.copy_from_slice(&self.gradient);
-            self.taken.project(&mut self.part);
-            let square = dot(&self.part, &self.part);
+            self.linear.part.copy_from_slice(&self.here.gradient);
+            self.linear.taken.project(&mut self.linear.part);
+            let square = dot(&self.linear.part, &self.linear.part);
             if square < 1e-16 {
                 break;
             }
-            let alpha = self.gain * self.h / (square + blind * blind);
-            self.part.iter_mut().for_each(|value| *value *= -alpha);
+            let alpha = self.gain * self.here.h / (square + blind * blind);
+            self.linear.part.iter_mut().for_each(|value| *value *= -alpha);
             if !self.add_part(problem, count, angles) {
                 break;
             }
@@ -97,7 +97,7 @@ impl Solver {
     /// Adds the part to a stage as far as the limits allow; true when one was hit, whose unknown then is taken.
     pub(super) fn add_part(&mut self, problem: &Problem, stage: usize, angles: &[f64]) -> bool {
         let n = angles.len();
-        let most = largest(&self.part);
+        let most = largest(&self.linear.part);
         if !most.is_finite() {
             return false;
         }
@@ -105,7 +105,7 @@ impl Solver {
         let step = &mut self.stages[stage * n..(stage + 1) * n];
         let mut hit = None;
         for (i, [low, high]) in problem.model.limits().iter().enumerate() {
-            let (from, by) = (angles[i] + step[i], self.part[i]);
+            let (from, by) = (angles[i] + step[i], self.linear.part[i]);
             let room = if by < -1e-15 {
                 low - from
             } else if by > 1e-15 {
@@ -118,7 +118,7 @@ impl Solver {
                 hit = Some(i);
             }
         }
-        step.iter_mut().zip(&self.part).for_each(|(step, part)| *step += share * part);
-        hit.is_some_and(|unknown| self.taken.pin(unknown))
+        step.iter_mut().zip(&self.linear.part).for_each(|(step, part)| *step += share * part);
+        hit.is_some_and(|unknown| self.linear.taken.pin(unknown))
     }
 }
