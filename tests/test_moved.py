@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import voodoo
-from voodoo._moved import MOVED
+from voodoo._moved import MOVED, MOVED_ON
 
 DOCUMENTED = {
     "voodoo.angles": ["angle_names", "joint_angles"],
@@ -66,6 +66,15 @@ def test_an_old_path_gives_the_same_module_and_says_where_it_is(old, new):
 def test_documented_names_are_there(path, names):
     module = importlib.import_module(path)
     assert [name for name in names if not hasattr(module, name)] == []
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.parametrize(("old", "names"), MOVED_ON.items())
+def test_names_that_stand_elsewhere_are_there_by_the_old_path(old, names):
+    forget(old)
+    module = importlib.import_module(old)
+    for name, home in names.items():
+        assert getattr(module, name) is getattr(importlib.import_module(home), name)
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

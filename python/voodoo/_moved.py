@@ -52,6 +52,18 @@ MOVED = {
     "voodoo.witness": "voodoo.evaluation.depth_agreement",
 }
 """Old path -> new path."""
+MOVED_ON = {
+    "voodoo.evaluate": {"find_recordings": "voodoo.evaluation.search"},
+    "voodoo.overlay": {"side_color": "voodoo.visualization.ink"},
+    "voodoo.report": {"Summary": "voodoo.evaluation.summary"},
+    "voodoo.virtual": {
+        "Disturbance": "voodoo.synthetic.disturbance",
+        "disturbed": "voodoo.synthetic.disturbance",
+        "disturbed_image": "voodoo.synthetic.disturbance",
+        "grown": "voodoo.synthetic.grown",
+    },
+}
+"""Old path -> names of it that stand in another module than its new path."""
 
 
 class _MovedFinder(MetaPathFinder):
@@ -74,6 +86,8 @@ class _MovedLoader(Loader):
         """The very module of the new path."""
         warnings.warn(f"{spec.name} has moved to {self._new}", DeprecationWarning, stacklevel=2)
         module = importlib.import_module(self._new)
+        for name, home in MOVED_ON.get(spec.name, {}).items():
+            setattr(module, name, getattr(importlib.import_module(home), name))
         self._spec = module.__spec__
         return module
 
