@@ -4,7 +4,7 @@ mod context;
 mod motion;
 
 pub use context::{Context, Matched, Setting};
-pub use motion::{Motion, predict};
+pub use motion::Motion;
 
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -213,9 +213,9 @@ impl Fit {
 
     /// Closest points of the limbs' candidates; `anew` says whether those are others than the last time.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
-        let Context { config, model, seen: crate::observation::observer::Observation { candidates, .. }, .. } = context;
+        let Context { config, model, seen, .. } = context;
         let Self { assignment, correspondences, threads, .. } = self;
-        let (assignment, limbs) = (&*assignment, model.body.limbs());
+        let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), seen.candidates);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let work = |(index, matches): (usize, &mut LimbMatches)| {
             if anew {

@@ -96,7 +96,7 @@ impl Motion {
 }
 
 /// Poses expected after `current` when `previous` came before it, into `predicted`; `factor` scales the motion.
-pub fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predicted: &mut Vec<Pose>) {
+fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predicted: &mut Vec<Pose>) {
     predicted.clear();
     for (index, limb) in body.limbs().iter().enumerate() {
         let pose = match &limb.parent {

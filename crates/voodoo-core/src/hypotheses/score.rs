@@ -11,7 +11,7 @@ use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
 
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
-/// are soft by some degrees; a joint may turn by a third of a right angle between two frames.
+/// are soft; a joint may turn by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
 /// How deep (metres) a place of an axis lies in another limb when it is inside: surfaces touch.

@@ -5,7 +5,7 @@ use crate::math::{Pose, Vec3};
 use crate::observation::candidates::{REFERENCE_PATCH, body_box};
 use crate::observation::segments::Segment;
 
-/// A segment shows at least this share of the surface that a camera can see of the body: half of it may be hidden.
+/// A segment shows at least this share of the surface that a camera can see of the body: the rest may be hidden.
 const LEAST_SURFACE: f64 = 0.25;
 /// Its extents as shares of the body's height at rest: the longer one at least, the upright one and the others at most.
 const EXTENTS: [f64; 3] = [0.35, 1.4, 1.5];

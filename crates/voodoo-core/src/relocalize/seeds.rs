@@ -9,7 +9,7 @@ use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::observation::segments::Segment;
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
-/// Directions the body is turned to: an eighth of a turn is within reach of the ICP steps.
+/// Directions the body is turned to, evenly: costs time in proportion.
 const HEADINGS: usize = 8;
 /// Up to this distance rough looks take a point as explained, metres.
 const EXPLAINED_ROUGHLY: f64 = 0.10;

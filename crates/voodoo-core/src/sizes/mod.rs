@@ -11,7 +11,7 @@ use crate::math::{Pose, Vec3};
 use crate::solver::Gate;
 use girth::{Girth, GirthFit, girth_step};
 
-/// Gauss-Newton steps of the girth fit: it settles in four or five.
+/// Gauss-Newton steps of the girth fit: points find their limbs anew in each.
 const GIRTH_STEPS: usize = 6;
 /// Points farther than this from the set pose say nothing about sizes, metres.
 const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };

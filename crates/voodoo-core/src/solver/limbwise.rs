@@ -14,7 +14,7 @@ pub struct Limbwise {
     warm_start: WarmStart,
 }
 
-/// Rounds in which the chain follows the sites: an arm is three joints long.
+/// Rounds in which the chain follows the sites: each of them assigns the points anew.
 const LIMBWISE_ROUNDS: usize = 3;
 
 impl Solver for Limbwise {

@@ -28,10 +28,9 @@ class PointsAdapter(Adapter[PointCloud]):
 
     def add(self, frame: Frame, item: PointCloud, context: Context) -> None:
         """As points, those on the body moved to the frame's time."""
-        chosen, pose = context.settings, item.root_from_sensor
-        weight = context.range_weight(chosen.depth_noise, chosen.sharing, pose)
-        points = context.motion_compensated(item.points, pose, item.stamp)
-        frame.add_points(points, world_from_sensor=pose, weight=weight, source=item.sensor)
+        chosen = context.settings
+        weight = context.range_weight(chosen.depth_noise, chosen.sharing, item.root_from_sensor)
+        _add(frame, item, item.points, weight, context)
 
     def draw(self, item: PointCloud, canvas: Canvas, memory: Memory) -> None:
         """Small dots."""
@@ -55,10 +54,9 @@ class ScanAdapter(Adapter[LaserScan]):
 
     def add(self, frame: Frame, item: LaserScan, context: Context) -> None:
         """As points, those on the body moved to the frame's time."""
-        chosen, pose = context.settings, item.root_from_sensor
-        weight = context.range_weight(chosen.scan_noise, chosen.scan_sharing, pose)
-        points = context.motion_compensated(item.points(), pose, item.stamp)
-        frame.add_points(points, world_from_sensor=pose, weight=weight, source=item.sensor)
+        chosen = context.settings
+        weight = context.range_weight(chosen.scan_noise, chosen.scan_sharing, item.root_from_sensor)
+        _add(frame, item, item.points(), weight, context)
 
     def draw(self, item: LaserScan, canvas: Canvas, memory: Memory) -> None:
         """Dots."""
@@ -68,3 +66,9 @@ class ScanAdapter(Adapter[LaserScan]):
         """Points."""
         points = transform(item.root_from_sensor, item.points())
         log.send(f"world/laser/{log.entity(item.sensor)}", log.rr.Points3D(points, radii=0.015, colors=(255, 220, 0)))
+
+
+def _add(frame: Frame, item: PointCloud | LaserScan, points: npt.NDArray[Any], weight: float, context: Context) -> None:
+    pose = item.root_from_sensor
+    points = context.motion_compensated(points, pose, item.stamp)
+    frame.add_points(points, world_from_sensor=pose, weight=weight, source=item.sensor)
