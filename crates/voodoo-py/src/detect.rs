@@ -22,6 +22,8 @@ pub struct PyCandidate {
     roll: f64,
     #[pyo3(get)]
     area: f64,
+    #[pyo3(get)]
+    floor: Option<([f64; 3], f64)>,
 }
 
 #[pymethods]
@@ -82,6 +84,7 @@ pub fn person_candidates<'py>(
             middle: crop.middle,
             roll: crop.roll,
             area: candidate.area,
+            floor: segmentation.floor().map(|floor| (floor.normal.to_array(), floor.offset)),
         });
     }
     Ok(found)

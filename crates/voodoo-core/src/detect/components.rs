@@ -2,6 +2,7 @@
 
 use super::view::View;
 use crate::math::Vec3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Neighbouring pixels hang together when their depths differ by less than this, metres, and so much of the depth.
 const STEP: [f32; 2] = [0.04, 0.012];
@@ -17,6 +18,8 @@ const LENGTH: [f64; 2] = [0.45, 2.5];
 const LEAST_PART: f64 = 0.004;
 /// Parts of a person that something hides the link of are at most so far apart, metres.
 const GAP: f64 = 0.28;
+/// Standard deviation of a flat part's points across it, metres: walls and table tops are no people.
+const FLAT: f64 = 0.022;
 /// Points of a part that distances are taken from.
 const SAMPLES: usize = 48;
 /// Parts that are looked at, the largest first.
@@ -33,6 +36,7 @@ struct Part {
     high: Vec3,
     samples: [Vec3; SAMPLES],
     sampled: usize,
+    flat: bool,
 }
 
 /// Parts that together may be a person.
@@ -165,6 +169,7 @@ impl Components {
                 high: Vec3::NEG_INFINITY,
                 samples: [Vec3::ZERO; SAMPLES],
                 sampled: group.len().min(SAMPLES),
+                flat: false,
             };
             for (_, index) in group {
                 let point = view.point(*index as usize);
@@ -174,6 +179,7 @@ impl Components {
             for number in 0..part.sampled {
                 part.samples[number] = view.point(group[number * group.len() / part.sampled].1 as usize);
             }
+            part.flat = is_flat(&part.samples[..part.sampled]);
             self.parts.push(part);
         }
         self.parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
@@ -183,7 +189,7 @@ impl Components {
     /// Every part that may be a person by itself, and with the parts near it.
     fn propose(&self, candidates: &mut Vec<Candidate>) {
         for (number, part) in self.parts.iter().enumerate() {
-            if part.area > AREA[1] || part.area < 0.3 * AREA[0] {
+            if part.area > AREA[1] || part.area < 0.3 * AREA[0] || part.flat {
                 continue;
             }
             let alone = Candidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
@@ -237,6 +243,18 @@ fn near(a: &Part, b: &Part) -> bool {
     let points = |part: &Part| part.samples[..part.sampled].to_vec();
     let others = points(b);
     points(a).iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
+}
+
+/// Whether points lie near a plane.
+fn is_flat(points: &[Vec3]) -> bool {
+    let count = points.len() as f64;
+    let mean = points.iter().sum::<Vec3>() / count;
+    let mut scatter = Matrix3::zeros();
+    for point in points {
+        let from = Vector3::from((*point - mean).to_array());
+        scatter += from * from.transpose() / count;
+    }
+    scatter.symmetric_eigenvalues().min() < FLAT * FLAT
 }
 
 /// How far the seen surface is from a standing person's, in powers of e.
