@@ -36,7 +36,35 @@ struct Part {
     high: Vec3,
     samples: [Vec3; SAMPLES],
     sampled: usize,
+    /// Points so far, of which every so manyth was kept.
+    seen: usize,
+    every: usize,
     flat: bool,
+}
+
+impl Part {
+    fn new(label: u32, area: f64) -> Self {
+        let samples = [Vec3::ZERO; SAMPLES];
+        Self { label, area, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, samples, sampled: 0, seen: 0, every: 1, flat: false }
+    }
+
+    /// Takes a point in; of many every so manyth is kept.
+    fn add(&mut self, point: Vec3) {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
+        if self.seen.is_multiple_of(self.every) {
+            if self.sampled == SAMPLES {
+                // Half of those that are kept make room.
+                for number in 0..SAMPLES / 2 {
+                    self.samples[number] = self.samples[2 * number];
+                }
+                (self.sampled, self.every) = (SAMPLES / 2, 2 * self.every);
+            }
+            self.samples[self.sampled] = point;
+            self.sampled += 1;
+        }
+        self.seen += 1;
+    }
 }
 
 /// Parts that together may be a person.
@@ -58,7 +86,8 @@ pub(super) struct Components {
     /// The label of every pixel: the index of another of its part, or of itself.
     pub(super) labels: Vec<u32>,
     parts: Vec<Part>,
-    order: Vec<(u32, u32)>,
+    /// Surface of the part with a label, at the label's place.
+    areas: Vec<f32>,
     too_large: Vec<u32>,
 }
 
@@ -151,39 +180,31 @@ impl Components {
 
     /// Sizes of the parts, the largest first.
     fn sum_up(&mut self, view: &View) {
-        // A part's pixels, counted; then what is large enough gets its sums.
-        self.order.clear();
-        self.order.extend(self.labels.iter().enumerate().filter(|(_, label)| **label != NONE).map(|(i, l)| (*l, i as u32)));
-        self.order.sort_unstable();
-        self.parts.clear();
-        let area = view.pixel_area();
-        for group in self.order.chunk_by(|a, b| a.0 == b.0) {
-            let seen: f64 = group.iter().map(|(_, index)| f64::from(view.depth[*index as usize]).powi(2) * area).sum();
-            if seen < LEAST_PART {
-                continue;
-            }
-            let mut part = Part {
-                label: group[0].0,
-                area: seen,
-                low: Vec3::INFINITY,
-                high: Vec3::NEG_INFINITY,
-                samples: [Vec3::ZERO; SAMPLES],
-                sampled: group.len().min(SAMPLES),
-                flat: false,
-            };
-            for (_, index) in group {
-                let point = view.point(*index as usize);
-                part.low = part.low.min(point);
-                part.high = part.high.max(point);
-            }
-            for number in 0..part.sampled {
-                part.samples[number] = view.point(group[number * group.len() / part.sampled].1 as usize);
-            }
-            part.flat = is_flat(&part.samples[..part.sampled]);
-            self.parts.push(part);
+        let Self { labels, parts, areas, .. } = self;
+        areas.clear();
+        areas.resize(labels.len(), 0.0);
+        let area = view.pixel_area() as f32;
+        for (label, z) in labels.iter().zip(&view.depth).filter(|(label, _)| **label != NONE) {
+            areas[*label as usize] += area * z * z;
         }
-        self.parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
-        self.parts.truncate(MOST_PARTS);
+        parts.clear();
+        let large = areas.iter().enumerate().filter(|(_, area)| f64::from(**area) > LEAST_PART);
+        parts.extend(large.map(|(label, area)| Part::new(label as u32, f64::from(*area))));
+        parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
+        parts.truncate(MOST_PARTS);
+        // From here on what stands at a label's place is one more than its part's number.
+        areas.fill(0.0);
+        for (number, part) in parts.iter().enumerate() {
+            areas[part.label as usize] = number as f32 + 1.0;
+        }
+        for (index, label) in labels.iter().enumerate().filter(|(_, label)| **label != NONE) {
+            if let Some(part) = (areas[*label as usize] as usize).checked_sub(1) {
+                parts[part].add(view.point(index));
+            }
+        }
+        for part in parts.iter_mut() {
+            part.flat = is_flat(&part.samples[..part.sampled]);
+        }
     }
 
     /// Every part that may be a person by itself, and with the parts near it.
@@ -240,9 +261,8 @@ fn near(a: &Part, b: &Part) -> bool {
     if gap > GAP {
         return false;
     }
-    let points = |part: &Part| part.samples[..part.sampled].to_vec();
-    let others = points(b);
-    points(a).iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
+    let others = &b.samples[..b.sampled];
+    a.samples[..a.sampled].iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
 }
 
 /// Whether points lie near a plane.
