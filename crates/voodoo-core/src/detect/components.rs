@@ -45,7 +45,17 @@ struct Part {
 impl Part {
     fn new(label: u32, area: f64) -> Self {
         let samples = [Vec3::ZERO; SAMPLES];
-        Self { label, area, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, samples, sampled: 0, seen: 0, every: 1, flat: false }
+        Self {
+            label,
+            area,
+            low: Vec3::INFINITY,
+            high: Vec3::NEG_INFINITY,
+            samples,
+            sampled: 0,
+            seen: 0,
+            every: 1,
+            flat: false,
+        }
     }
 
     /// Takes a point in; of many every so manyth is kept.
@@ -78,6 +88,21 @@ pub struct Candidate {
     pub low: Vec3,
     /// The other corner.
     pub high: Vec3,
+}
+
+impl Candidate {
+    /// Distance of a point in the camera's frame to its box, and a little of that to the box's middle.
+    pub(super) fn distance(&self, point: Vec3) -> f64 {
+        /// A place within several boxes belongs to the one whose middle is nearest.
+        const TO_MIDDLE: f64 = 0.1;
+        let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
+        outside + TO_MIDDLE * point.distance(0.5 * (self.low + self.high))
+    }
+
+    /// Whether both have a part in common.
+    pub(super) fn shares(&self, other: &Self) -> bool {
+        self.labels.iter().any(|label| other.labels.binary_search(label).is_ok())
+    }
 }
 
 /// Working memory, and what was found in the last image.

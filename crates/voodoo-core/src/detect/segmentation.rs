@@ -60,6 +60,14 @@ impl Segmentation {
         Crop::of(&self.view, &self.parts, candidate, self.up, self.distorted)
     }
 
+    /// Indices in the image of all pixels of a candidate, those between thinned ones, too.
+    pub(super) fn mask(&self, candidate: &Candidate, into: &mut Vec<usize>) {
+        into.clear();
+        for (index, _) in self.pixels(candidate) {
+            self.view.block(index, into);
+        }
+    }
+
     /// The pixels of a candidate: their indices in the image and points in the camera's frame. Large images are thinned out.
     pub fn pixels<'a>(&'a self, candidate: &'a Candidate) -> impl Iterator<Item = (usize, Vec3)> + 'a {
         let of = |label: &u32| *label != NONE && candidate.labels.binary_search(label).is_ok();

@@ -133,6 +133,14 @@ impl View {
         (self.step * self.step) as f64 / (self.intrinsics[0] * self.intrinsics[1])
     }
 
+    /// The pixels of the image for which one with this index in the image stands.
+    pub(super) fn block(&self, index: usize, into: &mut Vec<usize>) {
+        let (row, column) = (index / self.columns, index % self.columns);
+        for row in row..row + self.step {
+            into.extend((column..(column + self.step).min(self.columns)).map(|column| row * self.columns + column));
+        }
+    }
+
     /// Index in the image of a pixel.
     pub(super) fn in_image(&self, index: usize) -> usize {
         (index / self.width) * self.step * self.columns + (index % self.width) * self.step
