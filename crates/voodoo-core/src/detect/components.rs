@@ -96,7 +96,12 @@ impl Candidate {
         /// A place within several boxes belongs to the one whose middle is nearest.
         const TO_MIDDLE: f64 = 0.1;
         let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
-        outside + TO_MIDDLE * point.distance(0.5 * (self.low + self.high))
+        outside + TO_MIDDLE * point.distance(self.middle())
+    }
+
+    /// The middle of its box, camera frame.
+    pub(super) fn middle(&self) -> Vec3 {
+        0.5 * (self.low + self.high)
     }
 
     /// Whether both have a part in common.
