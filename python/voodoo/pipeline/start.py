@@ -91,9 +91,11 @@ class Init(BaseModel):
             raise VoodooError(f"{recording.name}, start: {_first_problem(error)}") from error
 
 
-Beginning: TypeAlias = Init | Track | Literal["auto"]
-"""A first pose, an earlier result that has one, or the word for: look for somebody, whatever lies beside the recording."""
-AUTO: Literal["auto"] = "auto"
+Automatic: TypeAlias = Literal["auto"]
+"""The word for: look for somebody, whatever lies beside the recording."""
+AUTO: Automatic = "auto"
+Beginning: TypeAlias = Init | Track | Automatic
+"""A first pose, an earlier result that has one, or neither."""
 
 
 def beginning_of(word: str | None) -> Beginning | None:
