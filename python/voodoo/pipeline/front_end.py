@@ -7,7 +7,7 @@ from copy import copy
 from typing import Any
 
 from voodoo._core import Estimate, Frame
-from voodoo.measurements import DepthImage, RecordedFrame
+from voodoo.measurements import RecordedFrame
 from voodoo.names import INPUTS
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
@@ -99,7 +99,7 @@ class FrontEnd:
             vars(self).update(before)
             raise
         was_posed = self.search.posed
-        depth = "depth" in self.settings.use and any(isinstance(item, DepthImage) for item in recorded.measurements)
+        depth = "depth" in self.settings.use and any(adapter_of(item).kind == "depth" for item in recorded.measurements)
         estimate = self.search.learn(estimate, depth=depth)
         if self.search.posed:
             self._learn(recorded, estimate)
