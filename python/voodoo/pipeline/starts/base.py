@@ -28,6 +28,8 @@ BONES_M: dict[tuple[str, str], tuple[float, float]] = {
             ("elbow", "wrist", (0.10, 0.45)),
             ("hip", "knee", (0.18, 0.70)),
             ("knee", "ankle", (0.18, 0.65)),
+            ("wrist", "hand", (0.01, 0.25)),
+            ("ankle", "toe", (0.04, 0.35)),
         )
     },
 }
@@ -113,6 +115,55 @@ def without_impossible(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray
     return kept
 
 
+def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The joints, without those that make a bone out of proportion to the trunk, and without what hangs on them.
+
+    A hidden joint has the depth of what hides it, which makes its bones too short or too long. A trunk seen from the side,
+    whose far half is hidden, leaves nothing.
+    """
+    trunk = [
+        np.linalg.norm(joints[f"{s}_shoulder"] - joints[f"{s}_hip"])
+        for s in "lr"
+        if {f"{s}_shoulder", f"{s}_hip"} <= joints.keys()
+    ]
+    if not trunk:
+        return {}
+    stature = float(np.mean(trunk)) / _OF_STATURE["l_shoulder", "l_hip"]
+    kept = dict(joints)
+    for (near, far), share in _OF_STATURE.items():
+        if near not in kept or far not in kept:
+            continue
+        length = float(np.linalg.norm(kept[near] - kept[far])) / stature
+        if _SHORTER * share <= length <= _LONGER * share:
+            continue
+        if near in TRUNK and far in TRUNK:
+            return {}
+        for name in _BEYOND.get(far, (far,)):
+            kept.pop(name, None)
+    return kept
+
+
+_SHORTER, _LONGER = 0.6, 1.6
+"""Bones of people differ from these shares by a tenth; the rest is 4 cm of error at either end."""
+_OF_STATURE: dict[tuple[str, str], float] = {
+    ("l_shoulder", "r_shoulder"): 0.224,
+    ("l_hip", "r_hip"): 0.104,
+    **{
+        (f"{s}_{a}", f"{s}_{b}"): share
+        for s in "lr"
+        for a, b, share in (
+            ("shoulder", "hip", 0.294),
+            ("shoulder", "elbow", 0.186),
+            ("elbow", "wrist", 0.146),
+            ("hip", "knee", 0.245),
+            ("knee", "ankle", 0.246),
+        )
+    },
+    ("l_shoulder", "skullbase"): 0.146,
+    ("l_shoulder", "head_center"): 0.164,
+    ("l_shoulder", "skull_tip"): 0.211,
+}
+"""Distances of sites in statures, those of the default human; parents first."""
 _BEYOND = {
     f"{side}_{joint}": tuple(f"{side}_{name}" for name in beyond)
     for side in "lr"

@@ -10,7 +10,7 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo.measurements import DepthImage, KeypointImage
-from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose, without_impossible
+from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose, in_proportion, without_impossible
 from voodoo.sensors.depth import depth_points
 from voodoo.sensors.keypoints.sensor import POINT_SIGMA_M
 from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
@@ -61,7 +61,7 @@ def _people(item: KeypointImage, depths: Sequence[DepthImage], seen: Seen) -> It
         sites = [site for site in sites if site.site in seen.body.site_names]
         if len(sites) >= _LEAST_SITES:
             person = _placed(sites, item, pixels, z, seen, coarse=item.camera.fx / depth.camera.fx)
-            kept = without_impossible({name: place for name, (place, _) in person.items()})
+            kept = in_proportion(without_impossible({name: place for name, (place, _) in person.items()}))
             if len(kept) >= _LEAST_SITES and fixes_pose(kept, seen.body):
                 yield {name: person[name] for name in kept}
 
