@@ -10,7 +10,7 @@ from voodoo.export.track import Track
 from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose
 
 _SAME_TIME_S = 0.02
-"""Stamps that differ by less are one frame's: two sensors of a robot that belong together."""
+"""Stamps that differ by less are one frame's, by no more than half a period of the result."""
 _ROUNDED_S = 1e-6
 _GIVEN_SIGMA_M = 0.03
 _USABLE = ("tracking", "degraded")
@@ -51,6 +51,8 @@ class EarlierStart(StartFinder):
 
     def __init__(self, result: Track) -> None:
         """Keep the frames that can be relied on."""
+        steps = np.diff(result.stamps)
+        self._near = min(_SAME_TIME_S, 0.5 * float(np.median(steps))) if len(steps) else _SAME_TIME_S
         self._result = result.of_frames(np.array([word in _USABLE for word in result.status], dtype=bool))
 
     def look(self, seen: Seen) -> Found | None:
@@ -59,7 +61,7 @@ class EarlierStart(StartFinder):
         if not len(result):
             return None
         row = int(np.argmin(np.abs(result.stamps - seen.stamp)))
-        if abs(result.stamps[row] - seen.stamp) > _SAME_TIME_S:
+        if abs(result.stamps[row] - seen.stamp) > self._near:
             return None
         pairs = zip(result.joint_names, result.joints[row], strict=True)
         joints = {name: position for name, position in pairs if name in seen.body.site_names}
