@@ -327,6 +327,20 @@ class Frame:
         Raises:
             MeasurementError: not three numbers.
         """
+    def exclude(
+        self, low: Sequence[float] | npt.NDArray[np.float64], high: Sequence[float] | npt.NDArray[np.float64]
+    ) -> None:
+        """Leave out a box of the world: nothing in it belongs to anybody (the robot's own arm, a coat stand).
+
+        Free points and depth pixels in it are neither matched nor searched; named sites and points of a limb are not touched.
+
+        Args:
+            low: (3,) the corner with the least coordinates [m], in the world.
+            high: (3,) the other corner [m].
+
+        Raises:
+            MeasurementError: not three numbers; the step refuses corners that are not finite or in the wrong order.
+        """
 
 @final
 class Estimate:

@@ -56,6 +56,7 @@
 pub mod association;
 pub mod body;
 pub mod config;
+pub mod detect;
 pub mod error;
 pub mod fit;
 pub mod hypotheses;

@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::fit::{Context, Setting};
 use crate::math::{Pose, Quat, Vec3};
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
-use crate::observation::observer::{Expectation, Observer};
+use crate::observation::observer::{Expectation, Observer, Own};
 use crate::visibility::render::{Rendering, Viewpoint};
 
 /// Size and lens of the camera, which stands in the world's origin and looks along z.
@@ -98,7 +98,14 @@ pub(crate) fn with_setting<R>(
 ) -> R {
     with_frame(pixels, 0.0, |frame| {
         let mut observer = Observer::default();
-        let expected = Expectation { body: &model.body, poses, origin: Vec3::ZERO, first: true, searched: None };
+        let expected = Expectation {
+            body: &model.body,
+            poses,
+            origin: Vec3::ZERO,
+            first: true,
+            searched: None,
+            own: Own::default(),
+        };
         observer.observe(frame, expected, config);
         look(Setting { config, seen: observer.seen(frame, Vec3::ZERO), previous: poses, time_scale: 1.0 })
     })

@@ -56,6 +56,7 @@ pub fn status_word(status: Status) -> &'static str {
         Status::Tracking => "tracking",
         Status::Degraded => "degraded",
         Status::Lost => "lost",
+        Status::Searching => "searching",
     }
 }
 

@@ -3,6 +3,7 @@
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Body;
+use voodoo_core::math::Aabb;
 use voodoo_core::observation::frame::Ground;
 
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
@@ -25,6 +26,7 @@ pub struct PyFrame {
     pub(crate) images: Vec<ImageData>,
     pub(crate) sites: Vec<SiteData>,
     pub(crate) ground: Option<Ground>,
+    pub(crate) excluded: Vec<Aabb>,
     pub sources: Vec<String>,
 }
 
@@ -49,7 +51,8 @@ impl PyFrame {
     #[new]
     #[pyo3(signature = (stamp))]
     fn new(stamp: f64) -> Self {
-        Self { stamp, clouds: Vec::new(), images: Vec::new(), sites: Vec::new(), ground: None, sources: Vec::new() }
+        let (clouds, images, sites, excluded, sources) = Default::default();
+        Self { stamp, clouds, images, sites, ground: None, excluded, sources }
     }
 
     /// Add 3-D points (N, 3) [m] in the sensor's frame (K06 IV-A, first three kinds).
@@ -240,6 +243,21 @@ impl PyFrame {
     #[pyo3(signature = (*, normal, offset=0.0))]
     fn set_ground(&mut self, normal: &Bound<'_, PyAny>, offset: f64) -> PyResult<()> {
         self.ground = Some(Ground { normal: vector("normal", normal)?, offset });
+        Ok(())
+    }
+
+    /// Leave out a box of the world: nothing in it belongs to anybody (the robot's own arm, a coat stand).
+    ///
+    /// Free points and depth pixels in it are neither matched nor searched; named sites and points of a limb are not touched.
+    ///
+    /// Args:
+    ///     low: (3,) the corner with the least coordinates [m], in the world.
+    ///     high: (3,) the other corner [m].
+    ///
+    /// Raises:
+    ///     MeasurementError: not three numbers; the step refuses corners that are not finite or in the wrong order.
+    fn exclude(&mut self, low: &Bound<'_, PyAny>, high: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.excluded.push(Aabb { mins: vector("low", low)?, maxs: vector("high", high)? });
         Ok(())
     }
 

@@ -9,6 +9,7 @@ mod arrays;
 mod body;
 mod borrowed;
 mod config;
+mod detect;
 mod errors;
 mod estimate;
 mod frame;
@@ -27,6 +28,8 @@ mod _core {
     use super::body::PyBody;
     #[pymodule_export]
     use super::config::config_fields;
+    #[pymodule_export]
+    use super::detect::{PyCandidate, person_candidates};
     #[pymodule_export]
     use super::estimate::{_estimate, PyEstimate};
     #[pymodule_export]

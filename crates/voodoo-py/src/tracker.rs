@@ -91,6 +91,7 @@ impl PyTracker {
             positions: &borrowed.positions,
             rays: &borrowed.rays,
             ground: borrowed.ground,
+            excluded: &frame.excluded,
         };
         let tracker = &mut self.tracker;
         py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;

@@ -15,10 +15,13 @@ pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
 use crate::association::correspondence::Correspondences;
 use crate::body::Model;
+use crate::detect::Detection;
 use crate::fit::{Context, Fit, Matched, Motion};
 use crate::math::{Pose, shifted};
 use history::{Basis, History};
-use proposals::{CarriedByParent, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean, UnexplainedCluster};
+use proposals::{
+    CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean, UnexplainedCluster,
+};
 use rough::{Extremity, RoughSearch};
 use score::strain;
 use suspicion::{SUSPICIOUS, Suspicion};
@@ -79,13 +82,14 @@ impl Hypotheses {
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others, and takes what explains the frame better.
-    /// Returns the number of ICP steps.
+    /// `detection` is what a detector says of this frame. Returns the number of ICP steps.
     pub fn improve(
         &mut self,
         context: Context,
         fit: &mut Fit,
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
+        detection: Option<&Detection>,
     ) -> usize {
         self.make_room(context, fit);
         self.unexplained.collect(context, fit.matched(poses));
@@ -95,7 +99,7 @@ impl Hypotheses {
             if !self.doubts(at) {
                 continue;
             }
-            self.propose(at);
+            self.propose(at, detection);
             let taken = self.try_proposals(context, index, fit, poses, predicted);
             if taken > 0 {
                 self.unexplained.collect(context, fit.matched(poses));
@@ -141,13 +145,14 @@ impl Hypotheses {
     }
 
     /// Fills the pool with other configurations of one arm or leg.
-    fn propose(&mut self, at: Extremity) {
+    fn propose(&mut self, at: Extremity, detection: Option<&Detection>) {
         let Self { history, suspicion, rough, clusters, lean, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current - GAIN);
         // The kinds of proposals: one more is a file and a line here.
-        let kinds: [&mut dyn Propose; 5] = [clusters, &mut LastGoodEnd, &mut CarriedByParent, &mut LastProposal, lean];
+        let kinds: [&mut dyn Propose; 6] =
+            [clusters, &mut LastGoodEnd, &mut CarriedByParent, &mut LastProposal, lean, &mut DetectedEnd(detection)];
         for kind in kinds {
             kind.propose(at, history, rough, pool);
         }
@@ -246,7 +251,7 @@ mod tests {
             let mut predicted = previous.clone();
             with_context(&pixels, &config, &model, &previous, |context| {
                 fit.match_last(context, &poses);
-                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted);
+                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None);
                 assert_eq!(poses == previous, predicted == previous, "what is taken is what is expected");
                 found.push((poses.clone(), steps));
             });

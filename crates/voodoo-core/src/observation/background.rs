@@ -86,6 +86,12 @@ impl Backgrounds {
         self.images.iter().find(|background| background.fits(image))
     }
 
+    /// What was learnt of this image.
+    pub(super) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
+        let known = self.images.iter_mut().find(|background| background.fits(image));
+        known.map(|background| background.depth.as_mut_slice())
+    }
+
     /// Whether no depth image was ever seen.
     pub fn is_empty(&self) -> bool {
         self.images.is_empty()

@@ -3,7 +3,7 @@
 use super::background::Backgrounds;
 use super::candidates::image_window;
 use super::frame::{DepthImage, Frame};
-use super::observer::Expectation;
+use super::observer::{Expectation, Own};
 use crate::math::{Aabb, Points, shifted};
 use crate::shape::SurfaceBatch;
 
@@ -16,6 +16,7 @@ impl Backgrounds {
     pub(super) fn learn_around(&mut self, frame: &Frame, expected: Expectation, bounds: &Aabb) {
         if expected.first {
             self.learn_first(frame, expected, bounds);
+            self.release(frame, expected.own);
             return;
         }
         if expected.searched == Some(0) {
@@ -25,6 +26,18 @@ impl Backgrounds {
             Some(_) => (0..0, 0..0),
             None => image_window(image, &shifted(&image.world_from_sensor, expected.origin), bounds),
         });
+    }
+
+    /// Forgets what was learnt at pixels that show the body.
+    pub(super) fn release(&mut self, frame: &Frame, own: Own) {
+        let Some(image) = frame.images.get(own.image) else { return };
+        if let Some(depth) = self.depth_mut(image) {
+            for pixel in own.pixels {
+                if let Some(depth) = depth.get_mut(*pixel) {
+                    *depth = 0.0;
+                }
+            }
+        }
     }
 
     fn learn_first(&mut self, frame: &Frame, expected: Expectation, bounds: &Aabb) {

@@ -75,6 +75,7 @@ impl Candidates {
         for cloud in frame.clouds {
             self.gather_cloud(cloud, origin, &gate);
         }
+        self.leave_out(frame.excluded, origin);
         self.clusters.arrange(&self.points);
     }
 
@@ -83,6 +84,35 @@ impl Candidates {
         self.weight.push(weight);
         self.limb.push(limb);
         self.source.push(source);
+    }
+
+    /// Drops the points in boxes of the world.
+    fn leave_out(&mut self, boxes: &[Aabb], origin: Vec3) {
+        if boxes.is_empty() {
+            return;
+        }
+        let (mut kept, mut camera) = (0, 0);
+        for index in 0..self.points.len() {
+            while self.cameras.get(camera).is_some_and(|(end, _)| *end as usize == index) {
+                self.cameras[camera].0 = kept as u32;
+                camera += 1;
+            }
+            let point = self.points.get(index) + origin;
+            let measured = self.limb[index] != ANY_LIMB;
+            if measured || !boxes.iter().any(|bounds| bounds.contains_local_point(point)) {
+                let [x, y, z] = [self.points.x[index], self.points.y[index], self.points.z[index]];
+                self.points.set(kept, [x, y, z]);
+                self.weight[kept] = self.weight[index];
+                self.limb[kept] = self.limb[index];
+                self.source[kept] = self.source[index];
+                kept += 1;
+            }
+        }
+        self.cameras[camera..].iter_mut().for_each(|(end, _)| *end = kept as u32);
+        self.points.resize(kept);
+        self.weight.truncate(kept);
+        self.limb.truncate(kept);
+        self.source.truncate(kept);
     }
 
     fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &PointGate) {

@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::error::TrackError;
-use crate::math::{Pose, Vec3};
+use crate::math::{Aabb, Pose, Vec3};
 
 /// Three-dimensional points as they lie in memory, in metres.
 #[derive(Clone, Copy, Debug)]
@@ -186,12 +186,14 @@ pub struct Frame<'a> {
     pub rays: &'a [RayRelation],
     /// The floor, where it is known.
     pub ground: Option<Ground>,
+    /// Boxes of the world in which nothing belongs to anybody: the robot's own arm, a coat stand.
+    pub excluded: &'a [Aabb],
 }
 
 impl<'a> Frame<'a> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
-        Self { stamp, clouds: &[], images: &[], positions: &[], rays: &[], ground: None }
+        Self { stamp, clouds: &[], images: &[], positions: &[], rays: &[], ground: None, excluded: &[] }
     }
 
     /// Refuses what cannot be used: nothing of it may reach the tracker's state.
@@ -253,6 +255,13 @@ impl<'a> Frame<'a> {
         {
             let found = format!("normal {:?} and offset {}", ground.normal.to_array(), ground.offset);
             return Err(TrackError::measurement("ground", "a unit normal and a finite offset", found));
+        }
+        for (index, bounds) in self.excluded.iter().enumerate() {
+            let (low, high) = (bounds.mins, bounds.maxs);
+            if !(low.is_finite() && high.is_finite() && low.cmple(high).all()) {
+                let found = format!("{:?} to {:?}", low.to_array(), high.to_array());
+                return Err(TrackError::measurement(format!("excluded[{index}]"), "a low and a high corner", found));
+            }
         }
         Ok(())
     }

@@ -47,6 +47,17 @@ pub struct Expectation<'a> {
     pub first: bool,
     /// For how many frames the body has been searched; `None` while it is not.
     pub searched: Option<usize>,
+    /// Pixels that are known to show it.
+    pub own: Own<'a>,
+}
+
+/// Pixels of one depth image that show the body: the number of the image in the frame, and their indices.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Own<'a> {
+    /// Number of the image.
+    pub image: usize,
+    /// Indices of pixels.
+    pub pixels: &'a [usize],
 }
 
 /// Keeps what is learnt of the scene, and the candidates of the current frame.
@@ -72,6 +83,11 @@ impl Observer {
             self.backgrounds.learn_around(frame, expected, &bounds);
         }
         self.gather(frame, expected.origin, &bounds, config);
+    }
+
+    /// Pixels that were taken for the scene show the body.
+    pub fn release(&mut self, frame: &Frame, own: Own) {
+        self.backgrounds.release(frame, own);
     }
 
     /// The candidates in another box.
@@ -120,7 +136,14 @@ mod tests {
         poses: &[Pose],
         known: (bool, Option<usize>),
     ) -> [usize; 2] {
-        let expected = Expectation { body: &model.body, poses, origin: Vec3::ZERO, first: known.0, searched: known.1 };
+        let expected = Expectation {
+            body: &model.body,
+            poses,
+            origin: Vec3::ZERO,
+            first: known.0,
+            searched: known.1,
+            own: Own::default(),
+        };
         with_frame(pixels, 0.0, |frame| observer.observe(frame, expected, &Config::default()));
         let points = &observer.candidates().points;
         let lamp = (0..points.len()).filter(|index| points.get(*index).distance(LAMP) < 1.6 * LAMP_SIZE).count();

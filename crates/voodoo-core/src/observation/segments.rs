@@ -73,6 +73,13 @@ impl Segments {
                 self.push(point, Vec3::ZERO, cloud.weight * step as f64);
             }
         }
+        if !frame.excluded.is_empty() {
+            let inside = |sample: &Sample| {
+                let point = Vec3::from_array(sample.point.map(f64::from)) + origin;
+                frame.excluded.iter().any(|bounds| bounds.contains_local_point(point))
+            };
+            self.samples.retain(|sample| !inside(sample));
+        }
         if let Some(ground) = frame.ground {
             let floor = ground.offset + config.ground_clearance - ground.normal.dot(origin);
             self.samples.retain(|sample| ground.normal.dot(Vec3::from_array(sample.point.map(f64::from))) >= floor);

@@ -3,7 +3,9 @@
 //! The body is put there as it stood when it was last tracked and as it stands at rest, upright, turned every way; the best are
 //! refined, and the one that explains the frame best by the score of all hypotheses is taken if it is not lost itself.
 
+mod doubt;
 mod facing;
+mod people;
 mod posture;
 mod seeds;
 mod segment_motion;
@@ -11,12 +13,17 @@ mod trials;
 mod watch;
 
 use crate::association::correspondence::Correspondences;
-use crate::body::Model;
+use crate::body::{Body, Model};
+use crate::detect::{Detection, Wanted};
 use crate::fit::{Context, Fit};
-use crate::math::{Aabb, Pose, Vec3};
+use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::Candidates;
+use crate::observation::frame::Frame;
+use crate::observation::observer::Own;
 use crate::observation::segments::Segments;
+use doubt::Doubt;
 use facing::Known;
+use people::People;
 use posture::{Place, Postures};
 use segment_motion::SegmentMotion;
 use trials::Trials;
@@ -41,14 +48,83 @@ pub struct Relocalizer {
     matched: Correspondences,
     trials: Trials,
     winner: Place,
+    people: People,
+    doubt: Doubt,
 }
 
 impl Relocalizer {
     /// Forgets everything that was remembered of an earlier track. `poses` are those the body was set in.
     pub fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.watch.restart();
+        self.doubt.restart();
         self.motion.clear();
         self.postures.restart(&model.body, poses);
+    }
+
+    /// Whether a body can be found without a pose.
+    pub fn finds(&self, body: &Body) -> bool {
+        People::know(body)
+    }
+
+    /// Body and poses of the surest person in a frame.
+    pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
+        let detection = self.people.look(frame, None, Wanted::Surest)?;
+        people::sized(model, detection)
+    }
+
+    /// The track was started where a detector saw somebody.
+    pub fn found_itself(&mut self) {
+        self.doubt.found_itself();
+    }
+
+    /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
+    /// was not where it should be in the frame before, or the body `lost`.
+    pub fn look(&mut self, frame: &Frame, body: &Body, root: Vec3, doubtful: bool, lost: bool) {
+        if self.doubt.due(frame.stamp, doubtful, lost) && People::know(body) {
+            self.people.look(frame, None, if lost { Wanted::Surest } else { Wanted::Near(root) });
+        } else {
+            self.people.forget();
+        }
+    }
+
+    /// What a detector saw in this frame, if it looked.
+    pub fn detection(&self) -> Option<&Detection> {
+        self.people.seen()
+    }
+
+    /// The pixels in which it saw it.
+    pub fn own(&self) -> Own<'_> {
+        self.people.own()
+    }
+
+    /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame.
+    pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool) -> bool {
+        self.people.seen().is_some_and(|detection| self.doubt.weigh(detection, body, world_from_limb, lost))
+    }
+
+    /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.
+    pub fn nobody(&mut self, stamp: f64, lost: bool) -> bool {
+        self.doubt.nobody(stamp, lost, self.people.verdict())
+    }
+
+    /// The poses that a detector saw in this frame, refined, where they are no worse than the present ones; working frame. What
+    /// `fit` has matched is as before when it returns.
+    pub fn detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
+        let detection = self.people.seen()?;
+        let origin = context.seen.origin();
+        let mut place = people::posed(&context.model.body, detection)?;
+        place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
+        let (low, high) = (detection.low - origin, detection.high - origin);
+        let bounds = Aabb::new(low - Vec3::splat(MARGIN), high + Vec3::splat(MARGIN));
+        self.doubt.tried();
+        fit.exchange(&mut self.matched);
+        self.candidates.gather(context.seen.frame(), origin, &bounds, context.seen.views.backgrounds, context.config);
+        let seen = context.seen.with(&self.candidates);
+        let at = Context { seen, previous: &[], time_scale: FREEDOM, ..context };
+        let known = Known { postures: &self.postures, motion: &self.motion, lost: self.watch.lost() };
+        let better = self.trials.at_detection(at, known, fit, present, &place);
+        fit.exchange(&mut self.matched);
+        better.then(|| self.trials.best().as_slice())
     }
 
     /// In how many of the last frames the body was lost, from the one on in which the search began; `None` otherwise.

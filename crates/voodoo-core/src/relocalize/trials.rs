@@ -73,7 +73,8 @@ impl Trials {
         let stood = present[0].rotation * Vec3::X;
         let mut ahead = stood;
         for seed in 0..self.seeds.len() {
-            self.refine(context, known, fit, seed);
+            put(known.postures, &self.seeds[seed], &mut self.poses);
+            self.refine(context, fit);
             let score = place_score(context, known, fit, &self.poses, total);
             let faces = self.poses[0].rotation * Vec3::X;
             let turned = faces.dot(ahead) < 0.0;
@@ -97,10 +98,50 @@ impl Trials {
         Outcome { gain: (found && decided).then_some(present_score - least), explained }
     }
 
-    /// Refines a rough look in some ICP steps, into `poses`; `fit` then holds its matches.
-    fn refine(&mut self, context: Context, known: Known, fit: &mut Fit, seed: usize) {
-        let Self { seeds, poses, predicted, .. } = self;
-        put(known.postures, &seeds[seed], poses);
+    /// Tries the body where a detector saw it, with the points there as the candidates of `context`; whether it explains them no
+    /// worse than the present pose does.
+    pub(super) fn at_detection(
+        &mut self,
+        context: Context,
+        known: Known,
+        fit: &mut Fit,
+        present: &[Pose],
+        place: &[Pose],
+    ) -> bool {
+        let candidates = context.seen.candidates;
+        let total: f64 = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+        fit.match_all(context, present, context.config.max_steps);
+        let score = |fit: &Fit, poses: &[Pose]| {
+            overall_cost(context, fit.matched(poses)).total.min(MOST_COST * total)
+                + body_landmark_cost(fit.matched(poses))
+                + other_joints_strain(context.model, poses)
+        };
+        let present_score = score(fit, present);
+        self.poses.clear();
+        self.poses.extend_from_slice(place);
+        self.refine(context, fit);
+        self.rough.sample.assign(&candidates.points, &candidates.weight);
+        self.rough.sample.subsample(SEED_SAMPLE);
+        let stray = stray_share(&mut self.rough, context, &self.poses);
+        let found = score(fit, &self.poses) < present_score + DECIDED && stray < MOST_STRAY;
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "detected: {} present {} stray {} lost {}",
+                score(fit, &self.poses),
+                present_score,
+                stray,
+                known.lost
+            );
+        }
+        if found {
+            self.best.clone_from(&self.poses);
+        }
+        found
+    }
+
+    /// Refines `poses` in some ICP steps; `fit` then holds their matches.
+    fn refine(&mut self, context: Context, fit: &mut Fit) {
+        let Self { poses, predicted, .. } = self;
         predicted.clone_from(poses);
         for step in 0..STEPS {
             fit.step(context, predicted, poses, step);

@@ -28,6 +28,8 @@ const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 #[derive(Debug, Default)]
 pub struct Sizes {
     open: bool,
+    /// Frames until the pose is good enough to fit the girths by it.
+    wait: usize,
     /// What is known about the girths since the first frame fitted them; empty when they were given.
     girths: Vec<Girth>,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
@@ -40,11 +42,17 @@ impl Sizes {
     /// The pose was set: with `fit`, the next frame fits the sizes, and those that follow refine the lengths.
     pub fn restart(&mut self, model: &Model, fit: bool, config: &Config) {
         self.open = fit;
+        self.wait = 0;
         self.girths.clear();
         self.pairs.clear();
         if fit && config.fit_lengths {
             self.follow_lengths(model);
         }
+    }
+
+    /// The pose is rough: girths wait for it.
+    pub fn wait(&mut self, frames: usize) {
+        self.wait = frames;
     }
 
     /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
@@ -64,6 +72,10 @@ impl Sizes {
     /// Fits the sizes to the first frame after a reset, whose pose is known.
     pub fn initialise(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
         if !self.open {
+            return;
+        }
+        if self.wait > 0 {
+            self.wait -= 1;
             return;
         }
         self.open = false;

@@ -10,8 +10,10 @@ pub enum Status {
     /// More than a quarter of the limbs are not measured.
     Degraded,
     /// Hardly anything measured supports the pose, or what is seen there is flat.
-    #[default]
     Lost,
+    /// There is no pose: it is looked for.
+    #[default]
+    Searching,
 }
 
 /// How much the pose of one limb can be relied on.
@@ -68,7 +70,7 @@ pub struct Estimate {
 }
 
 impl Default for Estimate {
-    /// Of a tracker without a pose: lost, nothing measured.
+    /// Of a tracker without a pose: nothing measured.
     fn default() -> Self {
         Self {
             stamp: f64::NAN,

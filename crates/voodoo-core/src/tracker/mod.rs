@@ -90,6 +90,31 @@ impl Tracker {
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
+        if self.is_started() {
+            self.follow(frame)
+        } else {
+            self.search(frame)
+        }
+        Ok(&self.estimate)
+    }
+
+    /// Looks for a person, and follows the one that is found.
+    fn search(&mut self, frame: &Frame) {
+        if let Some((body, poses)) = self.relocalizer.first(frame, &self.model) {
+            self.restart(body, poses, true);
+            self.assessor.doubt_pose();
+            self.relocalizer.found_itself();
+            self.sizes.wait(std::env::var("WAIT").ok().and_then(|v| v.parse().ok()).unwrap_or(0));
+            self.follow(frame);
+            if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
+                return;
+            }
+        }
+        self.stop(frame.stamp);
+    }
+
+    /// The pose at the next instant (K06 IV-B).
+    fn follow(&mut self, frame: &Frame) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
@@ -97,15 +122,20 @@ impl Tracker {
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
         let searched = relocalizer.searched().filter(|_| config.relocalization);
         let Motion { poses, previous, predicted, origin, .. } = motion;
-        let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched };
+        let own = relocalizer.own();
+        let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched, own };
         observer.observe(frame, expected, config);
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         sizes.initialise(setting, model, poses, fit);
         let mut steps = fit.run(setting.of(model), predicted, poses);
         // Other configurations of arms and legs.
+        if schedule.whole_body {
+            let lost = assessor.status() == Status::Lost;
+            relocalizer.look(frame, &model.body, poses[0].translation + *origin, assessor.doubts(), lost);
+        }
         if config.hypotheses && schedule.whole_body && known {
-            steps += hypotheses.improve(setting.of(model), fit, poses, predicted);
+            steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection());
         }
         // Sizes that follow what this frame shows.
         let lost = assessor.status() == Status::Lost;
@@ -119,12 +149,22 @@ impl Tracker {
         }
         self.remember();
         self.report(frame.stamp, steps);
-        Ok(&self.estimate)
+        let lost = self.estimate.status == Status::Lost;
+        if self.relocalizer.nobody(frame.stamp, lost) {
+            self.stop(frame.stamp);
+        }
+    }
+
+    /// There is nobody: from the next frame on somebody is looked for.
+    fn stop(&mut self, stamp: f64) {
+        self.motion.poses.clear();
+        self.motion.stamp = Some(stamp);
+        self.estimate = Estimate { stamp, ..Estimate::default() };
     }
 
     /// Refuses what cannot be used, before anything changes.
     fn check(&self, frame: &Frame) -> Result<(), TrackError> {
-        if !self.is_started() {
+        if !self.is_started() && !self.relocalizer.finds(&self.model.body) {
             return Err(TrackError::NotInitialised);
         }
         frame.check(&self.model.body, self.motion.stamp)
@@ -132,6 +172,13 @@ impl Tracker {
 
     /// Remembers a tracked body; looks for a lost one, and takes it where it is found.
     fn relocalize(&mut self, frame: &Frame) {
+        let lost = self.assessor.status() == Status::Lost;
+        if self.relocalizer.detection().is_some() {
+            let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
+            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost) && self.move_to_detection(frame) {
+                return;
+            }
+        }
         if !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
             return;
         }
@@ -144,6 +191,16 @@ impl Tracker {
         if self.relocalizer.conclude(found, sighting, &self.motion.poses) {
             self.assessor.give_up();
         }
+    }
+
+    /// Moves the body to where a detector sees it; whether it is there now.
+    fn move_to_detection(&mut self, frame: &Frame) -> bool {
+        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        observer.release(frame, relocalizer.own());
+        let seen = observer.seen(frame, motion.origin);
+        let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
+        let place = relocalizer.detected(setting.of(model), fit, &motion.poses).map(<[Pose]>::to_vec);
+        place.is_some_and(|place| self.move_to(frame, place))
     }
 
     /// Moves the body to another place, if it is not lost there; whether it is there now.

@@ -1,12 +1,14 @@
 //! Where an arm, a leg or the trunk may be instead: each kind of proposal is a file.
 
 mod carried_by_parent;
+mod detected_end;
 mod last_good_end;
 mod last_proposal;
 mod trunk_lean;
 mod unexplained_cluster;
 
 pub(super) use carried_by_parent::CarriedByParent;
+pub(super) use detected_end::DetectedEnd;
 pub(super) use last_good_end::LastGoodEnd;
 pub(super) use last_proposal::LastProposal;
 pub(super) use trunk_lean::TrunkLean;
@@ -47,12 +49,14 @@ pub(super) struct Pool {
     pub(super) least: f64,
     /// Both feet are where they were when all was well.
     pub(super) both_feet: Proposal,
+    /// The end is where a detector sees it.
+    pub(super) detected: Proposal,
 }
 
 impl Pool {
     /// Room for a body of so many limbs.
     pub(super) fn prepare(&mut self, limbs: usize) {
-        for proposal in [&mut self.lean, &mut self.again, &mut self.rest, &mut self.points, &mut self.both_feet] {
+        for proposal in self.slots() {
             proposal.poses.clear();
             proposal.poses.reserve(limbs);
         }
@@ -60,7 +64,7 @@ impl Pool {
 
     /// Empties it; what explains the points has to cost less than `least`.
     pub(super) fn begin(&mut self, least: f64) {
-        for proposal in [&mut self.lean, &mut self.again, &mut self.rest, &mut self.points, &mut self.both_feet] {
+        for proposal in self.slots() {
             proposal.found = false;
         }
         self.least = least;
@@ -68,7 +72,13 @@ impl Pool {
 
     /// What was found, in the order in which it is refined.
     pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        [&self.lean, &self.again, &self.rest, &self.points, &self.both_feet].into_iter().filter(|slot| slot.found)
+        let Self { lean, again, rest, points, both_feet, detected, .. } = self;
+        [lean, again, rest, points, both_feet, detected].into_iter().filter(|slot| slot.found)
+    }
+
+    fn slots(&mut self) -> [&mut Proposal; 6] {
+        let Self { lean, again, rest, points, both_feet, detected, .. } = self;
+        [lean, again, rest, points, both_feet, detected]
     }
 }
 

@@ -77,6 +77,17 @@ impl Assessor {
         self.round = None;
     }
 
+    /// A pose that nobody vouches for: what is seen of it now decides.
+    pub(super) fn doubt_pose(&mut self) {
+        self.forget_limbs();
+        self.round = None;
+    }
+
+    /// Whether the body, or one of its limbs, was not where it should have been.
+    pub(super) fn doubts(&self) -> bool {
+        self.status != Status::Tracking || self.internal.contains(&LimbStatus::Lost)
+    }
+
     /// The body is given up.
     pub(super) fn give_up(&mut self) {
         self.status = Status::Lost;

@@ -1,0 +1,310 @@
+//! What hangs together in a depth image, and which of it may be a person.
+
+use super::view::View;
+use crate::math::Vec3;
+use nalgebra::{Matrix3, Vector3};
+
+/// Neighbouring pixels hang together when their depths differ by less than this, metres, and so much of the depth.
+const STEP: [f32; 2] = [0.04, 0.012];
+/// What is too large for a person is cut again with steps of this share of those before.
+const CUT_FINER: f32 = 0.5;
+/// How often.
+const CUTS: usize = 2;
+/// Surface of a person that a camera sees, square metres: from a head and shoulders to a wide coat.
+const AREA: [f64; 2] = [0.08, 1.7];
+/// Length of a person's box along its longest edge, metres.
+const LENGTH: [f64; 2] = [0.45, 2.5];
+/// Parts smaller than this are noise, square metres.
+const LEAST_PART: f64 = 0.004;
+/// Parts of a person that something hides the link of are at most so far apart, metres.
+const GAP: f64 = 0.28;
+/// Standard deviation of a flat part's points across it, metres: walls and table tops are no people.
+const FLAT: f64 = 0.022;
+/// Points of a part that distances are taken from.
+const SAMPLES: usize = 48;
+/// Parts that are looked at, the largest first.
+const MOST_PARTS: usize = 40;
+/// No label.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// What hangs together; camera frame, metres.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    label: u32,
+    area: f64,
+    low: Vec3,
+    high: Vec3,
+    samples: [Vec3; SAMPLES],
+    sampled: usize,
+    /// Points so far, of which every so manyth was kept.
+    seen: usize,
+    every: usize,
+    flat: bool,
+}
+
+impl Part {
+    fn new(label: u32, area: f64) -> Self {
+        let samples = [Vec3::ZERO; SAMPLES];
+        Self {
+            label,
+            area,
+            low: Vec3::INFINITY,
+            high: Vec3::NEG_INFINITY,
+            samples,
+            sampled: 0,
+            seen: 0,
+            every: 1,
+            flat: false,
+        }
+    }
+
+    /// Takes a point in; of many every so manyth is kept.
+    fn add(&mut self, point: Vec3) {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
+        if self.seen.is_multiple_of(self.every) {
+            if self.sampled == SAMPLES {
+                // Half of those that are kept make room.
+                for number in 0..SAMPLES / 2 {
+                    self.samples[number] = self.samples[2 * number];
+                }
+                (self.sampled, self.every) = (SAMPLES / 2, 2 * self.every);
+            }
+            self.samples[self.sampled] = point;
+            self.sampled += 1;
+        }
+        self.seen += 1;
+    }
+}
+
+/// Parts that together may be a person.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Labels of its parts.
+    pub(super) labels: Vec<u32>,
+    /// Surface seen, square metres.
+    pub area: f64,
+    /// Corners of its box, camera frame.
+    pub low: Vec3,
+    /// The other corner.
+    pub high: Vec3,
+}
+
+impl Candidate {
+    /// Distance of a point in the camera's frame to its box, and a little of that to the box's middle.
+    pub(super) fn distance(&self, point: Vec3) -> f64 {
+        /// A place within several boxes belongs to the one whose middle is nearest.
+        const TO_MIDDLE: f64 = 0.1;
+        let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
+        outside + TO_MIDDLE * point.distance(0.5 * (self.low + self.high))
+    }
+
+    /// Whether both have a part in common.
+    pub(super) fn shares(&self, other: &Self) -> bool {
+        self.labels.iter().any(|label| other.labels.binary_search(label).is_ok())
+    }
+}
+
+/// Working memory, and what was found in the last image.
+#[derive(Debug, Default)]
+pub(super) struct Components {
+    /// The label of every pixel: the index of another of its part, or of itself.
+    pub(super) labels: Vec<u32>,
+    parts: Vec<Part>,
+    /// Surface of the part with a label, at the label's place.
+    areas: Vec<f32>,
+    too_large: Vec<u32>,
+}
+
+impl Components {
+    /// What may be a person, the likeliest sizes first.
+    pub(super) fn find(&mut self, view: &View, candidates: &mut Vec<Candidate>) {
+        self.labels.clear();
+        self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
+        let mut finer = 1.0;
+        self.join(view, finer, |_| true);
+        self.sum_up(view);
+        for _ in 0..CUTS {
+            self.too_large.clear();
+            self.too_large.extend(self.parts.iter().filter(|part| part.area > AREA[1]).map(|part| part.label));
+            if self.too_large.is_empty() {
+                break;
+            }
+            finer *= CUT_FINER;
+            self.cut(view, finer);
+            self.sum_up(view);
+        }
+        candidates.clear();
+        self.propose(candidates);
+    }
+
+    /// Takes too large parts apart and joins their pixels again by smaller steps.
+    fn cut(&mut self, view: &View, finer: f32) {
+        self.too_large.sort_unstable();
+        let mut again = vec![false; self.labels.len()];
+        for index in 0..self.labels.len() {
+            let label = self.labels[index];
+            again[index] = label != NONE && self.too_large.binary_search(&label).is_ok();
+        }
+        for index in 0..self.labels.len() {
+            if again[index] {
+                self.labels[index] = index as u32;
+            }
+        }
+        self.join(view, finer, |index| again[index]);
+    }
+
+    /// Joins neighbours, and pixels with one between them, for which `of` holds.
+    fn join(&mut self, view: &View, finer: f32, of: impl Fn(usize) -> bool) {
+        let (width, depth) = (view.width, &view.depth);
+        for row in 0..view.height {
+            for column in 0..width {
+                let index = row * width + column;
+                let z = depth[index];
+                if z <= 0.0 || !of(index) {
+                    continue;
+                }
+                for (other, there) in [
+                    (index.wrapping_sub(1), column >= 1),
+                    (index.wrapping_sub(width), row >= 1),
+                    (index.wrapping_sub(2), column >= 2),
+                    (index.wrapping_sub(2 * width), row >= 2),
+                ] {
+                    if !there || depth[other] <= 0.0 || !of(other) {
+                        continue;
+                    }
+                    if (z - depth[other]).abs() < finer * (STEP[0] + STEP[1] * z.min(depth[other])) {
+                        self.unite(index as u32, other as u32);
+                    }
+                }
+            }
+        }
+        for index in 0..self.labels.len() {
+            if self.labels[index] != NONE {
+                self.labels[index] = self.root(index as u32);
+            }
+        }
+    }
+
+    fn unite(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.labels[a.max(b) as usize] = a.min(b);
+    }
+
+    fn root(&mut self, mut index: u32) -> u32 {
+        loop {
+            let parent = self.labels[index as usize];
+            if parent == index {
+                return index;
+            }
+            let next = self.labels[parent as usize];
+            self.labels[index as usize] = next;
+            index = next;
+        }
+    }
+
+    /// Sizes of the parts, the largest first.
+    fn sum_up(&mut self, view: &View) {
+        let Self { labels, parts, areas, .. } = self;
+        areas.clear();
+        areas.resize(labels.len(), 0.0);
+        let area = view.pixel_area() as f32;
+        for (label, z) in labels.iter().zip(&view.depth).filter(|(label, _)| **label != NONE) {
+            areas[*label as usize] += area * z * z;
+        }
+        parts.clear();
+        let large = areas.iter().enumerate().filter(|(_, area)| f64::from(**area) > LEAST_PART);
+        parts.extend(large.map(|(label, area)| Part::new(label as u32, f64::from(*area))));
+        parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
+        parts.truncate(MOST_PARTS);
+        // From here on what stands at a label's place is one more than its part's number.
+        areas.fill(0.0);
+        for (number, part) in parts.iter().enumerate() {
+            areas[part.label as usize] = number as f32 + 1.0;
+        }
+        for (index, label) in labels.iter().enumerate().filter(|(_, label)| **label != NONE) {
+            if let Some(part) = (areas[*label as usize] as usize).checked_sub(1) {
+                parts[part].add(view.point(index));
+            }
+        }
+        for part in parts.iter_mut() {
+            part.flat = is_flat(&part.samples[..part.sampled]);
+        }
+    }
+
+    /// Every part that may be a person by itself, and with the parts near it.
+    fn propose(&self, candidates: &mut Vec<Candidate>) {
+        for (number, part) in self.parts.iter().enumerate() {
+            if part.area > AREA[1] || part.area < 0.3 * AREA[0] || part.flat {
+                continue;
+            }
+            let alone = Candidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
+            let together = self.with_near_parts(number);
+            for candidate in [alone, together] {
+                let fits = candidate.area > AREA[0] && candidate.area < AREA[1] && {
+                    let length = (candidate.high - candidate.low).max_element();
+                    length > LENGTH[0] && length < LENGTH[1]
+                };
+                if fits && !candidates.contains(&candidate) {
+                    candidates.push(candidate);
+                }
+            }
+        }
+        candidates.sort_by(|a, b| unlikely(a).total_cmp(&unlikely(b)).then(a.labels.cmp(&b.labels)));
+    }
+
+    /// A part and those that lie near it, as long as all of it is no larger than a person.
+    fn with_near_parts(&self, seed: usize) -> Candidate {
+        let mut taken = vec![seed];
+        let part = &self.parts[seed];
+        let mut whole = Candidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
+        let mut next = 0;
+        while next < taken.len() {
+            let from = &self.parts[taken[next]];
+            next += 1;
+            for (number, other) in self.parts.iter().enumerate() {
+                if taken.contains(&number) || whole.area + other.area > AREA[1] {
+                    continue;
+                }
+                let (low, high) = (whole.low.min(other.low), whole.high.max(other.high));
+                if (high - low).max_element() < LENGTH[1] && near(from, other) {
+                    taken.push(number);
+                    whole.labels.push(other.label);
+                    whole.area += other.area;
+                    (whole.low, whole.high) = (low, high);
+                }
+            }
+        }
+        whole.labels.sort_unstable();
+        whole
+    }
+}
+
+/// Whether two parts come nearer to each other than a person's parts may be apart.
+fn near(a: &Part, b: &Part) -> bool {
+    let gap = (a.low - b.high).max(b.low - a.high).max(Vec3::ZERO).length();
+    if gap > GAP {
+        return false;
+    }
+    let others = &b.samples[..b.sampled];
+    a.samples[..a.sampled].iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
+}
+
+/// Whether points lie near a plane.
+fn is_flat(points: &[Vec3]) -> bool {
+    let count = points.len() as f64;
+    let mean = points.iter().sum::<Vec3>() / count;
+    let mut scatter = Matrix3::zeros();
+    for point in points {
+        let from = Vector3::from((*point - mean).to_array());
+        scatter += from * from.transpose() / count;
+    }
+    scatter.symmetric_eigenvalues().min() < FLAT * FLAT
+}
+
+/// How far the seen surface is from a standing person's, in powers of e.
+fn unlikely(candidate: &Candidate) -> f64 {
+    /// Surface of a standing person that a camera sees, square metres.
+    const STANDING: f64 = 0.55;
+    (candidate.area / STANDING).ln().abs()
+}

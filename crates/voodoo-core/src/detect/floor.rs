@@ -1,0 +1,144 @@
+//! The floor in a depth image where nobody told it: the plane with the most points that has hardly any below it.
+
+use super::view::View;
+use crate::math::Vec3;
+use crate::observation::frame::Ground;
+
+/// Points that are looked at, about.
+const SAMPLES: usize = 1200;
+/// Planes that are tried.
+const TRIALS: usize = 96;
+/// A point is on the floor up to this distance from it, metres, and so much more by the square of its depth, 1/m.
+const NEAR: [f64; 2] = [0.025, 0.003];
+/// A floor holds at least this share of the points.
+const LEAST_SHARE: f64 = 0.03;
+/// A point below the floor speaks against it as much as so many on it speak for it: reflections are few.
+const BELOW: f64 = 4.0;
+/// The floor is tilted by at most this against the upwards direction that is assumed: cosine of 40 degrees.
+const LEAST_UPRIGHT: f64 = 0.766;
+
+/// The surface about a point is looked at over so much of the image's width.
+const NEIGHBOUR: f64 = 0.05;
+/// The plane is fitted again to the points within this share of the distance that the trials allowed.
+const NEARER: [f64; 2] = [0.7, 0.5];
+
+/// Working memory.
+#[derive(Debug, Default)]
+pub(super) struct FloorFinder {
+    points: Vec<Vec3>,
+    /// Those on surfaces that face upwards.
+    level: Vec<Vec3>,
+}
+
+impl FloorFinder {
+    /// The floor in the camera's frame; `up` is the direction upwards about as it is known there.
+    pub(super) fn find(&mut self, view: &View, up: Vec3) -> Option<Ground> {
+        self.sample(view, up);
+        let count = self.points.len();
+        if self.level.len() < 20 {
+            return None;
+        }
+        let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+        let mut best: Option<(f64, Ground)> = None;
+        for _ in 0..TRIALS {
+            let [a, b, c] = [(); 3].map(|()| self.level[draw.below(self.level.len())]);
+            let normal = (b - a).cross(c - a);
+            let Some(normal) = normal.try_normalize() else { continue };
+            let normal = if normal.dot(up) < 0.0 { -normal } else { normal };
+            if normal.dot(up) < LEAST_UPRIGHT {
+                continue;
+            }
+            let plane = Ground { normal, offset: normal.dot(a) };
+            let score = self.score(&plane);
+            if best.is_none_or(|(most, _)| score > most) {
+                best = Some((score, plane));
+            }
+        }
+        let (score, plane) = best?;
+        let fitted = |plane, share: &f64| self.refined(&plane, *share);
+        (score > LEAST_SHARE * count as f64).then(|| NEARER.iter().fold(plane, fitted))
+    }
+
+    fn sample(&mut self, view: &View, up: Vec3) {
+        self.points.clear();
+        self.level.clear();
+        let seen = view.depth.iter().filter(|z| **z > 0.0).count();
+        let step = (seen / SAMPLES).max(1);
+        let beside = ((NEIGHBOUR * view.width as f64) as usize).max(2);
+        for index in (0..view.depth.len()).filter(|index| view.depth[*index] > 0.0).step_by(step) {
+            let point = view.point(index);
+            self.points.push(point);
+            let (column, row) = (index % view.width, index / view.width);
+            if column < beside || row < beside {
+                continue;
+            }
+            let [left, above] = [index - beside, index - beside * view.width];
+            if view.depth[left] > 0.0 && view.depth[above] > 0.0 {
+                let normal = (view.point(left) - point).cross(view.point(above) - point).normalize_or_zero();
+                if normal.dot(up).abs() > LEAST_UPRIGHT {
+                    self.level.push(point);
+                }
+            }
+        }
+    }
+
+    fn score(&self, plane: &Ground) -> f64 {
+        let mut score = 0.0;
+        for point in &self.points {
+            let (height, near) = (plane.normal.dot(*point) - plane.offset, NEAR[0] + NEAR[1] * point.z * point.z);
+            if height < -2.0 * near {
+                score -= BELOW;
+            }
+        }
+        for point in &self.level {
+            let (height, near) = (plane.normal.dot(*point) - plane.offset, NEAR[0] + NEAR[1] * point.z * point.z);
+            // A squared distance, cut off: planes through the middle of what is level win over those beside it.
+            score += (1.0 - (height / near).powi(2)).max(0.0);
+        }
+        score
+    }
+
+    /// The plane through all level points near it, by least squares along its normal.
+    fn refined(&self, plane: &Ground, share: f64) -> Ground {
+        let near = |point: &Vec3| share * (NEAR[0] + NEAR[1] * point.z * point.z);
+        let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
+        let (mut count, mut mean) = (0.0, Vec3::ZERO);
+        for point in self.level.iter().filter(on) {
+            count += 1.0;
+            mean += *point;
+        }
+        mean /= f64::max(count, 1.0);
+        let first = plane.normal.any_orthonormal_vector();
+        let second = plane.normal.cross(first);
+        let (mut uu, mut uv, mut vv, mut uh, mut vh) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for point in self.level.iter().filter(on) {
+            let from = *point - mean;
+            let (u, v, h) = (from.dot(first), from.dot(second), from.dot(plane.normal));
+            uu += u * u;
+            uv += u * v;
+            vv += v * v;
+            uh += u * h;
+            vh += v * h;
+        }
+        let determinant = uu * vv - uv * uv;
+        if determinant < 1e-9 {
+            return *plane;
+        }
+        let (along_u, along_v) = ((uh * vv - vh * uv) / determinant, (vh * uu - uh * uv) / determinant);
+        let normal = (plane.normal - along_u * first - along_v * second).normalize();
+        Ground { normal, offset: normal.dot(mean) }
+    }
+}
+
+/// Numbers in an order that is the same on every run (Vigna's splitmix64).
+struct Draw(u64);
+
+impl Draw {
+    fn below(&mut self, count: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut value = self.0;
+        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((value ^ (value >> 31)) % count as u64) as usize
+    }
+}

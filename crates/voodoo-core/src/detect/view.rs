@@ -1,0 +1,148 @@
+//! A depth image as the detector looks at it: thinned out, in metres, without what cannot be a person.
+
+use crate::math::{Aabb, Pose, Vec3};
+use crate::observation::background::Background;
+use crate::observation::frame::{DepthImage, Ground};
+
+/// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 60 wide.
+const MOST_PIXELS: usize = 80_000;
+/// What lies less than this above the floor is left out, metres: feet would join the person to the floor.
+const FLOOR_CLEARANCE: f64 = 0.06;
+/// Depths between which persons are looked for, metres.
+const RANGE: [f32; 2] = [0.4, 12.0];
+
+/// What is known of the place beside the image.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Surroundings<'a> {
+    /// The floor, world frame.
+    pub ground: Option<Ground>,
+    /// Direction upwards where no floor is known, world frame, unit length.
+    pub up: Option<Vec3>,
+    /// Depth of the learnt background at every pixel, metres; empty where none was learnt.
+    pub background: &'a [f32],
+    /// Boxes of the world that hold nobody.
+    pub excluded: &'a [Aabb],
+}
+
+/// The thinned image. Points are in the camera's optical frame.
+#[derive(Debug, Default)]
+pub(super) struct View {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Every so manyth column and row of the image was kept.
+    pub(super) step: usize,
+    /// Depth, metres; 0: nothing, or nothing that may be a person.
+    pub(super) depth: Vec<f32>,
+    /// `(x/z, y/z)` of every pixel.
+    pub(super) slopes: Vec<[f32; 2]>,
+    /// The image's width, for its pixels' indices.
+    columns: usize,
+    intrinsics: [f64; 4],
+}
+
+impl View {
+    /// Reads an image; what holds nobody is left out but for the floor.
+    pub(super) fn read(&mut self, image: &DepthImage, around: &Surroundings) {
+        let mut step = 1;
+        while (image.width.div_ceil(step)) * (image.height.div_ceil(step)) > MOST_PIXELS {
+            step += 1;
+        }
+        (self.width, self.height, self.step) = (image.width.div_ceil(step), image.height.div_ceil(step), step);
+        (self.columns, self.intrinsics) = (image.width, image.intrinsics);
+        self.depth.clear();
+        self.slopes.clear();
+        let [fx, fy, cx, cy] = image.intrinsics;
+        for row in (0..image.height).step_by(step) {
+            for column in (0..image.width).step_by(step) {
+                let index = row * image.width + column;
+                let slope = match image.rays {
+                    Some(rays) => rays[index],
+                    None => [((column as f64 - cx) / fx) as f32, ((row as f64 - cy) / fy) as f32],
+                };
+                let z = image.pixels.get(index) * image.metres_per_unit as f32;
+                let background = around.background.get(index).is_some_and(|depth| Background::holds(*depth, z));
+                let kept = z > RANGE[0] && z < RANGE[1] && !background;
+                self.depth.push(if kept { z } else { 0.0 });
+                self.slopes.push(slope);
+            }
+        }
+        self.exclude(&image.world_from_sensor, around.excluded);
+    }
+
+    fn exclude(&mut self, world_from_camera: &Pose, boxes: &[Aabb]) {
+        if boxes.is_empty() {
+            return;
+        }
+        for index in 0..self.depth.len() {
+            if self.depth[index] > 0.0 {
+                let point = *world_from_camera * self.point(index);
+                if boxes.iter().any(|bounds| bounds.contains_local_point(point)) {
+                    self.depth[index] = 0.0;
+                }
+            }
+        }
+    }
+
+    /// The point of a pixel, camera frame.
+    pub(super) fn point(&self, index: usize) -> Vec3 {
+        let (z, [x, y]) = (f64::from(self.depth[index]), self.slopes[index]);
+        Vec3::new(z * f64::from(x), z * f64::from(y), z)
+    }
+
+    /// Leaves out what is on the floor or below it.
+    pub(super) fn remove_floor(&mut self, floor: &Ground) {
+        let normal = floor.normal.to_array().map(|value| value as f32);
+        let least = (floor.offset + FLOOR_CLEARANCE) as f32;
+        for (z, [x, y]) in self.depth.iter_mut().zip(&self.slopes) {
+            if *z * (normal[0] * x + normal[1] * y + normal[2]) < least {
+                *z = 0.0;
+            }
+        }
+    }
+
+    /// The pixel in whose direction `(x/z, y/z)` lies.
+    pub(super) fn pixel_at(&self, [x, y]: [f32; 2], distorted: bool) -> Option<usize> {
+        let [fx, fy, cx, cy] = self.intrinsics.map(|value| value as f32);
+        let (mut column, mut row) = (fx * x + cx, fy * y + cy);
+        if distorted {
+            // Fixed point of the lens: the pinhole's error at a pixel is nearly that at its neighbour.
+            for _ in 0..3 {
+                let index = self.index(column, row)?;
+                let seen = self.slopes[index];
+                let (at_column, at_row) = self.place(index);
+                column = at_column + fx * (x - seen[0]);
+                row = at_row + fy * (y - seen[1]);
+            }
+        }
+        self.index(column, row)
+    }
+
+    fn index(&self, column: f32, row: f32) -> Option<usize> {
+        let step = self.step as f32;
+        let (column, row) = ((column / step).round(), (row / step).round());
+        let inside = column >= 0.0 && row >= 0.0 && column < self.width as f32 && row < self.height as f32;
+        inside.then(|| row as usize * self.width + column as usize)
+    }
+
+    fn place(&self, index: usize) -> (f32, f32) {
+        (((index % self.width) * self.step) as f32, ((index / self.width) * self.step) as f32)
+    }
+
+    /// Surface that a pixel covers at a depth of 1 m, square metres.
+    pub(super) fn pixel_area(&self) -> f64 {
+        (self.step * self.step) as f64 / (self.intrinsics[0] * self.intrinsics[1])
+    }
+
+    /// The pixels of the image for which one with this index in the image stands.
+    pub(super) fn block(&self, index: usize, into: &mut Vec<usize>) {
+        let (row, column) = (index / self.columns, index % self.columns);
+        for row in row..row + self.step {
+            into.extend((column..(column + self.step).min(self.columns)).map(|column| row * self.columns + column));
+        }
+    }
+
+    /// Index in the image of a pixel.
+    pub(super) fn in_image(&self, index: usize) -> usize {
+        (index / self.width) * self.step * self.columns + (index % self.width) * self.step
+    }
+}

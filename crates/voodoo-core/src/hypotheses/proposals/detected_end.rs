@@ -1,0 +1,41 @@
+//! The arm or leg ends where a detector sees its wrist or ankle.
+
+use super::{Pool, Propose};
+use crate::detect::Detection;
+use crate::hypotheses::history::{Basis, History};
+use crate::hypotheses::rough::{Extremity, RoughSearch};
+use crate::math::Vec3;
+
+/// Bends that are tried, as where the end was when all was well: the detector's elbow is no better than its wrist.
+const SWIVELS_DETECTED: usize = 12;
+
+/// What a detector says of this frame, if it looked.
+#[derive(Debug)]
+pub(in crate::hypotheses) struct DetectedEnd<'a>(pub(in crate::hypotheses) Option<&'a Detection>);
+
+impl DetectedEnd<'_> {
+    /// Where the end is seen, world frame: the hand's middle, or as far from the ankle as it is now.
+    fn end(&self, at: Extremity) -> Option<Vec3> {
+        let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
+        let detection = self.0?;
+        let last = chain.ends.first()?;
+        let joint = body.limbs()[*last].parent.as_ref().map(|(_, joint)| joint)?;
+        let on_end = body.sites().iter().filter(|site| site.limb == *last && site.name != joint.name);
+        if let Some(seen) = on_end.filter_map(|site| detection.joint(&site.name)).next() {
+            return Some(seen.position);
+        }
+        let beyond = chain.end(poses) - poses[*last] * joint.limb_from_joint.translation;
+        Some(detection.joint(&joint.name)?.position + beyond)
+    }
+}
+
+impl Propose for DetectedEnd<'_> {
+    fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
+        let Some(end) = self.end(at) else { return };
+        let place = end - at.context.seen.origin();
+        let cost = rough.end_at(at, place, SWIVELS_DETECTED, f64::INFINITY, &mut pool.detected.poses);
+        if cost < f64::INFINITY {
+            pool.detected.set(Basis::Rest);
+        }
+    }
+}

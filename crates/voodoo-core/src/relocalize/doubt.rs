@@ -1,0 +1,101 @@
+//! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
+
+use crate::body::Body;
+use crate::detect::Detection;
+use crate::math::{Pose, Vec3};
+
+/// A track is looked after for so long from its start on, seconds.
+const YOUNG: f64 = 1.0;
+/// Every so manyth frame of a young track is looked at, and of one that is in doubt.
+const EVERY: [usize; 2] = [3, 5];
+/// A detection is elsewhere when the joints of its trunk are this far from the tracked ones in the mean, metres.
+const ELSEWHERE: f64 = 0.25;
+/// One detection counts for at most this, in log odds.
+const MOST: f64 = 4.0;
+/// From this sum of log odds on it is tried.
+const ENOUGH: f64 = 4.0;
+/// From this sum of log odds on what is tracked is no person.
+const NOBODY: f64 = 12.0;
+/// A body that has been lost for so long is gone, seconds.
+const GONE: f64 = 2.0;
+/// Joints of the trunk.
+const TRUNK: [&str; 6] = ["humanoid_root", "vc7", "l_shoulder", "r_shoulder", "l_hip", "r_hip"];
+
+/// What detections said of a track.
+#[derive(Debug, Default)]
+pub(super) struct Doubt {
+    /// The tracker found it by itself: nobody said where it is.
+    found_itself: bool,
+    /// When it was started, seconds.
+    since: Option<f64>,
+    frames: usize,
+    /// Log odds that the person is elsewhere, and that what is tracked is none.
+    elsewhere: f64,
+    nobody: f64,
+    /// Since when the body has been lost, seconds.
+    lost_since: Option<f64>,
+}
+
+impl Doubt {
+    /// A new track.
+    pub(super) fn restart(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Nobody said where it is.
+    pub(super) fn found_itself(&mut self) {
+        self.found_itself = true;
+    }
+
+    /// Whether the track was started less than a second ago.
+    pub(super) fn young(&self, stamp: f64) -> bool {
+        self.since.is_none_or(|since| stamp - since < YOUNG)
+    }
+
+    /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
+    pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
+        let young = self.young(stamp) || lost;
+        self.since = self.since.or(Some(stamp));
+        let first = self.frames == 0;
+        self.frames += 1;
+        let every = if young { EVERY[0] } else { EVERY[1] };
+        (young || doubtful) && (first || self.frames.is_multiple_of(every))
+    }
+
+    /// Weighs a detection against the pose, world frame; whether the detection's is to be tried.
+    /// A lost body is where it is seen.
+    pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose], lost: bool) -> bool {
+        if lost {
+            return true;
+        }
+        let mut apart = Vec::with_capacity(TRUNK.len());
+        for name in TRUNK {
+            if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
+                let tracked: Vec3 = body.site_position(world_from_limb, site);
+                apart.push(seen.position.distance(tracked));
+            }
+        }
+        let mean = apart.iter().sum::<f64>() / apart.len().max(1) as f64;
+        if mean > ELSEWHERE {
+            self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST);
+        } else {
+            self.elsewhere = 0.0;
+        }
+        self.elsewhere >= ENOUGH
+    }
+
+    /// Notes what a frame said: whether the body was lost, and what a detector says of what stands where it is tracked. Whether
+    /// there is nobody any more.
+    pub(super) fn nobody(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
+        self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
+        if let Some(person) = verdict {
+            self.nobody = if person > 0.0 { 0.0 } else { self.nobody + (-person).min(MOST) };
+        }
+        self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= GONE)
+    }
+
+    /// What was seen elsewhere was tried.
+    pub(super) fn tried(&mut self) {
+        self.elsewhere = 0.0;
+    }
+}
