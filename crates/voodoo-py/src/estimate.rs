@@ -90,7 +90,7 @@ pub fn _estimate(py: Python<'_>, head: Head, names: AllNames, found: Found) -> P
     let (stamp, status, mean_squared_distance, steps) = head;
     let (limbs, sites, joints, sources) = names;
     let (limb_status, poses, places, limb_points, limb_residual, joint_gaps, reports) = found;
-    let known = [Status::Tracking, Status::Degraded, Status::Lost];
+    let known = [Status::Tracking, Status::Degraded, Status::Lost, Status::Searching];
     let limb_known = [LimbStatus::Measured, LimbStatus::Inferred, LimbStatus::Lost];
     let limb_of = |word: &String| limb_known.into_iter().find(|status| limb_status_word(*status) == word);
     let estimate = Estimate {

@@ -17,8 +17,11 @@ from voodoo.tracker import Tracker
 GONE_S = 3.0
 """A body that was lost for so long [s], of which nothing is seen, is gone; the tracker's own search waits as long."""
 
-_KNOWN = {f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")}
-"""Sites that a detector of people knows."""
+_KNOWN = {
+    "head_center", "vc7", "humanoid_root",
+    *(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist", "hand", "hip", "knee", "ankle")),
+}  # fmt: skip
+"""Sites that the tracker's own search finds; a body without one of them needs another start."""
 
 
 RESTART_S = 0.5
@@ -118,4 +121,4 @@ def nobody(stamp: float) -> Estimate:
 
 def can_search(tracker: Tracker) -> bool:
     """Whether the tracker looks for its body in depth images: it knows people."""
-    return hasattr(_core, "Detector") and _KNOWN <= set(tracker.body.site_names)
+    return _KNOWN <= set(tracker.body.site_names)
