@@ -139,7 +139,10 @@ class Tracker:
 
     def __init__(self, body, *, config):
         self.initial, self.config, self.frames = body, config, []
-        self.body, self.estimate, self.was_reset = body, searching(float("nan")), False
+        self.search()
+
+    def search(self):
+        self.body, self.estimate, self.was_reset = self.initial, searching(float("nan")), False
 
     def reset(self, *, joints, fit_sizes):
         unknown = set(joints) - set(T_POSE) - {"l_hand", "r_hand", "head_center", "l_toe", "r_toe"}

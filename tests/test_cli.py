@@ -292,9 +292,10 @@ def test_ctrl_c_before_the_first_frame_leaves_nothing(run):
 
 def test_demo(run, monkeypatch):
     monkeypatch.setattr("voodoo.recordings.sample.sample_path", lambda: Path("sample"))
-    run.tracker.offset = (0.0, 0.03, 0.0)
+    run.tracker.offset, run.tracker.found_at = (0.0, 0.03, 0.0), 1
     result = run("demo", "--out", "here")
     assert result.exit_code == 0, result.stderr
+    assert "12 frames, 1 searching, 11 tracking" in result.stdout
     assert "mean joint error  3.0 cm" in result.stdout
     assert sorted(path.name for path in Path("here").iterdir()) == ["overlay.mp4", "pose.csv", "sheet.png"]
 

@@ -88,7 +88,7 @@ class FrontEnd:
             BodyError: a given first pose names a site that the body has not.
             RecordingError: a picture that cannot be decoded.
 
-        After any of them, tracker and front end are as they were; but a tracker that was started in this frame keeps the pose.
+        After any of them, tracker and front end are as they were.
         """
         before = self._state()
         try:
@@ -96,11 +96,13 @@ class FrontEnd:
             steps = self.search.posed or self.search.by_tracker
             estimate = self.tracker.step(frame) if steps else nobody(recorded.stamp)
         except BaseException:
+            if self.search.posed and not before["search"].posed:
+                self.tracker.search()
             vars(self).update(before)
             raise
         was_posed = self.search.posed
-        depth = "depth" in self.settings.use and any(adapter_of(item).kind == "depth" for item in recorded.measurements)
-        estimate = self.search.learn(estimate, depth=depth)
+        if steps:
+            estimate = self.search.learn(estimate)
         if self.search.posed:
             self._learn(recorded, estimate)
         elif was_posed:

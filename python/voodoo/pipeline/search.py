@@ -15,7 +15,7 @@ from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
 GONE_S = 3.0
-"""A body that was lost for so long [s], of which nothing is seen, is gone; the tracker's own search waits as long."""
+"""A body that a source found is gone when it was lost for so long [s]: neither source nor tracker found it again."""
 
 _KNOWN = {
     "head_center", "vc7", "humanoid_root",
@@ -87,13 +87,12 @@ class Search:
     @property
     def by_tracker(self) -> bool:
         """Whether the tracker looks for somebody in the depth images itself."""
-        return self._starts.by_tracker and self.found is None and can_search(self._tracker)
+        return self._starts.by_tracker and can_search(self._tracker)
 
-    def learn(self, estimate: Estimate, *, depth: bool) -> Estimate:
+    def learn(self, estimate: Estimate) -> Estimate:
         """Take up what a step found; the same, or an estimate of nobody where the person is gone for good.
 
-        A person that a source found in frames without depth is gone when lost for GONE_S; the tracker itself tells of
-        others.
+        A person that a source found is gone when lost for GONE_S; of one that it found itself the tracker tells.
         """
         if str(estimate.status) == SEARCHING:
             self.posed, self.found = False, None
@@ -102,8 +101,9 @@ class Search:
         if str(estimate.status) != "lost" or self._supported is None:
             self._supported = estimate.stamp
         lost = self._lost_for(estimate.stamp)
-        if lost is not None and lost >= GONE_S and not depth:
-            self.posed = False
+        if lost is not None and lost >= GONE_S:
+            self._tracker.search()
+            self.posed, self.found = False, None
             return nobody(estimate.stamp)
         return estimate
 
