@@ -63,10 +63,15 @@ class Estimate:
     limb_status: dict = field(default_factory=dict)
 
 
+def searching(stamp):
+    return Estimate(stamp, {}, {}, "searching", float("nan"))
+
+
 class Body:
     def __init__(self, limbs=()):
         self.limbs = tuple(limbs)
         self.limb_names = tuple(limb.name for limb in self.limbs)
+        self.site_names = tuple(T_POSE)
 
     @classmethod
     def human(cls, height=1.75, *, model="full"):
@@ -104,7 +109,7 @@ def pose(joints, stamp=0.0, **fields):
 
 class Frame:
     def __init__(self, *, stamp):
-        self.stamp, self.calls = stamp, []
+        self.stamp, self.calls, self.excluded = stamp, [], []
 
     def add_depth(self, image, **options):
         self.calls.append(("depth", image.shape, options))
@@ -112,26 +117,39 @@ class Frame:
     def add_points(self, points, **options):
         self.calls.append(("points", points.shape, options))
 
+    def exclude(self, low, high):
+        self.excluded.append((low, high))
+
     def set_ground(self, **options):
         self.ground = options
 
 
 class Tracker:
-    """Knows the answer: stands in `reference` displaced by `offset`, or stays where it was reset to."""
+    """Knows the answer: stands in `reference` displaced by `offset`, or stays where it was reset to.
+
+    Without a reset it finds the person in frame `found_at`, and in frame `gone_at` the person is gone.
+    """
 
     reference = None
     offset = (0.0, 0.0, 0.0)
+    found_at = None
+    gone_at = None
     refuse_at = None
     interrupt_at = None
 
     def __init__(self, body, *, config):
         self.initial, self.config, self.frames = body, config, []
+        self.search()
+
+    def search(self):
+        self.body, self.estimate, self.was_reset = self.initial, searching(float("nan")), False
 
     def reset(self, *, joints, fit_sizes):
         unknown = set(joints) - set(T_POSE) - {"l_hand", "r_hand", "head_center", "l_toe", "r_toe"}
         if unknown:
             raise VoodooError(f"joints: unknown site {sorted(unknown)[0]!r}")
         self.body, self.estimate = pose({**T_POSE, **joints})
+        self.was_reset = True
         return self.estimate
 
     def step(self, frame):
@@ -140,7 +158,14 @@ class Tracker:
         if self.interrupt_at == len(self.frames):
             raise KeyboardInterrupt
         self.frames.append(frame)
-        joints = self.estimate.joints
+        type(self).last = frame
+        if not self.was_reset:
+            number = len(self.frames) - 1
+            there = self.found_at is not None and number >= self.found_at
+            if not there or (self.gone_at is not None and number >= self.gone_at):
+                self.estimate = searching(frame.stamp)
+                return self.estimate
+        joints = self.estimate.joints or {name: np.asarray(place, dtype=float) for name, place in T_POSE.items()}
         if self.reference is not None:
             row = int(np.argmin(np.abs(self.reference.stamps - frame.stamp)))
             joints = {**joints, **dict(zip(self.reference.names, self.reference.positions[row], strict=True))}
@@ -212,9 +237,11 @@ def install(monkeypatch):
     import voodoo.cli.running
     import voodoo.evaluation.evaluate
     import voodoo.pipeline.front_end
+    import voodoo.pipeline.search
     import voodoo.pipeline.start
     from voodoo.export import track as results
 
+    monkeypatch.setattr(voodoo.pipeline.search, "can_search", lambda tracker: True)
     # The fake body has no joints to take angles from.
     monkeypatch.setattr(results, "Chain", lambda body: body)
     monkeypatch.setattr(results, "angle_names_of", lambda body: ("l_elbow_flexion",))

@@ -52,7 +52,7 @@ def assert_one_line(result, code, *words):
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ((), ("track", "demo", "eval", "config", "info", "body", "--version")),
+        ((), ("track", "demo", "init", "eval", "config", "info", "body", "--version")),
         (
             ("track",),
             (
@@ -70,6 +70,7 @@ def assert_one_line(result, code, *words):
             ),
         ),
         (("eval",), ("--out", "--jobs", "--only", "--config", "sequences.csv")),
+        (("init",), ("--at", "--out", "--exclude", "stamp", "Examples")),
         (("demo",), ("--out", "sheet.png")),
     ],
 )
@@ -112,10 +113,100 @@ def test_track_passes_frame_and_init(run):
     assert written.joints[0, written.joint_names.index("l_hip"), 2] == pytest.approx(T_POSE["l_hip"][2] + 0.5)
 
 
-def test_track_without_start_says_what_to_give(run):
+def test_track_without_start_looks_for_somebody(run):
+    """One row a frame with its stamp; empty cells until the person is found, and when they are gone."""
+    run.recording = FakeRecording(frames=8, start=False)
+    run.tracker.found_at, run.tracker.gone_at = 2, 6
+    done = run("track", "somewhere", "--out", "pose.csv", "--out", "pose.npz", "--overlay", "look.mp4")
+    assert done.exit_code == 0 and done.stderr == "", done.output
+    assert "8 frames, 4 searching, 4 tracking" in done.stdout
+    rows = [row.split(",") for row in Path("pose.csv").read_text().splitlines()[1:]]
+    assert [float(row[0]) for row in rows] == run.recording.stamps.tolist()
+    status = ["searching"] * 2 + ["tracking"] * 4 + ["searching"] * 2
+    assert [row[1] for row in rows] == status
+    assert [set(row[2:]) == {""} for row in rows] == [word == "searching" for word in status]
+    for name in ("pose.csv", "pose.npz"):
+        read = Track.load(name)
+        assert list(read.status) == status and read.found.tolist() == [word == "tracking" for word in status]
+        assert np.isnan(read.joints[~read.found]).all() and np.isfinite(read.joints[read.found]).all()
+        assert np.isnan(read.angles[~read.found]).all() and np.isnan(read.residual[~read.found]).all()
+    assert np.isnan(np.load("pose.npz")["world_from_limb"][:2]).all()
+    assert cv2.VideoCapture("look.mp4").get(cv2.CAP_PROP_FRAME_COUNT) == 8
+
+
+def test_nobody_found_is_a_result_and_one_line(run):
     run.recording = FakeRecording(frames=3, start=False)
-    assert_one_line(run("track", "somewhere"), 1, "--init FILE", "l_shoulder", "base_link")
-    assert not Path("fake.csv").exists()
+    done = run("track", "somewhere", "--out", "pose.csv", "--out", "pose.npz")
+    assert_one_line(done, 0, "nobody was found in 3 frames")
+    assert "3 frames, 3 searching; wrote pose.csv" in done.stdout
+    for name in ("pose.csv", "pose.npz"):
+        read = Track.load(name)
+        assert read.status == ("searching",) * 3 and read.joint_names == tuple(T_POSE)
+
+
+def test_init_auto_leaves_the_recordings_start_alone(run):
+    assert run("track", "somewhere", "--init", "auto", "--out", "pose.csv").exit_code == 0
+    assert run.options == {"bare": True}
+    assert Track.load("pose.csv").status == ("searching",) * 12  # this tracker finds nobody
+    assert run("track", "somewhere", "--out", "pose.csv").exit_code == 0
+    assert run.options == {}
+    assert Track.load("pose.csv").status == ("tracking",) * 12
+
+
+def test_init_for_a_time_starts_there(run):
+    run.tracker.reference = None
+    Path("start.json").write_text(json.dumps({"stamp_s": 1700200000.09, "joints": T_POSE}))
+    assert run("track", "somewhere", "--init", "start.json", "--out", "pose.csv").exit_code == 0
+    assert Track.load("pose.csv").status == ("searching",) * 3 + ("tracking",) * 9
+
+
+def test_an_earlier_result_is_a_start(run):
+    run.tracker.reference = None
+    assert run("track", "somewhere", "--out", "before.csv").exit_code == 0
+    before = Track.load("before.csv")
+    for name in ("later.csv", "later.npz"):
+        before.of_frames(np.arange(12) >= 4).save(name)
+        assert run("track", "somewhere", "--init", name, "--out", "pose.csv").exit_code == 0
+        assert Track.load("pose.csv").status == ("searching",) * 4 + ("tracking",) * 8
+    Path("bad.csv").write_text("no result")
+    assert_one_line(run("track", "somewhere", "--init", "bad.csv"), 1, "bad.csv", "stamp_s")
+
+
+def test_init_writes_what_init_reads(run):
+    run.recording = FakeRecording(frames=12)
+    run.tracker.found_at, run.tracker.reference = 1, None
+    done = run("init", "somewhere", "--at", "0.1")
+    assert done.exit_code == 0, done.output
+    assert run.options == {"bare": True}
+    written = json.loads(done.stdout)
+    # The fourth frame from 0.1 s on is the first one in which the tracker finds somebody who was looked for once.
+    assert written["stamp_s"] == pytest.approx(1700200000.0 + 4 / 30.0)
+    assert written["joints"]["l_wrist"] == list(T_POSE["l_wrist"])
+    for at in ("1700200000.1", "0.1"):
+        assert run("init", "somewhere", "--at", at, "--out", "start.json").exit_code == 0
+        assert json.loads(Path("start.json").read_text()) == written
+    assert Init.load(Path("start.json")).joints["l_wrist"] == T_POSE["l_wrist"]
+    assert_one_line(run("init", "somewhere", "--at", "7"), 1, "--at: expected 0 to 0.367 s", "found 7")
+    run.tracker.found_at = None
+    assert_one_line(run("init", "somewhere"), 1, "found nobody")
+
+
+def test_boxes_to_leave_out(run):
+    for words in ("1,2,3", "a,0,0,1,1,1", "0,0,0,1,1,inf", "0,0,0,0,1,1"):
+        assert_one_line(run("track", "x", "--exclude", words), 1, "exclude: expected")
+    low, high = running.boxes_of(["1,-1,2,0,1,0"])[0]
+    assert (low, high) == ((0.0, -1.0, 0.0), (1.0, 1.0, 2.0))
+    assert run("track", "x", "--exclude", "0,0,0,1,1,1", "--exclude", "2,2,0,3,3,1", "--out", "p.csv").exit_code == 0
+    assert run.tracker.last.excluded == [((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), ((2.0, 2.0, 0.0), (3.0, 3.0, 1.0))]
+
+
+def test_eval_can_look_for_the_person_itself(run):
+    Path("a_depth.mat").touch()
+    run.tracker.found_at = 4
+    result = run("eval", "a_depth.mat", "--jobs", "1", "--init", "auto")
+    assert result.exit_code == 0, result.output
+    assert "frames without a pose | 33.3 %" in result.stdout
+    assert run("eval", "a_depth.mat", "--init", "file.json").exit_code == 2
 
 
 @pytest.mark.parametrize(
@@ -201,9 +292,10 @@ def test_ctrl_c_before_the_first_frame_leaves_nothing(run):
 
 def test_demo(run, monkeypatch):
     monkeypatch.setattr("voodoo.recordings.sample.sample_path", lambda: Path("sample"))
-    run.tracker.offset = (0.0, 0.03, 0.0)
+    run.tracker.offset, run.tracker.found_at = (0.0, 0.03, 0.0), 1
     result = run("demo", "--out", "here")
     assert result.exit_code == 0, result.stderr
+    assert "12 frames, 1 searching, 11 tracking" in result.stdout
     assert "mean joint error  3.0 cm" in result.stdout
     assert sorted(path.name for path in Path("here").iterdir()) == ["overlay.mp4", "pose.csv", "sheet.png"]
 

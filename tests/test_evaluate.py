@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, install, pose
-from voodoo.errors import RecordingError, VoodooError
+from voodoo.errors import RecordingError
 from voodoo.evaluation import evaluate as module
 from voodoo.evaluation.depth_agreement import near_joints, witness
 from voodoo.evaluation.evaluate import compare, evaluate, evaluate_all, select_by
@@ -283,8 +283,17 @@ def test_frame_table_is_written(opened, tmp_path):
     assert float(rows[3]["mean_error_m"]) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_no_start_is_a_clear_failure(opened):
-    _, become = opened
+def test_who_is_there_and_not_found_counts_as_lost(opened):
+    """Frames without a pose have no error; where the reference knows the person they cost the class."""
+    tracker, become = opened
     become(start=False)
-    with pytest.raises(VoodooError, match="--init"):
-        evaluate(Path("fake"))
+    score, frames = evaluate(Path("fake"))
+    assert frames.status == ("searching",) * 40 and score.searching_share == 1.0
+    assert np.isnan(score.error_m) and score.tracking_class == 0
+    tracker.found_at = 20
+    score, frames = evaluate(Path("fake"))
+    assert score.searching_share == 0.5 and score.error_m == pytest.approx(0.0, abs=1e-6)
+    assert score.tracking_class == 1 and np.isnan(frames.errors[:20]).all()
+    become()
+    score, _ = evaluate(Path("fake"), init="auto")
+    assert score.searching_share == 0.5

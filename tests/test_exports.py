@@ -190,6 +190,59 @@ def test_bag_read_by_rosbags(tmp_path, tracked):
         write_bag(tmp_path / "bag", track, body, root_frame="odom")
 
 
+def with_gaps(track):
+    """The track with a searching frame before every frame of its own, and one behind."""
+    frames = 2 * len(track) + 1
+    found = np.arange(frames) % 2 == 1
+
+    def spread(values):
+        wide = np.full((frames, *values.shape[1:]), np.nan)
+        wide[found] = values
+        return wide
+
+    status = iter(track.status)
+    return replace(
+        track,
+        stamps=track.stamps[0] + np.arange(frames) / 30.0,
+        status=tuple(next(status) if there else "searching" for there in found),
+        **{name: spread(getattr(track, name)) for name in ("residual", "joints", "world_from_limb", "angles")},
+    )
+
+
+def test_bvh_holds_the_pose_through_searching_frames(tmp_path, tracked):
+    track, body = tracked
+    write_bvh(tmp_path / "whole.bvh", track, body)
+    write_bvh(tmp_path / "gaps.bvh", with_gaps(track), body)
+    whole, gaps = (read_bvh(tmp_path / f"{name}.bvh")[0]["l_forearm"] for name in ("whole", "gaps"))
+    np.testing.assert_array_equal(gaps, whole[[0, 0, 0, 1, 1, 2, 2]])
+    nobody = with_gaps(track).of_frames(np.array([0, 2, 4]))
+    write_bvh(tmp_path / "nobody.bvh", nobody, body)
+    places, _ = read_bvh(tmp_path / "nobody.bvh")
+    assert places["l_forearm"].shape == (3, 3) and np.ptp(places["l_forearm"], axis=0).max() == 0.0
+    assert places["head"][0, 1] > places["l_forearm"][0, 1] > places["l_calf"][0, 1]  # at rest, Y up
+
+
+def test_trc_and_bag_leave_searching_frames_empty(tmp_path, tracked):
+    track, body = tracked
+    gaps = with_gaps(track)
+    write_trc(tmp_path / "gaps.trc", gaps)
+    back = read_trc(tmp_path / "gaps.trc")
+    assert np.isnan(back.positions).all(axis=(1, 2)).tolist() == (~gaps.found).tolist()
+    write_bag(tmp_path / "bag", gaps, body, root_frame="odom")
+    stamps, actions = {}, []
+    with AnyReader([tmp_path / "bag"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        for connection, stamp, raw in reader.messages():
+            stamps.setdefault(connection.topic, []).append(stamp)
+            if connection.topic.endswith("markers"):
+                actions.append({marker.action for marker in reader.deserialize(raw, connection.msgtype).markers})
+    there = [round(stamp * 1e9) for stamp in gaps.stamps[gaps.found]]
+    assert stamps["/tf"] == stamps["/humans/bodies/voodoo/joint_states"] == there
+    assert actions == [{3}, {0}] * len(track) + [{3}]  # delete all, add
+    write_bag(tmp_path / "nobody", gaps.of_frames(~gaps.found), body, root_frame="odom")
+    with AnyReader([tmp_path / "nobody"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        assert sum(connection.topic == "/tf" for connection, _, _ in reader.messages()) == 0
+
+
 def test_stamps_that_no_bag_can_hold_leave_no_folder(tmp_path, tracked):
     track, body = tracked
     early = replace(track, stamps=track.stamps - track.stamps[0] - 1.0)

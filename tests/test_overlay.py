@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, pose, scan_at
+from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, pose, scan_at, searching
 from voodoo.errors import VoodooError
 from voodoo.model.projection import CameraView, TopView, limb_outline
 from voodoo.recordings import ColorImage, RecordedFrame
@@ -74,6 +74,19 @@ def test_without_images_the_body_is_seen_from_above():
     pixels, _ = view.project(np.array([[4.0, 0.0, 1.0], [3.0, 1.0, 1.0]]))
     assert pixels[0] == pytest.approx([359.5, 359.5 - 120])  # forward is up
     assert pixels[1] == pytest.approx([359.5 - 120, 359.5])  # left is left
+
+
+@pytest.mark.parametrize("depth", [True, False])
+def test_while_nobody_is_found_no_body_is_drawn(depth):
+    recorded = STILL if depth else RecordedFrame(0.0, (scan_at(0.0),))
+    body, _ = pose(T_POSE)
+    overlay = Overlay(FakeRecording(frames=1, depth=depth))
+    picture = overlay.draw(recorded, body, searching(0.0), index=0)
+    with_body = overlay.draw(recorded, *pose(T_POSE), index=0)
+    assert picture.shape == with_body.shape
+    blue = np.array(side_color("l_wrist"))
+    near = [np.abs(image.astype(float) - blue).sum(axis=2).min() for image in (picture, with_body)]
+    assert near[1] < 20 < near[0]
 
 
 def test_colour_is_the_background_when_there_is_no_depth():

@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core_fakes import T_POSE, pose
+import voodoo
+from core_fakes import T_POSE, pose, searching
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 
@@ -121,3 +122,31 @@ def test_a_lost_frame_without_measurements_has_no_residual(tmp_path, suffix):
     lost.save(tmp_path / f"result{suffix}")
     again = Track.load(tmp_path / f"result{suffix}")
     assert np.isnan(again.residual[1]) and np.isfinite(again.residual[[0, 2]]).all()
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_searching_frames_are_empty_and_nothing_else_is(tmp_path, suffix):
+    items = list(estimates(4))
+    items[0], items[2] = (searching(items[index].stamp) for index in (0, 2))
+    result = Track.of(items)
+    assert result.found.tolist() == [False, True, False, True] and result.joint_names == tuple(T_POSE)
+    result.save(tmp_path / f"pose{suffix}")
+    again = Track.load(tmp_path / f"pose{suffix}")
+    assert again.status == result.status and np.array_equal(again.stamps, result.stamps)
+    assert np.array_equal(np.isfinite(again.joints).all(axis=(1, 2)), result.found)
+    part = again.of_frames(again.found)
+    assert len(part) == 2 and np.isfinite(part.joints).all() and part.status == ("tracking", "lost")
+    joints = result.joints.copy()
+    joints[0] = 0.0
+    with pytest.raises(VoodooError, match=r"joints: expected NaN while searching, found 0\.0 in frame 0"):
+        replace(result, joints=joints)
+    with pytest.raises(VoodooError, match="residual: expected finite numbers, found nan in frame 2"):
+        replace(result, status=("searching", "tracking", "tracking", "tracking"))
+
+
+def test_nobody_has_the_names_of_the_body(tmp_path):
+    body = voodoo.Body.human(1.7)
+    Track.of([searching(0.0), searching(0.1)], body=body).save(tmp_path / "pose.csv")
+    read = Track.load(tmp_path / "pose.csv")
+    assert read.joint_names == body.site_names and "l_knee_flexion" in read.angle_names
+    assert np.isnan(read.joints).all() and read.joints.shape == (2, 21, 3)

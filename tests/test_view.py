@@ -1,6 +1,7 @@
 """The Rerun file, verified by Rerun's own command line, and the geometry that is shown."""
 
 import builtins
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import voodoo
 from voodoo.errors import VoodooError
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.search import nobody
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization import rerun_viewer as view
@@ -51,6 +53,25 @@ def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
         "/plots/residual_mm", "/plots/steps", "/plots/step_ms", "/plots/sources/scan/matched",
     ):  # fmt: skip
         assert entity in shown, entity
+
+
+def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):
+    pytest.importorskip("rerun", reason="Rerun is not installed (pip install voodoo[view])")
+    tracker, front_end, frames = steps
+    path = tmp_path / "track.rrd"
+    with Viewer(save=path) as viewer:
+        for index, recorded in enumerate(frames[:3]):
+            estimate = front_end.step(recorded)
+            gone = index == 1
+            viewer.log(
+                nobody(recorded.stamp) if gone else estimate, tracker.body, front_end=None if gone else front_end
+            )
+    command = Path(sys.executable).with_name("rerun")
+    shown = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
+    rows = re.findall(r"with (\d+) rows .* - (/world/body\S*) - .*\[(\S+?)[\] ]", shown)
+    counts = {(entity, column): int(count) for count, entity, column in rows}
+    assert counts["/world/body", "Clear:is_recursive"] == 1
+    assert counts["/world/body/limbs/l_forearm", "Mesh3D:albedo_factor"] == 2
 
 
 def test_without_rerun_the_message_says_what_to_install(monkeypatch, tmp_path):

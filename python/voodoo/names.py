@@ -11,3 +11,5 @@ TOPIC_KINDS: tuple[TopicKind, ...] = get_args(TopicKind)
 """What a bag's topics are read as, in the order of precedence: the first kind a recording has makes its frames."""
 INPUTS = ("depth", "points", "scan", "keypoints", "skin", "markers")
 """Kinds of measurements that a front end can use; `voodoo.sensors.adapters.register` adds others."""
+SEARCHING = "searching"
+"""Status of a frame without a pose: nobody was found yet, or the person is gone."""

@@ -38,7 +38,8 @@ class Tracker:
         if config is not None and not isinstance(config, Config):
             raise ConfigError(f"config: expected a voodoo.Config, found {type(config).__name__}")
         self.config = Config() if config is None else config
-        self._core = _core.Tracker(body.core, self.config.values())
+        self._initial = body
+        self.search()
 
     @property
     def body(self) -> Body:
@@ -66,6 +67,10 @@ class Tracker:
                 larger or smaller: they are not in metres. The tracker is unchanged.
         """
         return self._core._reset(checked_joints(joints), fit_sizes=fit_sizes)
+
+    def search(self) -> None:
+        """Give up the pose and what was learnt with it: from the next step on somebody is looked for, as in a new tracker."""
+        self._core = _core.Tracker(self._initial.core, self.config.values())
 
     def reset_pose(self, world_from_limb: Mapping[str, npt.ArrayLike]) -> Estimate:
         """Set the pose of every limb directly: limb name -> rigid (4, 4) world_from_limb; sizes stay as they are.

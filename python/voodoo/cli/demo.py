@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from voodoo.cli.common import INTERRUPTED, clear_errors, states
+from voodoo.errors import VoodooError
 
 
 def demo_command(
@@ -15,26 +16,29 @@ def demo_command(
 ) -> None:
     """Run the main job on the bundled recording, a person who bends, scoops and reaches up.
 
-    Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the recording's exact truth.
+    Nobody tells where the person is: they are found first. Writes pose.csv, overlay.mp4 and sheet.png and compares the pose
+    with the recording's exact truth.
     """
     import numpy as np
 
     from voodoo.cli.running import opened, run
     from voodoo.evaluation.evaluate import compare
-    from voodoo.pipeline.start import start_tracker
+    from voodoo.pipeline.start import AUTO, start_tracker
     from voodoo.recordings.sample import sample_path
     from voodoo.visualization.image_writer import save_picture
     from voodoo.visualization.sheet import contact_sheet
 
     with clear_errors():
         source = opened(sample_path(), None, None)
-        tracker = start_tracker(source)
+        tracker = start_tracker(source, init=AUTO)
         out.mkdir(parents=True, exist_ok=True)
         result, seconds, sheet, interrupted = run(source, tracker, out / "overlay.mp4", sheet=6)
         if interrupted:
             raise typer.Exit(INTERRUPTED)
         result.save(out / "pose.csv")
         save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
+        if not result.found.any():
+            raise VoodooError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
         errors = compare(source, result)
         typer.echo(f"{source.name}: {len(result)} frames, {states(result)}")
         typer.echo(

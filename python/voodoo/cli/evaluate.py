@@ -18,6 +18,10 @@ def eval_command(
         list[Path], typer.Argument(metavar="RECORDING...", help="Recordings, or folders that hold some.")
     ],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for tables and plot.")] = None,
+    init: Annotated[
+        str | None,
+        typer.Option(metavar="auto", help="auto: look for the person instead of taking the recordings' own starts."),
+    ] = None,
     config: ConfigOption = None,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Recordings at the same time; by default one for each core.")
@@ -48,6 +52,8 @@ def eval_command(
 
     voodoo eval utd-mhad/ --jobs 4 --out report
 
+    voodoo eval rendered/ --init auto
+
     voodoo eval rendered/ --ablate --out report
     """
     from voodoo.cli.running import config_of, kinds_of
@@ -55,16 +61,19 @@ def eval_command(
     from voodoo.evaluation.evaluate import evaluate_all
     from voodoo.evaluation.report import markdown, write_reports
     from voodoo.evaluation.search import find_recordings
+    from voodoo.pipeline.start import AUTO
 
     with clear_errors():
-        human = model or "full"
+        if init not in (None, AUTO):
+            raise typer.BadParameter(f"--init: expected auto, found {init!r}")
+        automatic = None if init is None else AUTO
         config_of(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
         if ablation:
             chosen = config_of(config)
-            runs = ablate(paths, config=chosen, loader=loader, model=human, use=kinds, jobs=jobs)
+            runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
             ablations = list(progressing(runs, "ablating", len(variants(chosen))))
             typer.echo(table(ablations))
             if out is not None:
@@ -73,7 +82,7 @@ def eval_command(
             if failed:
                 raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
             return
-        done = evaluate_all(paths, config_file=config, loader=loader, model=human, use=kinds, jobs=jobs)
+        done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
         ordered = sorted(progressing(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
         typer.echo(markdown(scores))

@@ -19,6 +19,7 @@ from voodoo.cli.options import (
     RecordingArgument,
     TopicOption,
 )
+from voodoo.errors import VoodooError
 
 
 def ik_command(
@@ -81,10 +82,11 @@ def ik_command(
     from voodoo.export.track import Track
     from voodoo.model.body import Body
     from voodoo.pipeline.ik import Positions, follow
-    from voodoo.pipeline.start import Init, start_tracker
+    from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
+        beginning = beginning_of(init)
         source = opened(recording, loader, frame, **topics_of(topic), **numbers_of(option))
         written = out or [Path(f"{source.name}_ik.csv")]
         for file in written:
@@ -92,11 +94,15 @@ def ik_command(
         positions = Positions.of(source, None if targets is None else Track.load(targets))
         tracker = start_tracker(
             source,
-            init=None if init is None else Init.load(init),
+            init=beginning,
             body=None if body is None else Body.load(body),
             height=height,
-            model=model or "full",
+            model=model,
         )
+        if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning)) is None:
+            raise VoodooError(
+                f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
+            )
         known = None if sites is None else tuple(name.strip() for name in sites.split(","))
         how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
         result, errors = follow(source, tracker, positions, **how)

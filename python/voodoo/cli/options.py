@@ -30,8 +30,21 @@ HeightOption = Annotated[
     typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in metres."),
 ]
 InitOption = Annotated[
-    Path | None,
-    typer.Option("--init", metavar="FILE", help="First pose as JSON; not needed when the recording brings one."),
+    str | None,
+    typer.Option(
+        "--init",
+        metavar="FILE|auto",
+        help="First pose as JSON, or an earlier result (.csv, .npz); auto: look for somebody, whatever start lies beside the "
+        "recording. By default the recording's own start; auto where none comes with it.",
+    ),
+]
+ExcludeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--exclude",
+        metavar="X0,Y0,Z0,X1,Y1,Z1",
+        help="A box in the root frame, two corners in metres, in which nobody is looked for or tracked; repeatable.",
+    ),
 ]
 ModelOption = Annotated[
     HumanModel | None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,10 +14,12 @@ from voodoo.config import Config
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.pipeline.run import track
+from voodoo.pipeline.start import AUTO, Beginning
+from voodoo.pipeline.starts.chosen import Starts
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.settings import FrontEndSettings
+from voodoo.sensors.settings import Box, FrontEndSettings
 from voodoo.tracker import Tracker
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.ink import Picture
@@ -68,6 +71,30 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
     return DepthFilter(nearest=nearest, farthest=farthest)
 
 
+def bare_for(init: Beginning | None) -> dict[str, Any]:
+    """The option of `open_recording` with which nothing beside the recording is read where a start is looked for."""
+    return {"bare": True} if init == AUTO else {}
+
+
+def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
+    """The boxes of "X0,Y0,Z0,X1,Y1,Z1" each, with the lower corner first.
+
+    Raises:
+        VoodooError: not six finite numbers, or a box without inside.
+    """
+    boxes = []
+    for word in words or ():
+        try:
+            numbers = [float(part) for part in word.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) != 6 or not np.isfinite(numbers).all():
+            raise VoodooError(f"exclude: expected X0,Y0,Z0,X1,Y1,Z1 in metres, found {word!r}")
+        low, high = np.sort(np.reshape(numbers, (2, 3)), axis=0).tolist()
+        boxes.append(((low[0], low[1], low[2]), (high[0], high[1], high[2])))
+    return FrontEndSettings(exclude=tuple(boxes)).exclude
+
+
 def config_of(path: Path | None) -> Config:
     """The configuration of a file; the defaults for None."""
     return Config() if path is None else Config.load(path)
@@ -80,6 +107,7 @@ def run(
     *,
     sheet: int = 0,
     settings: FrontEndSettings | None = None,
+    starts: Starts | None = None,
     viewer: Viewer | None = None,
 ) -> Run:
     """Track and draw, with `sheet` pictures spread over the recording. Ctrl-C ends it with the frames up to there, if any."""
@@ -90,7 +118,7 @@ def run(
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
     with writer or nullcontext():
         try:
-            for step in progressing(track(source, tracker, settings=settings), source.name, len(source)):
+            for step in progressing(track(source, tracker, settings=settings, starts=starts), source.name, len(source)):
                 estimates.append(step.estimate)
                 seconds.append(step.seconds)
                 if viewer is not None:

@@ -11,6 +11,7 @@ from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
+    ExcludeOption,
     FrameOption,
     HeightOption,
     InitOption,
@@ -68,23 +69,30 @@ def track_command(
     frame: FrameOption = None,
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
+    exclude: ExcludeOption = None,
 ) -> None:
-    """Track the body through a recording and write one row a frame.
+    """Find a person in a recording, follow them, and write one row a frame.
 
     All inputs the recording has are used: depth images, point clouds, laser scans, skin in colour images, 2-D
     keypoints, markers. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
+
+    The start is the recording's own, if one comes with it. Else somebody is looked for: in markers, keypoints of several
+    cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until then, and when the
+    person is gone, the status is searching and the coordinates are empty.
 
     The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in metres for every joint and site, in the
     recording's root frame (base_link if it has one), and NAME_rad for every joint angle. The .npz adds the pose of
     every limb. Ctrl-C writes the frames up to there and ends with exit code 130; a frame that is refused ends without any
     result.
 
-    --init gives the pose in the first frame, by any subset of names that fixes it:
+    --init FILE gives the pose in the first frame, by any subset of names that fixes it, or with stamp_s that of a later one:
     {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
 
     Examples
 
-    voodoo track walk_bag/ --init start.json --out walk.csv
+    voodoo track walk_bag/ --out walk.csv --overlay look.mp4
+
+    voodoo track walk_bag/ --init auto --exclude 0.2,-0.4,0,1.1,0.4,1.2
 
     voodoo track a1_s1_t1_depth.mat --height 1.80 --out pose.npz --out pose.bvh --overlay look.mp4
 
@@ -92,12 +100,12 @@ def track_command(
     """
     from dataclasses import replace
 
-    from voodoo.cli.running import config_of, depth_filter_of, kinds_of, opened, run, viewer_of
+    from voodoo.cli.running import bare_for, boxes_of, config_of, depth_filter_of, kinds_of, opened, run, viewer_of
     from voodoo.export.files import check_target
     from voodoo.export.files import save as export
     from voodoo.model.body import Body
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
-    from voodoo.pipeline.start import Init, start_tracker
+    from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.sensors.settings import FrontEndSettings
 
@@ -107,7 +115,8 @@ def track_command(
         if offset and not with_:
             raise typer.BadParameter("--offset is for the stamps of --with, give both")
         kinds = kinds_of(use)
-        depth_filter = depth_filter_of(depth_range)
+        depth_filter, boxes = depth_filter_of(depth_range), boxes_of(exclude)
+        beginning = beginning_of(init)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
         numbers, others = numbers_of(option), with_ or ()
         options = topics_of(topic) | loader_options(recording, loader, markers=markers, layout=layout, numbers=numbers)
@@ -115,29 +124,32 @@ def track_command(
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
-            opened(recording, loader, frame, **options),
+            opened(recording, loader, frame, **options, **bare_for(beginning)),
             keypoints=keypoint_folders(keypoints or ()),
             layout=layout,
             others=others,
             offset=offset,
             markers=markers,
             numbers=numbers,
+            **bare_for(beginning),
         )
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target, inputs=(recording, *(with_ or ())))
         tracker = start_tracker(
             source,
-            init=None if init is None else Init.load(init),
+            init=beginning,
             body=None if body is None else Body.load(body),
             height=height,
-            model=model or "full",
+            model=model,
             config=config_of(config),
             markers=markers,
+            use=kinds,
         )
         with viewer_of(view, save, source.name) as viewer:
-            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter)
-            result, _, _, interrupted = run(source, tracker, overlay, settings=settings, viewer=viewer)
+            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
+            starts = starts_of(beginning)
+            result, _, _, interrupted = run(source, tracker, overlay, settings=settings, starts=starts, viewer=viewer)
         for target in targets:
             export(result, target, body=tracker.body, root_frame=source.root_frame)
         written = [str(path) for path in (*targets, overlay, save) if path is not None]
@@ -146,3 +158,5 @@ def track_command(
             typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {told}", err=True)
             raise typer.Exit(INTERRUPTED)
         typer.echo(told)
+        if not result.found.any():
+            typer.echo(f"voodoo: {source.name}: nobody was found in {len(result)} frames", err=True)

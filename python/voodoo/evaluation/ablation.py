@@ -15,6 +15,7 @@ from voodoo.evaluation.evaluate import evaluate_all
 from voodoo.evaluation.score import Score
 from voodoo.evaluation.summary import Summary, summarize
 from voodoo.names import HumanModel
+from voodoo.pipeline.start import Automatic
 
 UNCHANGED = "as configured"
 # Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty weighs nothing.
@@ -78,8 +79,9 @@ def ablate(
     *,
     config: Config | None = None,
     loader: str | None = None,
-    model: HumanModel = "full",
+    model: HumanModel | None = None,
     use: Sequence[str] | None = None,
+    init: Automatic | None = None,
     jobs: int = 1,
 ) -> Iterator[Ablation]:
     """Evaluate `paths` with every variant of `config`, one after another; each is yielded when it is done.
@@ -91,7 +93,7 @@ def ablate(
             # The worker processes read their configuration from a file.
             file = Path(folder) / f"{index}.toml"
             file.write_text(variant.config.to_toml(), encoding="utf-8")
-            done = evaluate_all(paths, config_file=file, loader=loader, model=model, use=use, jobs=jobs)
+            done = evaluate_all(paths, config_file=file, loader=loader, model=model, use=use, init=init, jobs=jobs)
             yield Ablation(variant.name, tuple(score for _, score, _ in sorted(done, key=lambda item: item[0])))
 
 

@@ -84,9 +84,12 @@ def witness(
         estimate: of this frame.
         truth: true joint positions [m] in the root frame, or those of a reference; only "truth" selects by them.
         selection: see the module.
+
+    Returns:
+        Nothing of a searching frame: there is no model to compare with.
     """
     distances, about, overlaps = [np.empty(0)], [np.empty(0, dtype=bool)], [np.empty(0)]
-    for item in recorded.measurements:
+    for item in recorded.measurements if estimate.joints else ():
         if isinstance(item, DepthImage):
             points, valid = depth_points(item)
         elif isinstance(item, PointCloud):

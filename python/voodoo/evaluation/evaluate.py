@@ -22,9 +22,9 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
-from voodoo.names import HumanModel
+from voodoo.names import SEARCHING, HumanModel
 from voodoo.pipeline.run import track
-from voodoo.pipeline.start import start_tracker
+from voodoo.pipeline.start import Automatic, start_tracker
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
@@ -39,6 +39,8 @@ _CARRIER = {
 }
 """The limb that ends at a joint."""
 
+NOWHERE_M = 10.0
+"""Error of a joint that is there when nobody was found, for the class: beyond every limit."""
 _SEGMENTED_LOADERS = ("utd-mhad",)
 
 
@@ -47,16 +49,25 @@ def evaluate(
     *,
     config: Config | None = None,
     loader: str | None = None,
-    model: HumanModel = "full",
+    model: HumanModel | None = None,
     use: Sequence[str] | None = None,
+    init: Automatic | None = None,
 ) -> tuple[Score, FrameTable]:
-    """Track a recording from its own start and measure the result; `use` says from which of its inputs, None: all.
+    """Track a recording from its own start and measure the result.
+
+    Args:
+        path: of the recording.
+        config: None means the defaults.
+        loader: see open_recording.
+        model: see start_tracker.
+        use: from which of its inputs; None: all.
+        init: "auto" leaves the recording's own start out and looks for somebody, as is done where none comes with it.
 
     Raises:
-        VoodooError: it cannot be read, has no start, or a frame was refused.
+        VoodooError: it cannot be read, or a frame was refused.
     """
     recording = open_recording(path, loader=loader)
-    tracker = start_tracker(recording, config=config, model=model)
+    tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
     steps = []
     for frame in track(recording, tracker, settings=FrontEndSettings.of(recording, use=use)):
@@ -107,8 +118,9 @@ def evaluate_all(
     *,
     config_file: Path | None = None,
     loader: str | None = None,
-    model: HumanModel = "full",
+    model: HumanModel | None = None,
     use: Sequence[str] | None = None,
+    init: Automatic | None = None,
     jobs: int = 1,
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
     """Evaluate recordings in parallel processes; (index in `paths`, score, frames) as each is done, in any order.
@@ -122,6 +134,7 @@ def evaluate_all(
             loader,
             model,
             None if use is None else tuple(use),
+            init,
         )
         for path in paths
     ]
@@ -148,11 +161,16 @@ def _one_thread() -> None:
 
 
 def _task(
-    path: str, config_file: str | None, loader: str | None, model: HumanModel, use: Sequence[str] | None
+    path: str,
+    config_file: str | None,
+    loader: str | None,
+    model: HumanModel | None,
+    use: Sequence[str] | None,
+    init: Automatic | None,
 ) -> tuple[Score, FrameTable | None]:
     try:
         config = None if config_file is None else Config.load(config_file)
-        return evaluate(Path(path), config=config, loader=loader, model=model, use=use)
+        return evaluate(Path(path), config=config, loader=loader, model=model, use=use, init=init)
     except (VoodooError, OSError) as error:
         return Score(Path(path).name, Path(path), failure=str(error)), None
 
@@ -196,7 +214,10 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     errors_best = metrics.joint_errors(positions, reference, lag=lag)
     errors = errors_best if exact is False else errors0
     limit = LIMIT_EXACT_M if exact else LIMIT_REFERENCE_M
-    class_, lost = metrics.tracking_class(errors, stamps, limit=limit)
+    searching = np.array([word == SEARCHING for word in status])
+    # Who is there and not found is as lost as who is looked for in a wrong place.
+    missed = searching[:, None] & np.isfinite(reference).all(axis=2)
+    class_, lost = metrics.tracking_class(np.where(missed, NOWHERE_M, errors), stamps, limit=limit)
     still = metrics.standing_still(reference, stamps)
     distances = np.concatenate([step.witness.distances for step in steps])
     about_joints = np.concatenate([step.witness.about_joints for step in steps])
@@ -228,6 +249,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         reference_standing_jitter_m=metrics.standing_jitter(reference, still),
         degraded_share=float(np.mean([word == "degraded" for word in status])),
         lost_share=float(np.mean([word == "lost" for word in status])),
+        searching_share=float(searching.mean()),
         lost_recall=metrics.mean_or_nan((~measured[far]).astype(np.float64)),
         false_alarm_rate=metrics.mean_or_nan((~measured[near]).astype(np.float64)),
         far_ends=int(far.sum()),

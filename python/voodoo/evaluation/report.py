@@ -31,6 +31,7 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("reference_standing_jitter_m", "... of the reference itself there", lambda value: f"{1000 * value:.1f} mm"),
     ("degraded_share", "frames called degraded", lambda value: f"{100 * value:.1f} %"),
     ("lost_share", "frames called lost", lambda value: f"{100 * value:.1f} %"),
+    ("searching_share", "frames without a pose", lambda value: f"{100 * value:.1f} %"),
     ("lost_recall", "limbs off by 10 cm and not called measured", lambda value: f"{100 * value:.0f} %"),
     ("false_alarm_rate", "nearer limbs not called measured", lambda value: f"{100 * value:.1f} %"),
     ("lost_recall_together", "limbs off by 10 cm, all sequences together", lambda value: f"{100 * value:.1f} %"),

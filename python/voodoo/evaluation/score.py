@@ -39,7 +39,8 @@ class Score:
         jitter_m, reference_jitter_m: mean norm of the second difference of the twelve joints, over all frames.
         standing_jitter_m, reference_standing_jitter_m: the same over the joints and frames in which the reference stands
             still, see metrics.standing_still.
-        degraded_share, lost_share: frames in which the tracker itself said so.
+        degraded_share, lost_share, searching_share: frames in which the tracker itself said so. A searching frame has no
+            errors; in the class it counts as lost where the reference knows the person.
         lost_recall, false_alarm_rate: of the elbows, wrists, knees and ankles farther than 10 cm from the truth the share whose
             limb was not called measured; and of the nearer ones.
         far_ends, near_ends: how many such joints there were, over all frames.
@@ -72,6 +73,7 @@ class Score:
     reference_standing_jitter_m: float = np.nan
     degraded_share: float = np.nan
     lost_share: float = np.nan
+    searching_share: float = np.nan
     lost_recall: float = np.nan
     false_alarm_rate: float = np.nan
     far_ends: int = 0

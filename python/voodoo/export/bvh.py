@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from voodoo.export.skeleton import Bone, FloatArray, mean_interval, skeleton
+from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 
@@ -20,7 +20,8 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
 
     Axes are X left, Y up, Z forward at rest; with zero rotations the body stands at rest. Rotations are in the order
     Z, X, Y in degrees. All joints are closed: where the solver left a gap (`Estimate.joint_gaps`), a limb is moved to
-    its parent. The format has one constant frame time: the median of the track's.
+    its parent. The format has one constant frame time, the median of the track's, and no gaps: a searching frame repeats
+    the pose before it, those before the first pose show that one, and a track of nobody the body at rest.
 
     Args:
         path: .bvh file.
@@ -32,7 +33,7 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
         VoodooError: the track has no limb poses, is of another body, or its stamps do not rise.
         OSError: the file cannot be written.
     """
-    posed = skeleton(track, body)
+    posed = held(skeleton(track, body), track.found)
     parts = posed.bones
     lines = ["HIERARCHY"]
     order: list[int] = []

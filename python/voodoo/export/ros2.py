@@ -31,7 +31,7 @@ FRAMES = {"pelvis": "waist", "thorax": "torso", "torso": "torso", "head": "head"
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
-_CYLINDER, _SPHERES, _ADD = 1, 7, 0
+_CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 1, 7, 0, 3
 
 
 def write_bag(
@@ -41,6 +41,7 @@ def write_bag(
 
     Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
     `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints).
+    Searching frames have no transforms and no joint states; their markers delete those of the frame before.
 
     Args:
         path: the folder, which must not exist.
@@ -62,42 +63,36 @@ def write_bag(
         raise VoodooError(f"root_frame, person: expected names, found {root_frame!r} and {person!r}")
     if (track.stamps < 0.0).any():
         raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
-    posed = skeleton(track, body)
-    names, angles = joint_angles(posed)
+    posed, shown = skeleton(track, body), track.found
+    names, angles = joint_angles(posed.of_frames(shown)) if shown.any() else ((), np.empty((0, 0)))
     topic = f"/humans/bodies/{person}"
+    kinds = {"/tf": "tf2_msgs/msg/TFMessage", f"{topic}/joint_states": "sensor_msgs/msg/JointState"}
+    if markers:
+        kinds[f"{topic}/markers"] = "visualization_msgs/msg/MarkerArray"
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connect = {
-            name: writer.add_connection(name, kind, typestore=_STORE)
-            for name, kind in (
-                ("/tf", "tf2_msgs/msg/TFMessage"),
-                (f"{topic}/joint_states", "sensor_msgs/msg/JointState"),
-                (f"{topic}/markers", "visualization_msgs/msg/MarkerArray"),
-            )
-            if markers or not name.endswith("markers")
-        }
+        connect = {name: writer.add_connection(name, kind, typestore=_STORE) for name, kind in kinds.items()}
+        rows = iter(angles)
         for index, stamp in enumerate(track.stamps):
             nanoseconds = round(float(stamp) * 1e9)
             header = _header(nanoseconds, root_frame)
-            messages: dict[str, Any] = {
-                "/tf": _new(
-                    "tf2_msgs/msg/TFMessage",
-                    transforms=_transforms(track, posed, index, root_frame, person, nanoseconds),
-                ),
-                f"{topic}/joint_states": _new(
+            messages: dict[str, Any] = {}
+            if shown[index]:
+                messages["/tf"] = _new(
+                    kinds["/tf"], transforms=_transforms(track, posed, index, root_frame, person, nanoseconds)
+                )
+                messages[f"{topic}/joint_states"] = _new(
                     "sensor_msgs/msg/JointState",
                     header=_header(nanoseconds, f"body_{person}"),
                     name=[f"{name}_{person}" for name in names],
-                    position=angles[index],
+                    position=next(rows),
                     velocity=np.empty(0),
                     effort=np.empty(0),
-                ),
-                f"{topic}/markers": _new(
-                    "visualization_msgs/msg/MarkerArray", markers=_markers(track, body, index, header)
-                ),
-            }
-            for name, connection in connect.items():
-                message = messages[name]
-                writer.write(connection, nanoseconds, _STORE.serialize_cdr(message, message.__msgtype__))
+                )
+            if markers:
+                drawn = _markers(track, body, index, header) if shown[index] else [_no_markers(header)]
+                messages[f"{topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
+            for name, message in messages.items():
+                writer.write(connect[name], nanoseconds, _STORE.serialize_cdr(message, message.__msgtype__))
 
 
 def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[str, tuple[str | None, FloatArray]]:
@@ -163,6 +158,14 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
     still = np.array([0.0, 0.0, 0.0, 1.0])
     result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
     return result
+
+
+def _no_markers(header: Any) -> Any:  # noqa: ANN401
+    """What removes all markers."""
+    still = np.array([0.0, 0.0, 0.0, 1.0])
+    marker = _marker(header, "", 0, _CYLINDER, np.zeros(3), still, (0.0,) * 3, (0.0,) * 3, [])
+    marker.action = _DELETE_ALL
+    return marker
 
 
 def _marker(

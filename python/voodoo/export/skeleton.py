@@ -7,7 +7,7 @@ rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -78,12 +78,18 @@ class Skeleton:
         stamps: (F,) [s].
         rotations: (F, L, 3, 3) world_from_bone: the identity when the body stands at rest and looks along x.
         heads: (F, L, 3) where each bone is joined to its parent, on the bone's side [m].
+
+    Rotations and heads of searching frames are NaN.
     """
 
     bones: tuple[Bone, ...]
     stamps: FloatArray
     rotations: FloatArray
     heads: FloatArray
+
+    def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Skeleton:
+        """The skeleton of some frames: a mask (F,), or their numbers."""
+        return Skeleton(self.bones, self.stamps[chosen], self.rotations[chosen], self.heads[chosen])
 
     def local(self) -> FloatArray:
         """(F, L, 3, 3) rotations relative to the parent; those of the root are relative to the world."""
@@ -109,6 +115,22 @@ def skeleton(track: Track, body: Body) -> Skeleton:
     places = np.array([bone.head_in_limb for bone in parts])
     heads = np.einsum("flij,lj->fli", turn, places) + track.world_from_limb[:, :, :3, 3]
     return Skeleton(parts, track.stamps, turn @ rest.transpose(0, 2, 1), heads)
+
+
+def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
+    """The skeleton without gaps, for formats that know none.
+
+    A frame without a pose (not in `found` (F,)) gets that of the last frame that has one, the first ones that of the first
+    such frame; where there is none at all the body stands at rest.
+    """
+    if not found.any():
+        still = Skeleton(posed.bones, posed.stamps, np.empty_like(posed.rotations), np.empty_like(posed.heads))
+        still.rotations[:] = np.eye(3)
+        still.heads[:] = np.array([bone.head for bone in posed.bones])
+        return still
+    last = np.maximum.accumulate(np.where(found, np.arange(len(found)), -1))
+    last[last < 0] = int(np.argmax(found))
+    return replace(posed.of_frames(last), stamps=posed.stamps)
 
 
 def mean_interval(stamps: FloatArray) -> float:

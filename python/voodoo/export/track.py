@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -18,11 +18,13 @@ from voodoo.ik.angles import angle_names as angle_names_of
 from voodoo.ik.angles import angles_of
 from voodoo.ik.chain import Chain
 from voodoo.model.body import Body
+from voodoo.names import SEARCHING
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 SUFFIXES = (".csv", ".npz")
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
+_BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,15 +33,17 @@ class Track:
 
     Args:
         stamps: (F,) [s].
-        status: F of "tracking", "degraded" or "lost".
-        residual: (F,) root mean square distance of the measurements to the model [m]; NaN in a lost frame without
-            measurements (an empty cell in .csv).
+        status: F of "tracking", "degraded", "lost" or "searching".
+        residual: (F,) root mean square distance of the measurements to the model [m]; NaN in a lost or
+            degraded frame without measurements (an empty cell in .csv).
         joint_names: J names of joints and sites.
         joints: (F, J, 3) [m] in the recording's root frame.
         limb_names: L names; () when the track was read from a .csv, which has no limb poses.
         world_from_limb: (F, L, 4, 4) poses of the limb frames in the root frame.
         angle_names: A names of joint angles, see voodoo.ik.angles; () when none were asked for.
         angles: (F, A) [rad].
+
+    Positions, poses, angles and residual of a searching frame are NaN: there is no body (empty cells in .csv).
     """
 
     stamps: FloatArray
@@ -53,7 +57,7 @@ class Track:
     angles: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     def __post_init__(self) -> None:
-        """Check that the arrays belong together and are finite: a pose is never NaN, only a lost frame's residual."""
+        """Check that the arrays belong together, and that what says it has a pose has one."""
         frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
         if not self.angle_names:
             object.__setattr__(self, "angles", np.empty((frames, 0)))
@@ -70,13 +74,40 @@ class Track:
             array = getattr(self, name)
             if array.shape != shape:
                 raise VoodooError(f"{name}: expected shape {shape}, found {array.shape}")
-            finite = np.isfinite(array)
-            if name == "residual":
-                # A lost frame may have had nothing to measure a residual from.
-                finite |= np.array([status == "lost" for status in self.status], dtype=bool)[:frames]
-            if not finite.all():
-                where = tuple(int(index) for index in np.argwhere(~finite)[0])
-                raise VoodooError(f"{name}: expected finite numbers, found {array[where]} in frame {where[0]}")
+            self._check_numbers(name, array)
+
+    def _check_numbers(self, name: str, array: FloatArray) -> None:
+        """Refuse poses that are NaN, and poses of nobody."""
+        searching = ~self.found.reshape(-1, *[1] * (array.ndim - 1))
+        finite = np.isfinite(array)
+        if name == "stamps":
+            right = finite
+        elif name == "residual":
+            # A lost frame may have had nothing to measure a residual from, as may one that is carried by prediction.
+            right = finite | np.array([status in ("lost", "degraded") for status in self.status], dtype=bool)
+            right = np.where(searching, np.isnan(array), right)
+        else:
+            right = np.where(searching, np.isnan(array), finite)
+        if not right.all():
+            where = tuple(int(index) for index in np.argwhere(~right)[0])
+            what = (
+                "NaN while searching" if self.status[where[0]] == SEARCHING and name != "stamps" else "finite numbers"
+            )
+            raise VoodooError(f"{name}: expected {what}, found {array[where]} in frame {where[0]}")
+
+    @property
+    def found(self) -> npt.NDArray[np.bool_]:
+        """Which frames (F,) have a pose: all but the searching ones."""
+        return np.array([status != SEARCHING for status in self.status], dtype=bool)
+
+    def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Track:
+        """The track of some frames: a mask (F,), or their numbers."""
+        numbers = np.arange(len(self))[chosen]
+        return replace(
+            self,
+            status=tuple(self.status[number] for number in numbers),
+            **{name: getattr(self, name)[numbers] for name in _BY_FRAME},
+        )
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -88,23 +119,30 @@ class Track:
 
     @classmethod
     def of(cls, estimates: Sequence[Estimate], *, body: Body | None = None) -> Track:
-        """Collect estimates of one body; with the body also its joint angles.
+        """Collect estimates of one body; with the body also its joint angles, and its names where nobody was found.
 
         Raises:
             VoodooError: no estimate, one that is not finite, or one of another body.
         """
         if not estimates:
             raise VoodooError("estimates: expected at least one frame, found none")
-        joint_names, limb_names = tuple(estimates[0].joints), tuple(estimates[0].world_from_limb)
+        posed = [estimate for estimate in estimates if str(estimate.status) != SEARCHING]
+        joint_names: tuple[str, ...] = tuple(posed[0].joints) if posed else () if body is None else body.site_names
+        limb_names: tuple[str, ...] = (
+            tuple(posed[0].world_from_limb) if posed else () if body is None else body.limb_names
+        )
+        nowhere, unposed = np.full((len(joint_names), 3), np.nan), np.full((len(limb_names), 4, 4), np.nan)
+        joints, poses = [], []
         for index, estimate in enumerate(estimates):
+            if str(estimate.status) == SEARCHING:
+                joints.append(nowhere)
+                poses.append(unposed)
+                continue
             if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
                 raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
-        angle_names: tuple[str, ...] = ()
-        angles = np.empty((len(estimates), 0))
-        if body is not None:
-            chain = Chain(body)
-            angles = np.array([angles_of(chain, estimate) for estimate in estimates], dtype=np.float64)
-            angle_names = angle_names_of(body)
+            joints.append(np.array(list(estimate.joints.values()), dtype=np.float64))
+            poses.append(np.array(list(estimate.world_from_limb.values()), dtype=np.float64))
+        angle_names, angles = _angles(estimates, body)
         return cls(
             angle_names=angle_names,
             angles=angles,
@@ -112,11 +150,9 @@ class Track:
             status=tuple(str(estimate.status) for estimate in estimates),
             residual=np.array([estimate.residual for estimate in estimates], dtype=np.float64),
             joint_names=joint_names,
-            joints=np.array([list(estimate.joints.values()) for estimate in estimates], dtype=np.float64),
+            joints=np.array(joints, dtype=np.float64),
             limb_names=limb_names,
-            world_from_limb=np.array(
-                [list(estimate.world_from_limb.values()) for estimate in estimates], dtype=np.float64
-            ),
+            world_from_limb=np.array(poses, dtype=np.float64),
         )
 
     def save(self, path: str | Path) -> None:
@@ -147,8 +183,8 @@ class Track:
                 self.stamps, self.status, self.residual, self.joints, self.angles, strict=True
             ):
                 # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
-                row = [repr(float(stamp)), status, "" if np.isnan(residual) else f"{residual:.6f}"]
-                writer.writerow(row + [f"{value:.6f}" for value in (*joints.ravel(), *angles)])
+                row = [repr(float(stamp)), status]
+                writer.writerow(row + [_cell(value) for value in (residual, *joints.ravel(), *angles)])
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as file:
@@ -192,8 +228,8 @@ class Track:
         for line, row in enumerate(rows, start=2):
             if len(row) != len(header):
                 raise VoodooError(f"line {line}: expected {len(header)} cells, found {len(row)}")
-        joints = np.array([[float(cell) for cell in row[3:first]] for row in rows], dtype=np.float64)
-        angles = np.array([[float(cell) for cell in row[first:]] for row in rows], dtype=np.float64)
+        joints = np.array([[float(cell or "nan") for cell in row[3:first]] for row in rows], dtype=np.float64)
+        angles = np.array([[float(cell or "nan") for cell in row[first:]] for row in rows], dtype=np.float64)
         return cls(
             angle_names=angle_names,
             angles=angles.reshape(len(rows), len(angle_names)),
@@ -234,6 +270,21 @@ def check_suffix(path: Path) -> None:
     """
     if path.suffix not in SUFFIXES:
         raise VoodooError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}, found {path.suffix!r}")
+
+
+def _angles(estimates: Sequence[Estimate], body: Body | None) -> tuple[tuple[str, ...], FloatArray]:
+    """Names of the joint angles, and the angles (F, A) [rad]; none without a body."""
+    if body is None:
+        return (), np.empty((len(estimates), 0))
+    chain, names = Chain(body), angle_names_of(body)
+    unknown = np.full(len(names), np.nan)
+    rows = [unknown if str(each.status) == SEARCHING else angles_of(chain, each) for each in estimates]
+    return names, np.array(rows, dtype=np.float64)
+
+
+def _cell(value: float) -> str:
+    """Text of a number; what is not known is empty."""
+    return "" if np.isnan(value) else f"{value:.6f}"
 
 
 def _header(names: Sequence[str], angle_names: Sequence[str] = ()) -> list[str]:

@@ -14,7 +14,7 @@ from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP
 
 
 def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None, y_up: bool = True) -> None:
-    """Write the joints and sites of a track as markers, in metres.
+    """Write the joints and sites of a track as markers, in metres; those of searching frames are empty cells.
 
     Args:
         path: .trc file.
@@ -48,5 +48,9 @@ def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = N
     ]
     # OpenSim starts its clock near zero; epoch seconds would lose their fraction in it.
     for index, (stamp, row) in enumerate(zip(track.stamps - track.stamps[0], positions, strict=True), start=1):
-        lines.append(f"{index}\t{stamp:.6f}\t" + "\t".join(f"{value:.6f}" for value in np.ravel(row)))
+        lines.append(f"{index}\t{stamp:.6f}\t" + "\t".join(_cell(value) for value in np.ravel(row)))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _cell(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.6f}"

@@ -11,7 +11,9 @@ from voodoo.measurements import RecordedFrame
 from voodoo.names import INPUTS
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
-from voodoo.sensors.adapters import Context, Memory, adapter_of
+from voodoo.pipeline.search import Search, nobody
+from voodoo.pipeline.starts.chosen import Starts
+from voodoo.sensors.adapters import Context, Memory, adapter_of, all_adapters
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.keypoints.sensor import KeypointReport
 from voodoo.sensors.motion import LimbMotion
@@ -27,27 +29,38 @@ class FrontEnd:
     """Feeds one tracker from recorded measurements of any kind.
 
     Args:
-        tracker: already reset to the first pose.
+        tracker: with a first pose (`reset`), or without one: then it is looked for in what comes.
         settings: see FrontEndSettings.
+        starts: where a first pose may come from; None: from whatever is measured.
 
     Attributes:
+        search: whether somebody is tracked, and how the first pose was found.
         memory: what the adapters keep of their sensors.
         rays: of the last frame, with their trust.
     """
 
-    def __init__(self, tracker: Tracker, *, settings: FrontEndSettings | None = None) -> None:
+    def __init__(
+        self, tracker: Tracker, *, settings: FrontEndSettings | None = None, starts: Starts | None = None
+    ) -> None:
         """Take up the tracker's current estimate as the first prediction."""
         self.tracker = tracker
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
         self.rays: list[SiteRay] = []
+        self.search = Search(tracker, starts)
         self._frozen = FrozenSensors()
-        self._steps = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Predict from the tracker's pose as it stands, if it has one."""
+        chosen = self.settings
+        # Somebody set the pose, or a source other than the tracker did.
+        self._vouched = self.search.posed
         self._predictor = SitePredictor()
         self._motion = LimbMotion()
-        chosen = self.settings
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
-        self._predictor.update(float("nan"), tracker.estimate.joints)
+        if self.search.posed:
+            self._predictor.update(float("nan"), self.tracker.estimate.joints)
 
     @property
     def frozen(self) -> tuple[str, ...]:
@@ -67,24 +80,50 @@ class FrontEnd:
     def step(self, recorded: RecordedFrame) -> Estimate:
         """Make the frame, step the tracker, and learn from the estimate.
 
+        Returns:
+            The estimate; with status "searching" and without joints where nobody was found yet, or the person is gone.
+
         Raises:
             MeasurementError: a measurement that cannot be used.
+            BodyError: a given first pose names a site that the body has not.
             RecordingError: a picture that cannot be decoded.
 
-        After either, tracker and front end are as they were.
+        After any of them, tracker and front end are as they were.
         """
         before = self._state()
         try:
-            estimate = self.tracker.step(self.frame(recorded))
+            frame = self.frame(recorded)
+            steps = self.search.posed or self.search.by_tracker
+            estimate = self.tracker.step(frame) if steps else nobody(recorded.stamp)
         except BaseException:
+            if self.search.posed and not before["search"].posed:
+                self.tracker.search()
             vars(self).update(before)
             raise
+        was_posed = self.search.posed
+        if steps:
+            estimate = self.search.learn(estimate)
+        if self.search.posed:
+            self._learn(recorded, estimate)
+        elif was_posed:
+            self._forget()
+        else:
+            self.rays = []
+        return estimate
+
+    def _learn(self, recorded: RecordedFrame, estimate: Estimate) -> None:
         self._predictor.update(recorded.stamp, estimate.joints)
         self._motion.update(recorded.stamp, estimate.world_from_limb)
         for item in recorded.measurements:
-            adapter_of(item).learn(item, estimate, self.memory, vouched=self._steps == 0)
-        self._steps += 1
-        return estimate
+            adapter_of(item).learn(item, estimate, self.memory, vouched=self._vouched)
+        self._vouched = False
+
+    def _forget(self) -> None:
+        """The person is gone: whoever comes next moves and looks otherwise."""
+        self.rays = []
+        for adapter in all_adapters():
+            adapter.forget(self.memory)
+        self._begin()
 
     def _state(self) -> dict[str, Any]:
         """All that `frame` changes, as it is."""
@@ -93,16 +132,26 @@ class FrontEnd:
             "memory": copy(self.memory),
             "_frozen": copy(self._frozen),
             "_gate": copy(self._gate),
+            "search": copy(self.search),
+            "_predictor": self._predictor,
+            "_motion": self._motion,
+            "_vouched": self._vouched,
         }
 
     def frame(self, recorded: RecordedFrame) -> Frame:
-        """The tracker's frame, without stepping."""
+        """The tracker's frame, without stepping; a tracker without a pose is put where a source of first poses finds one."""
         use = self.settings.use
         alive = self._frozen.without(recorded.measurements, use=use)
+        if self.search.wanted(recorded.stamp):
+            used = [item for item in alive if adapter_of(item).kind in use]
+            if self.search.look(recorded.stamp, used, self.settings):
+                self._begin()
         frame = Frame(stamp=recorded.stamp)
+        for low, high in self.settings.exclude:
+            frame.exclude(low, high)
         if self.settings.ground_z is not None:
             frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
-        predicted = self._predictor.predict(recorded.stamp)
+        predicted = self._predictor.predict(recorded.stamp) if self.search.posed else {}
         context = Context(
             stamp=recorded.stamp,
             measurements=alive,
@@ -116,7 +165,7 @@ class FrontEnd:
         )
         for item in alive:
             adapter = adapter_of(item)
-            if adapter.kind in use:
+            if adapter.kind in use and (self.search.posed or adapter.while_searching):
                 adapter.add(frame, item, context)
         self.rays = context.rays
         if self.settings.agreement > 0.0:

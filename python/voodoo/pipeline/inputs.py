@@ -41,6 +41,7 @@ def join(
     offset: float = 0.0,
     markers: MarkerMap | None = None,
     numbers: Mapping[str, float] | None = None,
+    bare: bool = False,
 ) -> Recording:
     """The recording with all that is joined to it.
 
@@ -52,6 +53,7 @@ def join(
         offset: [s] added to their stamps.
         markers: what the markers in marker files mean.
         numbers: options of their loaders, for those that have them.
+        bare: see `open_recording`.
 
     Raises:
         VoodooError: what cannot be read or does not belong together.
@@ -63,7 +65,7 @@ def join(
         recording = WithKeypoints(recording, keypoints, layout=layout)
     if others:
         recording = Joined(
-            recording, [_open(path, recording, markers, layout, numbers) for path in others], offset=offset
+            recording, [_open(path, recording, markers, layout, numbers, bare) for path in others], offset=offset
         )
     return recording
 
@@ -90,9 +92,16 @@ def loader_options(
 
 
 def _open(
-    path: Path, first: Recording, markers: MarkerMap | None, layout: str, numbers: Mapping[str, float] | None
+    path: Path,
+    first: Recording,
+    markers: MarkerMap | None,
+    layout: str,
+    numbers: Mapping[str, float] | None,
+    bare: bool,
 ) -> Recording:
     options = loader_options(path, None, markers=markers, layout=layout, numbers=numbers)
     if path.exists() and guess_loader(path) in ("ros1", "ros2"):
         options["root_frame"] = first.root_frame
+    if bare:
+        options["bare"] = True
     return open_recording(path, **options)

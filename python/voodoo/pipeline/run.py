@@ -12,6 +12,7 @@ from voodoo.measurements import RecordedFrame
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.start import Init, start_tracker
+from voodoo.pipeline.starts.chosen import Starts
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
@@ -39,7 +40,11 @@ class TrackedFrame:
 
 
 def track(
-    recording: Recording, tracker: Tracker, *, settings: FrontEndSettings | None = None
+    recording: Recording,
+    tracker: Tracker,
+    *,
+    settings: FrontEndSettings | None = None,
+    starts: Starts | None = None,
 ) -> Iterator[TrackedFrame]:
     """Step the tracker through a recording, by the front end that every command uses.
 
@@ -47,13 +52,14 @@ def track(
 
     Args:
         recording: read while iterating.
-        tracker: already reset to the first pose, see start_tracker.
+        tracker: see start_tracker; one without a pose searches.
         settings: what is used and how; None means all there is, see FrontEndSettings.of.
+        starts: where a first pose may come from; None: from whatever the recording offers.
 
     Raises:
         VoodooError: damage in the recording, or a frame that the tracker refuses; names the frame.
     """
-    front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording))
+    front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
     for index, recorded in enumerate(paired(recording)):
         began = time.perf_counter()
         try:

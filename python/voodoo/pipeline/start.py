@@ -1,38 +1,55 @@
-"""Where a tracker starts: the first pose of a recording, or one that is given."""
+"""Where a tracker starts: a first pose that is given or comes with a recording, or wherever somebody is found."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, TypeAlias, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
+from voodoo._core import Estimate
 from voodoo.config import Config
 from voodoo.errors import VoodooError
+from voodoo.export.skeleton import bones
+from voodoo.export.track import SUFFIXES, Track
 from voodoo.model.body import Body
+from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.starts.chosen import Starts
+from voodoo.pipeline.starts.given import EarlierStart, GivenStart
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
+from voodoo.sensors.kinds import input_of, inputs
 from voodoo.sensors.markers import body_with_markers
+from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
 Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
+_ROUNDED_S = 1e-6
+_DEFAULT_M = 1.75
+"""Stature of `Body.human()`."""
 
 
 Position = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
 class Init(BaseModel):
-    """Where the body is in the first frame: any subset of named positions that fixes the pose.
+    """Where the body is in the first frame, or at a time: any subset of named positions that fixes the pose.
 
     Args:
         height_m: stature [m], None if unknown.
+        stamp_s: the pose is that of the first frame at or after this time [s]; None: of the first frame.
         joints: site name to (x, y, z) [m] in the recording's root frame.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     height_m: Height | None = None
+    stamp_s: FiniteFloat | None = None
     joints: Annotated[dict[str, Position], Field(min_length=1)]
 
     @classmethod
@@ -51,6 +68,14 @@ class Init(BaseModel):
         except ValidationError as error:
             raise VoodooError(f"{path}: {_first_problem(error)}") from error
 
+    def to_json(self) -> str:
+        """As `load` reads it, a joint a line."""
+        numbers = {"height_m": self.height_m, "stamp_s": self.stamp_s}
+        lines = [f'  "{name}": {json.dumps(value)}' for name, value in numbers.items() if value is not None]
+        joints = [f'    "{name}": {json.dumps(place)}' for name, place in self.joints.items()]
+        lines.append('  "joints": {\n' + ",\n".join(joints) + "\n  }")
+        return "{\n" + ",\n".join(lines) + "\n}"
+
     @classmethod
     def of(cls, recording: Recording) -> Init | None:
         """The start that comes with the recording, or None.
@@ -66,43 +91,62 @@ class Init(BaseModel):
             raise VoodooError(f"{recording.name}, start: {_first_problem(error)}") from error
 
 
+Automatic: TypeAlias = Literal["auto"]
+"""The word for: look for somebody, whatever lies beside the recording."""
+AUTO: Automatic = "auto"
+Beginning: TypeAlias = Init | Track | Automatic
+"""A first pose, an earlier result that has one, or neither."""
+
+
+def beginning_of(word: str | None) -> Beginning | None:
+    """What --init says: "auto", a JSON file (see Init.load), or a .csv or .npz of `voodoo track`.
+
+    Raises:
+        VoodooError: a file that is none of these; names it.
+    """
+    if word is None or word == AUTO:
+        return word
+    return Track.load(word) if Path(word).suffix in SUFFIXES else Init.load(Path(word))
+
+
 def start_tracker(
     recording: Recording,
     *,
-    init: Init | None = None,
+    init: Beginning | None = None,
     body: Body | None = None,
     height: float | None = None,
-    model: HumanModel = "full",
+    model: HumanModel | None = None,
     config: Config | None = None,
     markers: MarkerMap | None = None,
+    use: Sequence[str] | None = None,
 ) -> Tracker:
-    """A tracker that stands in the first pose of the recording.
+    """A tracker for a recording: in its first pose, or without one, so that it looks for somebody.
 
     Args:
-        recording: gives the start when `init` is None.
-        init: first pose, and stature unless `height` is given.
-        body: what to track; None means the default human.
-        height: stature of the default human [m]; not together with `body`.
-        model: how finely that human is divided, see `Body.human`.
+        recording: gives the start when `init` is None, if one comes with it.
+        init: first pose, and stature unless `height` is given. One for a certain time, an earlier result and "auto" leave the
+            tracker without a pose; give `starts_of(init)` to `track`.
+        body: what to track; None means the default human, or two legs where there is nothing but a laser to start from.
+        height: stature of the default body [m]; not together with `body`.
+        model: how finely that human is divided, see `Body.human`; None: "full".
         config: None means the defaults.
         markers: those worn on limbs become sites of the body.
+        use: kinds of inputs in use; None: all.
 
     Raises:
-        VoodooError: there is no first pose, it does not fix the pose of this body, both body and height are given, or a
-            marker stands for a site that the body has not.
+        VoodooError: the first pose does not fix that of this body, both body and height are given, or a marker stands for a
+            site that the body has not.
     """
     if body is not None and height is not None:
         raise VoodooError("body and height: expected at most one of them, found both")
-    init = init or Init.of(recording)
-    if init is None:
-        raise VoodooError(
-            f"{recording.name}: expected a first pose, found none in the recording; give one with --init FILE, a JSON "
-            'file like {"height_m": 1.76, "joints": {"l_shoulder": [x, y, z], "r_hip": [x, y, z], ...}} '
-            f"in metres in the frame {recording.root_frame!r}"
-        )
+    init = init or Init.of(recording) or AUTO
     if body is None:
-        height = height if height is not None else init.height_m
-        body = Body.human(model=model) if height is None else Body.human(height=height, model=model)
+        stature = height if height is not None else init.height_m if isinstance(init, Init) else None
+        known = {} if stature is None else {"height": stature}
+        if init == AUTO and model is None and _only_laser(recording, use):
+            body = legs_body(**known)
+        else:
+            body = Body.human(**known, model=model or "full")
     if markers is not None and markers.limbs:
         body = body_with_markers(body, markers.worn())
     for marker, site in () if markers is None else markers.sites.items():
@@ -111,8 +155,78 @@ def start_tracker(
                 f"marker {marker}: expected one of the sites {', '.join(body.site_names)}, found {site!r}"
             )
     tracker = Tracker(body, config=config if config is not None else Config())
-    tracker.reset(joints=dict(init.joints), fit_sizes=True)
+    if isinstance(init, Init) and init.stamp_s is None:
+        tracker.reset(joints=dict(init.joints), fit_sizes=True)
     return tracker
+
+
+def starts_of(init: Beginning | None) -> Starts | None:
+    """Where a tracker without a pose takes its first one from, for `track`; None: from whatever the recording offers."""
+    if isinstance(init, Init) and init.stamp_s is not None:
+        return Starts((GivenStart(init.joints, init.stamp_s),), by_tracker=False)
+    return Starts((EarlierStart(init),), by_tracker=False) if isinstance(init, Track) else None
+
+
+def first_pose(
+    recording: Recording,
+    tracker: Tracker,
+    *,
+    settings: FrontEndSettings | None = None,
+    starts: Starts | None = None,
+    after: float = float("-inf"),
+) -> Estimate | None:
+    """Step a tracker until somebody is found; the estimate of that frame, or None.
+
+    Args:
+        recording: read while looking.
+        tracker: without a pose; it has one afterwards.
+        settings, starts: see `voodoo.pipeline.run.track`.
+        after: frames before this time [s] are left out.
+
+    Raises:
+        VoodooError: damage in the recording, or a frame that the tracker refuses.
+    """
+    front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
+    for recorded in paired(recording):
+        if recorded.stamp >= after - _ROUNDED_S:
+            estimate = front_end.step(recorded)
+            if front_end.search.posed:
+                return estimate
+    return None
+
+
+def pose_as_init(estimate: Estimate, body: Body) -> Init:
+    """The pose of a frame as a first pose, with its time and, of a person, the stature.
+
+    Args:
+        estimate: with a pose.
+        body: with the sizes it has.
+    """
+    common = Body.human(model="papers").site_names
+    names = [name for name in body.site_names if name in common] or list(body.site_names)
+    joints = {name: tuple(round(float(value), 4) for value in estimate.joints[name]) for name in names}
+    return Init.model_validate({"height_m": stature(body), "stamp_s": float(estimate.stamp), "joints": joints})
+
+
+def stature(body: Body) -> float | None:
+    """Stature [m] of a body that is divided like the default human; None of another one."""
+    for model in get_args(HumanModel):
+        human = Body.human(model=model)
+        if human.limb_names == body.limb_names:
+            return round(_DEFAULT_M * _upright(body) / _upright(human), 3)
+    return None
+
+
+def _upright(body: Body) -> float:
+    """Height [m] at rest from the lowest ankle to the highest place."""
+    heights = [place[2] for bone in bones(body) for place in (bone.head, bone.tip)]
+    return float(max(heights) - min(heights))
+
+
+def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
+    """Whether there is nothing but lasers to start from: skin tells no posture."""
+    kinds = {input_of(sensor.kind) for sensor in recording.info().sensors} - {None, "skin"}
+    return kinds & set(use if use is not None else inputs()) == {"scan"}
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -27,9 +27,9 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
         raise RecordingError(f"{path}: expected an object with a list of people, found {content!r:.80}")
     found = []
     for index, person in enumerate(people):
-        if person == {}:  # Pose2Sim writes this where it found nobody
-            continue
         flat = person.get("pose_keypoints_2d") if isinstance(person, dict) else None
+        if person == {} or flat == []:  # Pose2Sim and OpenPose write these where they found no body
+            continue
         if not isinstance(flat, list) or not all(isinstance(value, (int, float)) for value in flat):
             raise RecordingError(f"{path}, person {index}: expected a list of numbers pose_keypoints_2d")
         if len(flat) != 3 * count:

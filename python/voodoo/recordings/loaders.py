@@ -73,12 +73,19 @@ LOADERS: dict[str, Loader] = {
 }
 
 
-def open_recording(path: str | Path, *, loader: str | None = None, **options: Any) -> Recording:  # noqa: ANN401
+def open_recording(
+    path: str | Path,
+    *,
+    loader: str | None = None,
+    bare: bool = False,
+    **options: Any,  # noqa: ANN401
+) -> Recording:
     """Open a recording.
 
     Args:
         path: file or folder.
         loader: name in LOADERS; guessed from the path when None.
+        bare: leave out first pose, truth and reference, and read none of the files beside the recording that hold them.
         **options: of the loader, e.g. `use=("depth", "scan")`, `root_frame="odom"` for bags; see RosRecording,
             UtdMhadRecording and FolderRecording.
 
@@ -94,6 +101,8 @@ def open_recording(path: str | Path, *, loader: str | None = None, **options: An
         raise RecordingError(f"{path}: expected a recording, found no such file or folder")
     name = guess_loader(path) if loader is None else loader
     known = options_of(name)
+    if bare and "bare" in known:
+        options["bare"] = True
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise RecordingError(

@@ -79,12 +79,13 @@ class MarkerRecording(Recording):
         path: the file.
         markers: what its markers mean; None: they have names of the default human's sites, or Pose2Sim's. Others are
             not used.
+        bare: the first instant is no start; its markers are measurements like any others.
 
     Raises:
         RecordingError: the file is damaged.
     """
 
-    def __init__(self, path: Path, markers: MarkerMap | None = None) -> None:
+    def __init__(self, path: Path, markers: MarkerMap | None = None, *, bare: bool = False) -> None:
         """Read the file."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
         self.map = markers or MarkerMap()
@@ -103,7 +104,8 @@ class MarkerRecording(Recording):
         if len(set(sites)) != len(sites):
             raise RecordingError(f"{path}: expected one marker for each site, found {', '.join(sorted(sites))}")
         first = {name: at for name, at in self._at(0).items() if name not in self.map.limbs}
-        self.start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
+        start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
+        self.start = None if bare else start
         self.reference = None
 
     def _at(self, index: int) -> dict[str, FloatArray]:

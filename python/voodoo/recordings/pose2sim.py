@@ -53,13 +53,20 @@ class Pose2SimRecording(Recording):
         layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
         rate: images per second; nothing in the folder tells it (`voodoo track --option rate=30`).
         cameras: names to use, as in the calibration file; None means all.
+        bare: no .trc is read.
 
     Raises:
         RecordingError: a part is missing or not of that form.
     """
 
     def __init__(
-        self, path: Path, layout: str = "body25b", rate: float = 60.0, cameras: tuple[str, ...] | None = None
+        self,
+        path: Path,
+        layout: str = "body25b",
+        rate: float = 60.0,
+        cameras: tuple[str, ...] | None = None,
+        *,
+        bare: bool = False,
     ) -> None:
         """Read calibration, the names of the keypoint files and the reference; see the class."""
         self.path = path
@@ -90,7 +97,7 @@ class Pose2SimRecording(Recording):
         counts = {len(files) for files in self._files}
         if len(counts) != 1 or counts == {0}:
             raise RecordingError(f"{path}: expected as many keypoint files for every camera, found {sorted(counts)}")
-        self.reference = self._read_reference()
+        self.reference = None if bare else self._read_reference()
         self.start = None if self.reference is None else _start(self.reference)
 
     def _read_reference(self) -> Reference | None:

@@ -42,7 +42,7 @@ class RosRecording(Recording):
     and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover` repair
     it), as is one whose index announces other messages than it holds.
 
-    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`.
+    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`, unless `bare`.
 
     Args:
         path: see voodoo.recordings.ros_bag.Bag.
@@ -53,6 +53,7 @@ class RosRecording(Recording):
         root_frame: by default base_link if the bag's transforms know it, else the frame of the first sensor.
         metres_per_unit: of 16-bit depth images.
         tf_max_age: how old a changing transform may be [s].
+        bare: read nothing that lies beside the bag.
 
     Raises:
         RecordingError: the bag is damaged, or calibration, transforms or usable topics are missing.
@@ -71,6 +72,7 @@ class RosRecording(Recording):
         root_frame: str | None = None,
         metres_per_unit: float = 0.001,
         tf_max_age: float = 0.5,
+        bare: bool = False,
     ) -> None:
         """Survey topics and transforms; see the class."""
         if isinstance(use, str) or not use or not set(use) <= set(TOPIC_KINDS):
@@ -96,7 +98,7 @@ class RosRecording(Recording):
 
         place = path if path.suffix == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
-        truth, start = find_beside(place, "truth.csv"), find_beside(place, "init.json")
+        truth, start = (None if bare else find_beside(place, name) for name in ("truth.csv", "init.json"))
         self.reference = None if truth is None else read_truth(truth, self._root_from_truth)
         self.start = None if start is None else read_start(start, self._root_from_truth(self._driver.first_stamp))
 

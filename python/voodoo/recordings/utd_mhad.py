@@ -58,12 +58,13 @@ class UtdMhadRecording(Recording):
 
     Args:
         path: the *_depth.mat file; the skeleton is expected in ../Skeleton/*_skeleton.mat (no reference without it).
+        bare: the skeleton is not read.
 
     Raises:
         RecordingError: damaged, or not of the data set's form.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, bare: bool = False) -> None:
         """Read depth and skeleton; see the class."""
         self.path = path
         self.name = path.name.removesuffix("_depth.mat").removesuffix(".mat")
@@ -75,7 +76,7 @@ class UtdMhadRecording(Recording):
             )
         self._depth: npt.NDArray[np.uint16] = depth
         skeleton = path.parent.parent / "Skeleton" / f"{self.name}_skeleton.mat"
-        self.reference = _read_skeleton(skeleton, len(self)) if skeleton.is_file() else None
+        self.reference = _read_skeleton(skeleton, len(self)) if not bare and skeleton.is_file() else None
         self.start = None if self.reference is None else _start(self.reference)
 
     def __len__(self) -> int:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 from voodoo.recordings.recording import Recording
@@ -13,6 +18,8 @@ from voodoo.sensors.kinds import input_of, inputs
 from voodoo.sensors.model import PLANAR_LASER, POINTS_SHARING, PixelNoise, RangeNoise, SensorModel
 from voodoo.sensors.skin.settings import SkinSettings
 
+Box: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Two opposite corners [m], the lower one first."""
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 
@@ -36,10 +43,12 @@ class FrontEndSettings:
         marker_sigma: standard deviation [m] of a marker that is given without one.
         depth_filter: what is dropped from depth images; None takes them as they are.
         skin: settings of the skin-colour cue.
+        exclude: boxes (low, high), two corners [m] in the root frame: nobody is looked for in them, and nothing in them is the
+            body's.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
 
     Raises:
-        MeasurementError: an unknown kind, or no finite least confidence.
+        MeasurementError: an unknown kind, no finite least confidence, or a box without corners or without inside.
     """
 
     use: tuple[str, ...] = field(default_factory=inputs)
@@ -57,11 +66,14 @@ class FrontEndSettings:
     marker_sigma: float = 0.02
     depth_filter: DepthFilter | None = None
     skin: SkinSettings = field(default_factory=SkinSettings)
+    exclude: tuple[Box, ...] = ()
     ground_z: float | None = None
 
     def __post_init__(self) -> None:
         """Check the kinds, and what would silently let everything in."""
         check_confidence(self.min_confidence)
+        for box in self.exclude:
+            _check_box(box)
         unknown = sorted(set(self.use) - set(inputs()))
         if unknown or not self.use:
             raise MeasurementError(f"use: expected some of {', '.join(inputs())}, found {', '.join(unknown) or 'none'}")
@@ -82,3 +94,20 @@ class FrontEndSettings:
                 f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(settings.use)}"
             )
         return replace(settings, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
+
+
+def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
+    """Which places (N, 3) [m] lie in one of the boxes."""
+    inside = np.zeros(len(places), dtype=bool)
+    for low, high in boxes:
+        inside |= ((places >= low) & (places <= high)).all(axis=1)
+    return inside
+
+
+def _check_box(box: Box) -> None:
+    """Refuse a box that excludes nothing."""
+    low, high = box
+    if not all(math.isfinite(value) for value in (*low, *high)) or not all(
+        a < b for a, b in zip(low, high, strict=True)
+    ):
+        raise MeasurementError(f"exclude: expected two corners in metres, the lower one first, found {low} and {high}")

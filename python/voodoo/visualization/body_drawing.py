@@ -16,7 +16,12 @@ _FACETS = 64
 
 
 def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View) -> None:
-    """Draw limbs as shaded, half transparent solids with outlines, far ones first, then joints and sites."""
+    """Draw limbs as shaded, half transparent solids with outlines, far ones first, then joints and sites.
+
+    Nothing is drawn while nobody is tracked.
+    """
+    if not estimate.joints:
+        return
     limbs = []
     for limb in body.limbs:
         root_from_limb = np.asarray(estimate.world_from_limb[limb.name], dtype=np.float64)

@@ -59,8 +59,8 @@ def limb_colours(body: Body) -> dict[str, tuple[int, int, int]]:
 def nearest_limb(points: FloatArray, estimate: Estimate, body: Body) -> npt.NDArray[np.intp]:
     """(N,) index of the limb whose surface is nearest to each world point (N, 3), the number of limbs for the
     background."""
-    if not len(points):
-        return np.empty(0, dtype=np.intp)
+    if not len(points) or not len(estimate.joint_positions):
+        return np.full(len(points), len(body.limbs), dtype=np.intp)
     distances = np.full((len(body.limbs) + 1, len(points)), np.inf)
     distances[-1] = _ON_BODY_M
     low = estimate.joint_positions.min(axis=0) - 0.4

@@ -13,6 +13,7 @@ from voodoo._core import Estimate
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import Axes, CameraView, TopView
+from voodoo.names import SEARCHING
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
@@ -25,7 +26,7 @@ from voodoo.visualization.sheet import contact_sheet, side_by_side
 
 __all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
 
-_STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250)}
+_STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250), SEARCHING: (230, 190, 110)}
 _LOOK_AHEAD, _MOST_PANELS = 5, 4
 _TARGET_HEIGHT = 640
 _TOP_SIZE, _TOP_METRES = 720, 6.0
@@ -44,6 +45,8 @@ class Overlay:
         self._axes: Axes = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
         self._range: tuple[float, float] | None = None
         self._origin: float | None = None
+        # What a view from above shows until somebody is found.
+        self._centre = (0.0, 0.0, 0.0)
         found: dict[str, Pictured] = {}
         for recorded in islice(paired(recording), _LOOK_AHEAD):
             for item in _pictured(recorded):
@@ -81,9 +84,10 @@ class Overlay:
             canvas = OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
             pictures.append(_drawn(canvas, recorded, body, estimate, front_end))
         if not pictures:
-            joints = np.array(list(estimate.joints.values()))
-            x, y, z = (float(value) for value in np.median(joints, axis=0))
-            top = TopView((x, y, z), _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
+            if estimate.joints:
+                x, y, z = (float(value) for value in np.median(list(estimate.joints.values()), axis=0))
+                self._centre = x, y, z
+            top = TopView(self._centre, _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
             pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, body, estimate, front_end))
         picture = side_by_side(pictures)
         self._origin = estimate.stamp if self._origin is None else self._origin
@@ -129,10 +133,12 @@ def _drawn(
 
 
 def caption(picture: Picture, text: str, estimate: Estimate) -> None:
-    """Write frame number, status and residual into the top left corner."""
+    """Write frame number, status and, if there is one, residual into the top left corner."""
     size = picture.shape[0] / 1100.0
     status = str(estimate.status)
-    parts = [(text, INK), (status, _STATUS.get(status, INK)), (f"{1e3 * estimate.residual:.0f} mm", INK)]
+    parts = [(text, INK), (status, _STATUS.get(status, INK))]
+    if np.isfinite(estimate.residual):
+        parts.append((f"{1e3 * estimate.residual:.0f} mm", INK))
     x, y = round(22 * size), round(42 * size)
     for part, color in parts:
         for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):  # a dark rim keeps it legible over bright depth

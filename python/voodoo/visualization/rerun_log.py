@@ -68,7 +68,7 @@ class StepLog:
     def outlines(self, path: str, item: Pictured) -> None:
         """See Log."""
         outlines, colours = [], []
-        for limb in self.body.limbs:
+        for limb in self.body.limbs if self.estimate.joints else ():
             view = CameraView(item.camera, item.root_from_sensor)
             outline = limb_outline(limb.shape, self.estimate.world_from_limb[limb.name], view)
             if outline is not None:

@@ -124,6 +124,11 @@ class Viewer:
             rows = [(0, "background", (0, 0, 0, 0))]
             rows += [(index, name, (*colours[name], 255)) for index, name in enumerate(self._classes, start=1)]
             self._stream.log("world", rr.AnnotationContext(rows), static=True)
+        if not estimate.joints:
+            # Nobody is there; the meshes have to be sent again for the next person.
+            self._stream.log("world/body", rr.Clear(recursive=True))
+            self._shapes = {}
+            return
         for limb in body.limbs:
             path = f"world/body/limbs/{limb.name}"
             if self._shapes.get(limb.name) != limb.shape:

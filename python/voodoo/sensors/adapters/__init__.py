@@ -9,10 +9,10 @@ from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.adapters.keypoints import KeypointsAdapter
 from voodoo.sensors.adapters.markers import MarkersAdapter
 from voodoo.sensors.adapters.points import PointsAdapter, ScanAdapter
-from voodoo.sensors.adapters.registry import adapter_of, register, unregister
+from voodoo.sensors.adapters.registry import adapter_of, all_adapters, register, unregister
 from voodoo.sensors.adapters.skin import SkinAdapter
 
 for _adapter in (DepthAdapter(), PointsAdapter(), ScanAdapter(), KeypointsAdapter(), SkinAdapter(), MarkersAdapter()):
     register(_adapter)
 
-__all__ = ["Adapter", "Canvas", "Context", "Log", "Memory", "adapter_of", "register", "unregister"]
+__all__ = ["Adapter", "Canvas", "Context", "Log", "Memory", "adapter_of", "all_adapters", "register", "unregister"]

@@ -26,6 +26,9 @@ M = TypeVar("M")
 T = TypeVar("T")
 
 
+_TYPICAL_RANGE_M = 3.0
+
+
 class Memory:
     """What the adapters of one front end keep from frame to frame, by name and sensor."""
 
@@ -51,6 +54,10 @@ class Memory:
         value: T = self._kept[key]
         return value
 
+    def drop(self, name: str) -> None:
+        """Forget what is kept under a name, of all sensors."""
+        self._kept = {key: value for key, value in self._kept.items() if key[0] != name}
+
     def put(self, name: str, sensor: str, value: object) -> None:
         """Keep something of a sensor in place of what was kept."""
         self._kept[name, sensor] = value
@@ -63,7 +70,7 @@ class Context:
     Attributes:
         stamp: of the frame [s].
         measurements: all of the frame, without those of frozen sensors.
-        predicted: site name -> (3,) expected at the frame's time [m], root frame.
+        predicted: site name -> (3,) expected at the frame's time [m], root frame; empty while nobody is tracked.
         settings: what is used, and how much it is believed.
         tracker: not yet stepped; its estimate is the last one.
         predictor: where sites are at other times.
@@ -92,9 +99,11 @@ class Context:
         return [item for item in self.measurements if isinstance(item, DepthImage)]
 
     def range_weight(self, noise: RangeNoise | None, sharing: float, root_from_sensor: FloatArray) -> float:
-        """Weight of a range at the body's distance from a sensor; 1 without a noise."""
+        """Weight of a range at the body's distance from a sensor, 3 m while nobody is tracked; 1 without a noise."""
         if noise is None:
             return 1.0
+        if not self.predicted:
+            return self.settings.model.weight(noise.sigma(_TYPICAL_RANGE_M), sharing=sharing)
         body = np.mean(list(self.predicted.values()), axis=0)
         away = max(float(np.linalg.norm(in_sensor(root_from_sensor, body[None])[0])), 0.1)
         return self.settings.model.weight(noise.sigma(away), sharing=sharing)
@@ -119,6 +128,7 @@ class Adapter(ABC, Generic[M]):
         recorded_as: what recordings call such a sensor (`SensorInfo.kind`); "": as `kind`.
         panel: place of its pictures in an overlay, the least first; None: it has none.
         panel_of_its_own: False: no panel where another camera's picture shows the same.
+        while_searching: whether `add` is called when nobody is tracked; then nothing is predicted.
     """
 
     kind: ClassVar[str]
@@ -126,6 +136,7 @@ class Adapter(ABC, Generic[M]):
     recorded_as: ClassVar[str] = ""
     panel: ClassVar[int | None] = None
     panel_of_its_own: ClassVar[bool] = True
+    while_searching: ClassVar[bool] = False
 
     def content(self, item: M) -> npt.NDArray[Any] | None:
         """What was measured, to tell a frozen sensor from one that has noise; None: it may repeat itself."""
@@ -141,6 +152,9 @@ class Adapter(ABC, Generic[M]):
 
     def learn(self, item: M, estimate: Estimate, memory: Memory, *, vouched: bool) -> None:
         """Learn from the estimate of a frame; `vouched`: somebody set the pose it started from."""
+
+    def forget(self, memory: Memory) -> None:
+        """The person is gone: forget what belongs to them alone."""
 
     def picture(self, item: M) -> npt.NDArray[Any] | None:
         """What a camera saw: colours (H, W, 3) BGR uint8, or depths (H, W) float32 [m]; None: no picture is known."""

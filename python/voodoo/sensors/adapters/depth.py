@@ -20,6 +20,7 @@ class DepthAdapter(Adapter[DepthImage]):
     kind = "depth"
     measurement = DepthImage
     panel = 0
+    while_searching = True
 
     def content(self, item: DepthImage) -> npt.NDArray[Any]:
         """The image."""

@@ -67,6 +67,10 @@ class KeypointsAdapter(Adapter[KeypointImage]):
         for site, (position, sigma) in points.items():
             frame.add_position(site, position, weight=chosen.model.weight(sigma), source=item.sensor)
 
+    def forget(self, memory: Memory) -> None:
+        """Nobody's keypoints are used."""
+        memory.drop(self.kind)
+
     def draw(self, item: KeypointImage, canvas: Canvas, memory: Memory) -> None:
         """Rings in the picture they were found in, fainter with less confidence."""
         for person in item.people:

@@ -21,6 +21,7 @@ class PointsAdapter(Adapter[PointCloud]):
 
     kind = "points"
     measurement = PointCloud
+    while_searching = True
 
     def content(self, item: PointCloud) -> npt.NDArray[Any]:
         """The points."""
@@ -47,6 +48,7 @@ class ScanAdapter(Adapter[LaserScan]):
 
     kind = "scan"
     measurement = LaserScan
+    while_searching = True
 
     def content(self, item: LaserScan) -> npt.NDArray[Any]:
         """The ranges."""

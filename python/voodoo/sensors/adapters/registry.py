@@ -34,6 +34,11 @@ def unregister(kind: str) -> None:
     remove_kind(kind)
 
 
+def all_adapters() -> tuple[Adapter[Any], ...]:
+    """All that are known."""
+    return tuple(_adapters.values())
+
+
 def adapter_of(item: object) -> Adapter[Any]:
     """The adapter of a measurement, or of the nearest class it inherits from.
 

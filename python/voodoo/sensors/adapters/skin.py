@@ -65,6 +65,10 @@ class SkinAdapter(Adapter[ColorImage]):
             # The first frame shows the pose that was set; without it a colour camera alone would never begin.
             skin.learn(item.image, item.camera, item.root_from_sensor, estimate, vouched=vouched)
 
+    def forget(self, memory: Memory) -> None:
+        """The next person's skin has other colours."""
+        memory.drop(self.kind)
+
     def picture(self, item: ColorImage) -> npt.NDArray[Any]:
         """The image."""
         return item.image

@@ -1,0 +1,97 @@
+"""`voodoo init`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from voodoo.cli.common import clear_errors, numbers_of, refuse_both, topics_of
+from voodoo.cli.options import (
+    BodyOption,
+    ConfigOption,
+    ExcludeOption,
+    FrameOption,
+    HeightOption,
+    LoaderNumberOption,
+    LoaderOption,
+    ModelOption,
+    RecordingArgument,
+    TopicOption,
+    UseOption,
+)
+from voodoo.errors import VoodooError
+
+
+def init_command(
+    recording: RecordingArgument,
+    at: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="Look from here on: seconds after the first frame, or a stamp. By default from the first frame.",
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where to write; by default to stdout.")] = None,
+    body: BodyOption = None,
+    height: HeightOption = None,
+    model: ModelOption = None,
+    config: ConfigOption = None,
+    use: UseOption = None,
+    exclude: ExcludeOption = None,
+    topic: TopicOption = None,
+    frame: FrameOption = None,
+    loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
+) -> None:
+    """Find the first pose and write it as JSON, as --init of voodoo track reads it.
+
+    It is that of the first frame at or after S in which somebody is found: joints in metres in the recording's root frame,
+    the stature, and the frame's stamp. A start, truth or reference that lies beside the recording is not read. Edit the file
+    and give it to voodoo track where the start is wrong. Exit code 1 if nobody is found.
+
+    Examples
+
+    voodoo init walk_bag/
+
+    voodoo init walk_bag/ --at 2.5 --out start.json
+    """
+    from dataclasses import replace
+
+    from voodoo.cli.running import boxes_of, config_of, kinds_of, opened
+    from voodoo.model.body import Body
+    from voodoo.pipeline.start import AUTO, first_pose, pose_as_init, start_tracker
+    from voodoo.sensors.settings import FrontEndSettings
+
+    with clear_errors():
+        refuse_both("--body", body, **{"--height": height, "--model": model})
+        kinds, boxes = kinds_of(use), boxes_of(exclude)
+        source = opened(recording, loader, frame, bare=True, **topics_of(topic), **numbers_of(option))
+        about = source.info()
+        after = about.start_stamp
+        if at is not None:
+            after = at if at > about.duration else about.start_stamp + at
+            if not about.start_stamp <= after <= about.start_stamp + about.duration:
+                raise VoodooError(
+                    f"--at: expected 0 to {about.duration:.3f} s, or a stamp from {about.start_stamp:.3f} s on, found {at}"
+                )
+        tracker = start_tracker(
+            source,
+            init=AUTO,
+            body=None if body is None else Body.load(body),
+            height=height,
+            model=model,
+            config=config_of(config),
+            use=kinds,
+        )
+        settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
+        estimate = first_pose(source, tracker, settings=settings, after=after)
+        if estimate is None:
+            raise VoodooError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
+        text = pose_as_init(estimate, tracker.body).to_json()
+        if out is None:
+            typer.echo(text)
+        else:
+            out.write_text(text + "\n", encoding="utf-8")
+            typer.echo(f"{source.name}: pose at {estimate.stamp:.3f} s; wrote {out}")

@@ -1,0 +1,23 @@
+"""First poses from whatever a recording offers: one file a source, best first."""
+
+from voodoo.pipeline.starts.base import Found, Seen, StartFinder
+from voodoo.pipeline.starts.cameras import CamerasStart
+from voodoo.pipeline.starts.chosen import Starts, automatic_starts
+from voodoo.pipeline.starts.given import EarlierStart, GivenStart
+from voodoo.pipeline.starts.keypoints_depth import KeypointsDepthStart
+from voodoo.pipeline.starts.legs import LegsStart
+from voodoo.pipeline.starts.markers import MarkersStart
+
+__all__ = [
+    "CamerasStart",
+    "EarlierStart",
+    "Found",
+    "GivenStart",
+    "KeypointsDepthStart",
+    "LegsStart",
+    "MarkersStart",
+    "Seen",
+    "StartFinder",
+    "Starts",
+    "automatic_starts",
+]

@@ -1,0 +1,177 @@
+"""What a source of first poses is: it looks at frames until it has joints."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.model.body import Body
+from voodoo.sensors.pixels import FloatArray
+from voodoo.sensors.settings import FrontEndSettings
+
+TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")
+"""Sites of a person's trunk: three that do not lie on a line say where it is and which way it faces."""
+BONES_M: dict[tuple[str, str], tuple[float, float]] = {
+    ("l_shoulder", "r_shoulder"): (0.12, 0.60),
+    ("l_hip", "r_hip"): (0.06, 0.45),
+    **{
+        (f"{s}_{a}", f"{s}_{b}"): limits
+        for s in "lr"
+        for a, b, limits in (
+            ("shoulder", "hip", (0.22, 0.85)),
+            ("shoulder", "elbow", (0.12, 0.50)),
+            ("elbow", "wrist", (0.10, 0.45)),
+            ("hip", "knee", (0.18, 0.70)),
+            ("knee", "ankle", (0.18, 0.65)),
+            ("wrist", "hand", (0.01, 0.25)),
+            ("ankle", "toe", (0.04, 0.35)),
+        )
+    },
+}
+"""Least and greatest distance [m] of two sites, from a child of 1 m to a man of 2.1 m, with 5 cm of error at either end; parents
+first."""
+_ON_A_LINE_M = 0.04
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a finder may look at: one frame, before anybody is tracked.
+
+    Args:
+        stamp: of the frame [s].
+        measurements: those of the kinds in use, without frozen sensors.
+        body: what is to be tracked.
+        settings: of the front end.
+    """
+
+    stamp: float
+    measurements: Sequence[Any]
+    body: Body
+    settings: FrontEndSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A first pose.
+
+    Args:
+        joints: site name -> (3,) [m], root frame; they fix the pose of the body.
+        sigma: site name -> standard deviation of its position [m].
+        by: which finder found it.
+    """
+
+    joints: Mapping[str, FloatArray]
+    sigma: Mapping[str, float]
+    by: str
+
+
+class StartFinder(ABC):
+    """Looks at frames, one after the other, until it has a first pose.
+
+    Attributes:
+        name: for messages.
+        given: somebody vouches for the pose; what is wrong with it is an error.
+    """
+
+    name: ClassVar[str]
+    given: ClassVar[bool] = False
+
+    @abstractmethod
+    def look(self, seen: Seen) -> Found | None:
+        """The first pose, if this frame (with those before it) shows one."""
+
+
+def fixes_pose(joints: Mapping[str, npt.ArrayLike], body: Body) -> bool:
+    """Whether three of the positions do not lie on a line; of a person, three of the trunk's."""
+    of_trunk = [name for name in TRUNK if name in body.site_names]
+    names = [name for name in joints if name in body.site_names and (len(of_trunk) < 3 or name in of_trunk)]
+    if len(names) < 3:
+        return False
+    places = np.array([joints[name] for name in names], dtype=np.float64)
+    spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    return bool(spread[1] > _ON_A_LINE_M)
+
+
+def without_impossible(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The joints, without those that make a bone no person has, and without what hangs on them.
+
+    Of a bad bone of an arm or leg the far end goes. A trunk with a bad bone leaves nothing.
+    """
+    kept = dict(joints)
+    for (near, far), (least, most) in BONES_M.items():
+        if near not in kept or far not in kept:
+            continue
+        if least <= float(np.linalg.norm(kept[near] - kept[far])) <= most:
+            continue
+        if near in TRUNK and far in TRUNK:
+            return {}
+        for name in _BEYOND.get(far, (far,)):
+            kept.pop(name, None)
+    return kept
+
+
+def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The joints, without those that make a bone out of proportion to the trunk, and without what hangs on them.
+
+    A hidden joint has the depth of what hides it, which makes its bones too short or too long. A trunk seen from the side,
+    whose far half is hidden, leaves nothing.
+    """
+    trunk = [
+        np.linalg.norm(joints[f"{s}_shoulder"] - joints[f"{s}_hip"])
+        for s in "lr"
+        if {f"{s}_shoulder", f"{s}_hip"} <= joints.keys()
+    ]
+    if not trunk:
+        return {}
+    stature = float(np.mean(trunk)) / _OF_STATURE["l_shoulder", "l_hip"]
+    kept = dict(joints)
+    for (near, far), share in _OF_STATURE.items():
+        if near not in kept or far not in kept:
+            continue
+        length = float(np.linalg.norm(kept[near] - kept[far])) / stature
+        if _SHORTER * share <= length <= _LONGER * share:
+            continue
+        if near in TRUNK and far in TRUNK:
+            return {}
+        for name in _BEYOND.get(far, (far,)):
+            kept.pop(name, None)
+    return kept
+
+
+_SHORTER, _LONGER = 0.6, 1.6
+"""Bones of people differ from these shares by a tenth; the rest is 4 cm of error at either end."""
+_OF_STATURE: dict[tuple[str, str], float] = {
+    ("l_shoulder", "r_shoulder"): 0.224,
+    ("l_hip", "r_hip"): 0.104,
+    **{
+        (f"{s}_{a}", f"{s}_{b}"): share
+        for s in "lr"
+        for a, b, share in (
+            ("shoulder", "hip", 0.294),
+            ("shoulder", "elbow", 0.186),
+            ("elbow", "wrist", 0.146),
+            ("hip", "knee", 0.245),
+            ("knee", "ankle", 0.246),
+        )
+    },
+    ("l_shoulder", "skullbase"): 0.146,
+    ("l_shoulder", "head_center"): 0.164,
+    ("l_shoulder", "skull_tip"): 0.211,
+}
+"""Distances of sites in statures, those of the default human; parents first."""
+_BEYOND = {
+    f"{side}_{joint}": tuple(f"{side}_{name}" for name in beyond)
+    for side in "lr"
+    for joint, beyond in {
+        "elbow": ("elbow", "wrist", "hand"),
+        "wrist": ("wrist", "hand"),
+        "knee": ("knee", "ankle", "toe"),
+        "ankle": ("ankle", "toe"),
+    }.items()
+}
+"""A joint and what hangs on it."""

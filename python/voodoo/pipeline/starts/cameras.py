@@ -1,0 +1,140 @@
+"""A first pose from the keypoints of two or more calibrated cameras, triangulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from voodoo.measurements import KeypointImage
+from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose, without_impossible
+from voodoo.sensors.keypoints.sites import site_pixels
+from voodoo.sensors.pixels import FloatArray, ray_distance, world_rays
+from voodoo.sensors.rays import SiteRay
+from voodoo.sensors.triangulation import Place, place_of
+
+_TOGETHER_S = 0.05
+"""Pictures of one instant: a walking wrist goes 10 cm in that time."""
+_BASELINE_M = 0.1
+"""Cameras nearer to each other see no depth with 4 px of error."""
+_SAME_PERSON_M = 0.15
+"""Median distance of a person's rays in one camera from the places that others found: half the way to a neighbour."""
+_LEAST_SITES = 6
+_WORST_SIGMA_M = 0.10
+_TYPICAL_RANGE_M = 3.0
+"""At this range a pixel's error is taken before the place is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Person:
+    """Somebody in one camera: a ray for each site."""
+
+    camera: str
+    rays: dict[str, SiteRay]
+
+
+class CamerasStart(StartFinder):
+    """The first frame in which two cameras agree on a whole trunk and some limbs; of several people, the one seen best."""
+
+    name = "keypoints of several cameras"
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self._latest: dict[str, KeypointImage] = {}
+
+    def look(self, seen: Seen) -> Found | None:
+        """See StartFinder."""
+        for item in seen.measurements:
+            if isinstance(item, KeypointImage):
+                self._latest[item.sensor] = item
+        images = [item for item in self._latest.values() if abs(seen.stamp - item.stamp) <= _TOGETHER_S]
+        views = [[person for rows in item.people if (person := _person(item, rows, seen))] for item in images]
+        best: tuple[float, dict[str, Place]] | None = None
+        for one, other in combinations([view for view in views if view], 2):
+            for pair in ((first, second) for first in one for second in other):
+                places = _together(pair, views)
+                score = sum(float(place.trust.sum()) for place in places.values())
+                if places and (best is None or score > best[0]) and _stands(places, seen):
+                    best = score, places
+        if best is None:
+            return None
+        joints = _joints(best[1])
+        return Found(joints, {name: best[1][name].sigma for name in joints}, self.name)
+
+
+def _joints(places: dict[str, Place]) -> dict[str, FloatArray]:
+    return without_impossible({name: place.position for name, place in places.items()})
+
+
+def _stands(places: dict[str, Place], seen: Seen) -> bool:
+    """Whether places are a person that the body can be fitted to."""
+    joints = _joints(places)
+    return len(joints) >= _LEAST_SITES and fixes_pose(joints, seen.body)
+
+
+def _person(item: KeypointImage, rows: FloatArray, seen: Seen) -> _Person | None:
+    """One person of one image; None with too few keypoints."""
+    chosen = seen.settings
+    sites, _ = site_pixels(rows, layout=item.layout, min_confidence=chosen.min_confidence)
+    sites = [site for site in sites if site.site in seen.body.site_names]
+    if len(sites) < _LEAST_SITES:
+        return None
+    origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in sites])
+    focal = float(np.sqrt(item.camera.fx * item.camera.fy))
+    rays = {}
+    for site, direction in zip(sites, directions, strict=True):
+        if np.isfinite(direction).all():
+            sigma = chosen.keypoint_noise.sigma(_TYPICAL_RANGE_M, focal, confidence=site.confidence, spread=site.spread)
+            rays[site.site] = SiteRay(site.site, origin, direction, sigma, item.sensor)
+    return _Person(item.sensor, rays) if len(rays) >= _LEAST_SITES else None
+
+
+def _together(pair: Sequence[_Person], views: Sequence[Sequence[_Person]]) -> dict[str, Place]:
+    """The places of a person seen in two cameras, with the rays of those in other cameras that are the same person."""
+    group = list(pair)
+    places = _places(group) if _gap(*pair) < 2.0 * _SAME_PERSON_M else {}
+    if len(places) < _LEAST_SITES:
+        return {}
+    for view in views:
+        if view and view[0].camera not in {person.camera for person in group}:
+            away, nearest = min(((_away(person, places), person) for person in view), key=lambda each: each[0])
+            if away < _SAME_PERSON_M:
+                group.append(nearest)
+    return places if len(group) == len(pair) else _places(group)
+
+
+def _gap(one: _Person, other: _Person) -> float:
+    """Median distance [m] of the rays of the same sites in two cameras: people who are not the same are far apart."""
+    shared = [name for name in one.rays if name in other.rays]
+    if len(shared) < _LEAST_SITES:
+        return float("inf")
+    first, second = ([person.rays[name] for name in shared] for person in (one, other))
+    across = np.cross([ray.direction for ray in first], [ray.direction for ray in second])
+    between = second[0].origin - first[0].origin
+    return float(np.median(np.abs(across @ between) / np.maximum(np.linalg.norm(across, axis=1), 1e-9)))
+
+
+def _away(person: _Person, places: dict[str, Place]) -> float:
+    """Median distance [m] of a person's rays from places."""
+    shared = [name for name in person.rays if name in places]
+    if len(shared) < _LEAST_SITES:
+        return float("inf")
+    rays = [person.rays[name] for name in shared]
+    directions = np.array([ray.direction for ray in rays])
+    positions = np.array([places[name].position for name in shared])
+    return float(np.median(ray_distance(rays[0].origin, directions, positions)))
+
+
+def _places(group: Sequence[_Person]) -> dict[str, Place]:
+    """Where the rays of one person in several cameras meet."""
+    origins = [next(iter(person.rays.values())).origin for person in group]
+    if max(float(np.linalg.norm(a - b)) for a, b in combinations(origins, 2)) < _BASELINE_M:
+        return {}
+    found = {}
+    for name in {name: None for person in group for name in person.rays}:
+        place = place_of([person.rays[name] for person in group if name in person.rays])
+        if place is not None and place.sigma < _WORST_SIGMA_M:
+            found[name] = place
+    return found

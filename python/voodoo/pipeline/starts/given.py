@@ -1,0 +1,69 @@
+"""A first pose that somebody gave, for a certain time; and the poses of an earlier result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from voodoo.export.track import Track
+from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose
+
+_SAME_TIME_S = 0.02
+"""Stamps that differ by less are one frame's, by no more than half a period of the result."""
+_ROUNDED_S = 1e-6
+_GIVEN_SIGMA_M = 0.03
+_USABLE = ("tracking", "degraded")
+
+
+class GivenStart(StartFinder):
+    """Joints in the first frame at or after a time.
+
+    Args:
+        joints: site name -> (x, y, z) [m], root frame.
+        stamp: [s].
+    """
+
+    name = "given"
+    given = True
+
+    def __init__(self, joints: Mapping[str, Sequence[float]], stamp: float) -> None:
+        """Keep both."""
+        self._joints = {name: np.asarray(position, dtype=np.float64) for name, position in joints.items()}
+        self._stamp = stamp
+
+    def look(self, seen: Seen) -> Found | None:
+        """See StartFinder."""
+        if seen.stamp < self._stamp - _ROUNDED_S:
+            return None
+        return Found(self._joints, dict.fromkeys(self._joints, _GIVEN_SIGMA_M), self.name)
+
+
+class EarlierStart(StartFinder):
+    """The pose of an earlier result in the first frame that has one.
+
+    Args:
+        result: of `voodoo track`, of this recording or of another of the same scene and clock.
+    """
+
+    name = "earlier result"
+    given = True
+
+    def __init__(self, result: Track) -> None:
+        """Keep the frames that can be relied on."""
+        steps = np.diff(result.stamps)
+        self._near = min(_SAME_TIME_S, 0.5 * float(np.median(steps))) if len(steps) else _SAME_TIME_S
+        self._result = result.of_frames(np.array([word in _USABLE for word in result.status], dtype=bool))
+
+    def look(self, seen: Seen) -> Found | None:
+        """See StartFinder."""
+        result = self._result
+        if not len(result):
+            return None
+        row = int(np.argmin(np.abs(result.stamps - seen.stamp)))
+        if abs(result.stamps[row] - seen.stamp) > self._near:
+            return None
+        pairs = zip(result.joint_names, result.joints[row], strict=True)
+        joints = {name: position for name, position in pairs if name in seen.body.site_names}
+        sigma = dict.fromkeys(joints, _GIVEN_SIGMA_M)
+        return Found(joints, sigma, self.name) if fixes_pose(joints, seen.body) else None

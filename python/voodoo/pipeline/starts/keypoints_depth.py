@@ -1,0 +1,93 @@
+"""A first pose from keypoints and depth: each keypoint lies behind the surface that a depth camera sees there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+import voodoo._core as _core
+from voodoo.measurements import DepthImage, KeypointImage
+from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose, in_proportion, without_impossible
+from voodoo.sensors.depth import depth_points
+from voodoo.sensors.keypoints.sensor import POINT_SIGMA_M
+from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
+from voodoo.sensors.keypoints.surface import behind_surface
+from voodoo.sensors.pixels import FloatArray, in_sensor, world_rays
+
+_TOGETHER_S = 0.05
+"""Pictures of one instant: a walking wrist goes 10 cm in that time."""
+_LEAST_SITES = 6
+_AROUND = 2.5
+"""The surface is looked for within so many pixels, as in a window of 5 x 5; of a coarser depth camera, so many of its."""
+
+_Person: TypeAlias = dict[str, tuple[FloatArray, float]]
+"""Site -> place (3,) and standard deviation [m]."""
+
+
+class KeypointsDepthStart(StartFinder):
+    """The first frame with a person whose trunk and some limbs a depth camera sees, too; of several people, the nearest."""
+
+    name = "keypoints with depth"
+
+    def look(self, seen: Seen) -> Found | None:
+        """See StartFinder."""
+        depths = [item for item in seen.measurements if isinstance(item, DepthImage)]
+        images = [item for item in seen.measurements if isinstance(item, KeypointImage)]
+        best: tuple[float, _Person] | None = None
+        for item in images:
+            for person in _people(item, depths, seen):
+                places = np.array([place for place, _ in person.values()])
+                away = float(np.median(in_sensor(item.root_from_sensor, places)[:, 2]))
+                if best is None or away < best[0]:
+                    best = away, person
+        if best is None:
+            return None
+        joints = {name: place for name, (place, _) in best[1].items()}
+        return Found(joints, {name: sigma for name, (_, sigma) in best[1].items()}, self.name)
+
+
+def _people(item: KeypointImage, depths: Sequence[DepthImage], seen: Seen) -> Iterator[_Person]:
+    """The people of an image that can be started from, with the depth image that is nearest in time."""
+    near = [depth for depth in depths if abs(depth.stamp - item.stamp) <= _TOGETHER_S]
+    if not near or not item.people:
+        return
+    depth = min(near, key=lambda each: (abs(each.stamp - item.stamp), each.camera != item.camera))
+    pixels, z = _seen_from(depth, item)
+    for rows in item.people:
+        sites, _ = site_pixels(rows, layout=item.layout, min_confidence=seen.settings.min_confidence)
+        sites = [site for site in sites if site.site in seen.body.site_names]
+        if len(sites) >= _LEAST_SITES:
+            person = _placed(sites, item, pixels, z, seen, coarse=item.camera.fx / depth.camera.fx)
+            kept = in_proportion(without_impossible({name: place for name, (place, _) in person.items()}))
+            if len(kept) >= _LEAST_SITES and fixes_pose(kept, seen.body):
+                yield {name: person[name] for name in kept}
+
+
+def _seen_from(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray, FloatArray]:
+    """Where the points of a depth image are in the keypoints' image, (N, 2), and their depths there (N,) [m]."""
+    points, valid = depth_points(depth)
+    local = in_sensor(item.root_from_sensor, points[valid])
+    local = local[local[:, 2] > 0.0]
+    return item.camera.project(local), np.ascontiguousarray(local[:, 2])
+
+
+def _placed(
+    sites: Sequence[SitePixel], item: KeypointImage, pixels: FloatArray, z: FloatArray, seen: Seen, *, coarse: float
+) -> _Person:
+    """The sites that have a surface behind their keypoint."""
+    origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in sites])
+    focal = math.sqrt(item.camera.fx * item.camera.fy)
+    placed: _Person = {}
+    for site, direction in zip(sites, directions, strict=True):
+        found = _core.nearest_surface(pixels, z, None, pixel=site.pixel, radius=_AROUND * max(coarse, 1.0))
+        if found is None or not np.isfinite(direction).all():
+            continue
+        surface = found[0] / float(direction @ item.root_from_sensor[:3, 2])
+        noise = seen.settings.keypoint_noise
+        sigma = noise.sigma(found[0], focal, confidence=site.confidence, spread=site.spread)
+        place = origin + direction * (surface + behind_surface(site.site))
+        placed[site.site] = np.asarray(place), math.hypot(sigma, POINT_SIGMA_M)
+    return placed

@@ -1,0 +1,129 @@
+"""A first pose from a planar laser: two things of a leg's size that walk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations, permutations
+
+import numpy as np
+
+from voodoo.measurements import LaserScan
+from voodoo.model.legs import HALF_WIDTH, HIP, LEG
+from voodoo.model.projection import transform
+from voodoo.pipeline.starts.base import Found, Seen, StartFinder
+from voodoo.sensors.free_space import FreeSpace
+from voodoo.sensors.pixels import FloatArray
+from voodoo.sensors.settings import Box, within_boxes
+
+SITES = ("l_hip", "r_hip", "l_ankle", "r_ankle")
+_GAP_M = 0.10
+"""Neighbouring returns farther apart than this are of two things."""
+_WIDTH_M = (0.04, 0.28)
+"""From a child's shin, of which half is seen, to wide trousers; the middle of a leg is half a shin behind its surface."""
+_SHIN_RADIUS_M = 0.05
+_APART_M = (0.08, 0.70)
+"""Distance of the middles of two legs, from standing to a long step."""
+_COME = 0.6
+"""So much of a leg must stand where nothing stood: its rim may lie in a cell with something else."""
+_FASTEST = 2.5
+"""A swinging shin of somebody who walks [m/s]."""
+_PATIENCE_S = 0.6
+"""The one leg may hide the other for so long [s]."""
+_STATURE_M, _SHIN_HEIGHT_M = 1.75, 0.30
+"""Of whoever it is, and the height of a laser over a floor that is not known."""
+_MOVED_M = 0.05
+"""A pair that went less far tells nothing of where it faces."""
+_SIGMA_M = 0.10
+_LEVEL = 0.97
+"""Cosine of the tilt up to which a laser cuts shins."""
+
+
+class LegsStart(StartFinder):
+    """Two legs that have come, in two scans one after the other; of several people, the nearest.
+
+    What stands where the laser looked through before has come, and is no furniture. Somebody who has not moved since the
+    first scan cannot be told from it.
+
+    It serves bodies of legs only (`voodoo.model.legs`): a laser cannot tell how a whole person stands. The root frame must
+    stand still on the floor, as odom does; from a frame that drives along, nobody is found.
+    """
+
+    name = "legs in a laser"
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self._free: dict[str, FreeSpace] = {}
+        self._last: tuple[float, list[FloatArray]] | None = None
+
+    def look(self, seen: Seen) -> Found | None:
+        """See StartFinder."""
+        names = seen.body.site_names
+        if not set(SITES) <= set(names) or "l_shoulder" in names:
+            return None
+        for item in seen.measurements:
+            if isinstance(item, LaserScan) and item.root_from_sensor[2, 2] >= _LEVEL:
+                free = self._free.setdefault(item.sensor, FreeSpace())
+                found = self._pair(item, _leg_middles(item, free, seen.settings.exclude))
+                if found is not None:
+                    return _found(*found, item, seen)
+        return None
+
+    def _pair(self, scan: LaserScan, middles: list[FloatArray]) -> tuple[FloatArray, FloatArray] | None:
+        """Two legs (2, 2) [m] that were seen before, and how they went on since (2,); the nearest to the laser."""
+        before, self._last = self._last, (scan.stamp, middles) if len(middles) > 1 else self._last
+        if before is None or not 0.0 < scan.stamp - before[0] <= _PATIENCE_S:
+            return None
+        reach = _FASTEST * (scan.stamp - before[0])
+        origin = scan.root_from_sensor[:2, 3]
+        pairs = []
+        for legs in map(np.array, combinations(middles, 2)):
+            apart = float(np.linalg.norm(legs[0] - legs[1]))
+            if _APART_M[0] <= apart <= _APART_M[1]:
+                for earlier in map(np.array, permutations(before[1], 2)):
+                    if float(np.linalg.norm(legs - earlier, axis=1).max()) <= reach:
+                        away = float(np.linalg.norm(legs.mean(axis=0) - origin))
+                        pairs.append((away, legs, (legs - earlier).mean(axis=0)))
+        if not pairs:
+            return None
+        _, legs, moved = min(pairs, key=lambda pair: pair[0])
+        return legs, moved
+
+
+def _leg_middles(scan: LaserScan, free: FreeSpace, exclude: Sequence[Box]) -> list[FloatArray]:
+    """Middles (2,) [m], in the root frame, of what is of a leg's size and has come; the map learns the scan."""
+    points = scan.points()
+    come = free.come(scan) & ~within_boxes(transform(scan.root_from_sensor, points), exclude)
+    free.learn(scan)
+    if len(points) < 2:
+        return []
+    cuts = np.flatnonzero(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) > _GAP_M) + 1
+    middles = []
+    for part, new in zip(np.split(points, cuts), np.split(come, cuts), strict=True):
+        beam = scan.angle_increment * float(np.linalg.norm(part[0]))
+        width = float(np.linalg.norm(part[-1] - part[0])) + beam
+        if len(part) >= 2 and _WIDTH_M[0] <= width <= _WIDTH_M[1] and new.mean() >= _COME:
+            middle = part.mean(axis=0)
+            middle *= 1.0 + _SHIN_RADIUS_M / max(float(np.linalg.norm(middle)), _SHIN_RADIUS_M)
+            middles.append(transform(scan.root_from_sensor, middle[None])[0, :2])
+    return middles
+
+
+def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, seen: Seen) -> Found:
+    """Legs that stand under the middle of the pair; across their line they face where they went."""
+    between = legs[1] - legs[0]
+    middle = legs.mean(axis=0)
+    ahead = np.array([-between[1], between[0]])
+    if float(np.linalg.norm(moved)) > _MOVED_M:
+        ahead = moved
+    ahead = ahead / np.linalg.norm(ahead)
+    left = np.array([-ahead[1], ahead[0]])
+    height = float(scan.root_from_sensor[2, 3])
+    ground = seen.settings.ground_z
+    floor = height - _SHIN_HEIGHT_M if ground is None else ground
+    joints: dict[str, FloatArray] = {}
+    for side, sign, leg in zip("lr", (1.0, -1.0), sorted(legs, key=lambda leg: -float(leg @ left)), strict=True):
+        hip = np.array([*(middle + sign * HALF_WIDTH * _STATURE_M * left), floor + HIP * _STATURE_M])
+        shin = np.array([*leg, height])
+        joints[f"{side}_hip"] = hip
+        joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * LEG * _STATURE_M
+    return Found(joints, dict.fromkeys(joints, _SIGMA_M), LegsStart.name)

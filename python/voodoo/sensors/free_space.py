@@ -1,0 +1,72 @@
+"""Where a laser has looked through: what stands there later has come, and is no furniture."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.measurements import LaserScan
+from voodoo.model.projection import transform
+from voodoo.sensors.pixels import FloatArray
+
+CELL_M, SIZE_M = 0.10, 40.0
+"""Side of a cell, half a leg; and of the map, around where the laser was first."""
+_LEAST_PASSES = 3
+_SHARE = 0.2
+"""A cell that returned more than this share of the beams that came to it may be furniture, as may its neighbours."""
+_ALL_NEW = 0.4
+"""Where more than this share of all returns has come, the map is wrong: the frame moves."""
+
+
+class FreeSpace:
+    """A map of cells in the plane of one laser, in a frame that stands still."""
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self._origin: FloatArray | None = None
+        count = round(SIZE_M / CELL_M)
+        self._passes = np.zeros((count, count), dtype=np.float32)
+        self._hits = np.zeros((count, count), dtype=np.float32)
+
+    def come(self, scan: LaserScan) -> npt.NDArray[np.bool_]:
+        """Which valid returns (N,) of a scan stand where its laser looked through before, and have not stood there long.
+
+        None at all where nearly everything is new.
+        """
+        places = transform(scan.root_from_sensor, scan.points())[:, :2]
+        if self._origin is None or not len(places):
+            return np.zeros(len(places), dtype=bool)
+        share = self._hits / np.maximum(self._passes + self._hits, 1.0)
+        about = cv2.dilate(share, np.ones((3, 3), np.uint8))
+        open_ = (self._passes >= _LEAST_PASSES) & (about < _SHARE)
+        cells, inside = self._cells(places)
+        new = np.zeros(len(places), dtype=bool)
+        new[inside] = open_[cells[:, 0], cells[:, 1]]
+        return new & (new.mean() <= _ALL_NEW)
+
+    def learn(self, scan: LaserScan) -> None:
+        """Take up a scan; a laser that has left the map starts a new one."""
+        origin = scan.root_from_sensor[:2, 3]
+        if self._origin is None or np.abs(origin - self._origin).max() > SIZE_M / 4.0:
+            self._origin = np.array(origin)
+            self._passes[:], self._hits[:] = 0.0, 0.0
+        places = transform(scan.root_from_sensor, scan.points())[:, :2]
+        way = places - origin
+        reach = np.linalg.norm(way, axis=1)
+        steps = np.arange(CELL_M, min(float(reach.max(initial=0.0)), SIZE_M), CELL_M)
+        # A beam passes the cells before its own.
+        passed = (steps[None] < reach[:, None] - CELL_M)[..., None]
+        along = origin + (way / np.maximum(reach, CELL_M)[:, None])[:, None] * steps[None, :, None]
+        for grid, where in ((self._passes, along[passed[..., 0]]), (self._hits, places)):
+            cells, _ = self._cells(where)
+            seen = np.zeros(grid.shape, dtype=bool)
+            seen[cells[:, 0], cells[:, 1]] = True
+            grid += seen
+
+    def _cells(self, places: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+        """Rows and columns (M, 2) of the places (N, 2) that lie in the map, and which do (N,)."""
+        origin = np.zeros(2) if self._origin is None else self._origin
+        cells = np.floor((places - origin + SIZE_M / 2.0) / CELL_M).astype(np.intp)
+        inside = np.asarray(((cells >= 0) & (cells < len(self._passes))).all(axis=1))
+        return cells[inside], inside

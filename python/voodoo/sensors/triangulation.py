@@ -1,0 +1,101 @@
+"""Places from rays, without a prediction: where several cameras see one site."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.sensors.pixels import FloatArray
+from voodoo.sensors.rays import SiteRay
+
+AGREE_M = 0.08
+"""A ray that passes a place by this much speaks for it a quarter as loud as one through it: networks err by 2 to 6 cm."""
+TRUSTED = 0.25
+"""A ray with less trust does not see the place."""
+_STEPS = 20
+_MOVED_M = 1e-4
+_PARALLEL = 1e-3
+"""Rays whose directions differ by less than 2 degrees (sine squared) fix no place."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where rays meet.
+
+    Args:
+        position: (3,) [m], world.
+        sigma: standard deviation along the worst direction [m].
+        trust: of each ray, in [0, 1].
+    """
+
+    position: FloatArray
+    sigma: float
+    trust: FloatArray
+
+    @property
+    def seen_by(self) -> npt.NDArray[np.bool_]:
+        """Which rays (N,) see it."""
+        return np.asarray(self.trust >= TRUSTED)
+
+
+def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> Place | None:
+    """Where the rays of one site meet, by robust least squares; None where fewer than two rays agree.
+
+    The meeting points of all pairs are tried; the one that most rays agree with is refined with the Geman-McClure weight
+    `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it, s = `scale` [m].
+    """
+    if len(rays) < 2:
+        return None
+    origins = np.array([ray.origin for ray in rays])
+    directions = np.array([ray.direction for ray in rays])
+    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    information = np.array([1.0 / ray.sigma**2 for ray in rays])
+    best: tuple[float, FloatArray] | None = None
+    for pair in combinations(range(len(rays)), 2):
+        point = _meeting(origins[list(pair)], directions[list(pair)], across[list(pair)])
+        if point is not None:
+            total = float(_trust(point, origins, directions, across, scale).sum())
+            if best is None or total > best[0]:
+                best = total, point
+    if best is None:
+        return None
+    point = best[1]
+    for _ in range(_STEPS):
+        weights = information * _trust(point, origins, directions, across, scale)
+        matrix = (weights[:, None, None] * across).sum(axis=0)
+        if float(np.linalg.eigvalsh(matrix)[0]) <= 0.0:
+            return None
+        moved = np.linalg.solve(matrix, np.einsum("n,nij,nj->i", weights, across, origins))
+        done = float(np.linalg.norm(moved - point)) < _MOVED_M
+        point = moved
+        if done:
+            break
+    trust = _trust(point, origins, directions, across, scale)
+    seeing = trust >= TRUSTED
+    if seeing.sum() < 2:
+        return None
+    matrix = (information[seeing, None, None] * across[seeing]).sum(axis=0)
+    least = float(np.linalg.eigvalsh(matrix)[0])
+    return Place(point, least**-0.5, trust) if least > 0.0 else None
+
+
+def _meeting(origins: FloatArray, directions: FloatArray, across: FloatArray) -> FloatArray | None:
+    """The point nearest to two rays; None for parallel ones, and behind a camera."""
+    if 1.0 - float(directions[0] @ directions[1]) ** 2 < _PARALLEL:
+        return None
+    point = np.linalg.solve(across.sum(axis=0), np.einsum("nij,nj->i", across, origins))
+    ahead = np.einsum("nj,nj->n", point - origins, directions)
+    return np.asarray(point) if (ahead > 0.0).all() else None
+
+
+def _trust(
+    point: FloatArray, origins: FloatArray, directions: FloatArray, across: FloatArray, scale: float
+) -> FloatArray:
+    towards = point - origins
+    distance2 = (np.einsum("nij,nj->ni", across, towards) ** 2).sum(axis=1)
+    trust = (scale**2 / (scale**2 + distance2)) ** 2
+    return np.where(np.einsum("nj,nj->n", towards, directions) > 0.0, trust, 0.0)
