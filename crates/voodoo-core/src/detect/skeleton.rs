@@ -14,7 +14,7 @@ pub fn take_lengths(joints: &mut [Vec3], lengths: &[f64]) {
 }
 
 /// What [`take_lengths`] takes, of joints: the mean of both sides.
-pub(super) fn lengths(joints: &[Vec3]) -> Vec<f64> {
+pub fn lengths(joints: &[Vec3]) -> Vec<f64> {
     let at = |name: &str| index(name).map_or(Vec3::ZERO, |index| joints[index]);
     let bone = |from: &str, to: &str| {
         0.5 * SIDES.iter().map(|side| at(&format!("{side}{from}")).distance(at(&format!("{side}{to}")))).sum::<f64>()

@@ -2,7 +2,7 @@
 //! whether a track is what it is taken for.
 
 use crate::body::{Body, Model};
-use crate::detect::{Detection, Detector, JOINTS, Surroundings, Wanted, take_lengths};
+use crate::detect::{Detection, Detector, JOINTS, Surroundings, Wanted, lengths, take_lengths};
 use crate::math::{Pose, Vec3};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::frame::Frame;
@@ -86,15 +86,34 @@ pub(super) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<P
     Some((body, poses))
 }
 
-/// A body with the lengths of `LENGTHS`, like on both sides.
-pub(super) fn with_sizes(reference: &Body, lengths: &[f64]) -> Option<Body> {
+/// People of one stature differ in the length of a limb by this share of it (standard deviation).
+const PROPORTIONS: f64 = 0.04;
+
+/// A body of these sizes, in the order of `LENGTHS`, each with its relative standard deviation; like on both sides. What is known
+/// badly is drawn to the proportions of the reference body.
+pub(super) fn with_sizes(reference: &Body, sizes: &[[f64; 2]]) -> Option<Body> {
     let rest = reference.rest_pose(Pose::identity());
     let mut joints = Vec::with_capacity(JOINTS.len());
     for name in JOINTS {
         joints.push(reference.site_position(&rest, reference.site_index(name).ok()?));
     }
-    take_lengths(&mut joints, lengths);
+    let lengths = in_proportion(&lengths(&joints), sizes);
+    take_lengths(&mut joints, &lengths);
     reference.fit(&positions(reference, &joints), true).ok().map(|(body, _)| body)
+}
+
+/// Lengths between those measured and the reference body's at the scale that fits best, by what is known of each.
+fn in_proportion(reference: &[f64], sizes: &[[f64; 2]]) -> Vec<f64> {
+    let ratios = || reference.iter().zip(sizes).map(|(own, [length, sigma])| ((length / own).ln(), sigma * sigma));
+    let spread = PROPORTIONS * PROPORTIONS;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (ratio, variance) in ratios() {
+        sum += ratio / (variance + spread);
+        weights += 1.0 / (variance + spread);
+    }
+    let scale = sum / weights;
+    let known = |(ratio, variance): (f64, f64)| scale + (ratio - scale) * spread / (spread + variance);
+    reference.iter().zip(ratios()).map(|(own, ratio)| own * known(ratio).exp()).collect()
 }
 
 /// The pose of the same body in other sizes: its limbs point where they did, and its sites lie there in the mean; world frame.
@@ -111,7 +130,10 @@ pub(super) fn placed(body: &Body, before: &Body, world_from_limb: &[Pose]) -> Ve
 /// The pose of a body that fits a detected person's joints best, world frame.
 pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
     let mut joints: Vec<Vec3> = detection.joints.iter().map(|joint| joint.position).collect();
-    take_lengths(&mut joints, &detection.sizes());
+    let rest = body.rest_pose(Pose::identity());
+    let own: Option<Vec<Vec3>> =
+        JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
+    take_lengths(&mut joints, &lengths(&own?));
     body.fit(&positions(body, &joints), false).ok().map(|(_, poses)| poses)
 }
 

@@ -2,9 +2,6 @@
 
 use crate::detect::Detection;
 
-/// Detections of one person err alike: no length is known better than this share of it by any of them.
-const ALIKE: f64 = 0.02;
-
 /// Sums of the logarithms of lengths, each weighted by how well a detection knows it.
 #[derive(Debug, Default)]
 pub(super) struct SeenSizes {
@@ -24,8 +21,7 @@ impl SeenSizes {
     pub(super) fn add(&mut self, detection: &Detection) {
         let sizes = detection.sizes();
         self.sums.resize(sizes.len(), [0.0; 2]);
-        for (index, ([sum, weights], size)) in self.sums.iter_mut().zip(sizes).enumerate() {
-            let sigma = detection.lengths.get(index).map_or(1.0, |length| length[1].hypot(ALIKE));
+        for ([sum, weights], [size, sigma]) in self.sums.iter_mut().zip(sizes) {
             let weight = 1.0 / (sigma * sigma);
             *sum += weight * size.ln();
             *weights += weight;
@@ -33,8 +29,9 @@ impl SeenSizes {
         self.count += 1;
     }
 
-    /// The mean lengths of several detections, metres.
-    pub(super) fn mean(&self) -> Option<Vec<f64>> {
-        (self.count > 1).then(|| self.sums.iter().map(|[sum, weights]| (sum / weights).exp()).collect())
+    /// The mean sizes of several detections, and how well these know them: detections of one person err alike.
+    pub(super) fn mean(&self) -> Option<Vec<[f64; 2]>> {
+        let mean = |[sum, weights]: &[f64; 2]| [(sum / weights).exp(), (self.count as f64 / weights).sqrt()];
+        (self.count > 1).then(|| self.sums.iter().map(mean).collect())
     }
 }
