@@ -12,7 +12,7 @@ from test_starts import AROUND, CAMERA, keypoints, person
 from voodoo import cli
 from voodoo.export import write_trc
 from voodoo.export.track import Track
-from voodoo.recordings import open_recording
+from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.pose2sim import SITES
 
 FRAMES, EMPTY = 6, 2
@@ -132,3 +132,19 @@ def test_markers_are_measurements_not_a_start_beside(run, tmp_path):
     result = Track.load("pose.csv")
     assert result.status[:EMPTY] == ("searching",) * EMPTY and "searching" not in result.status[EMPTY:]
     assert error_of(result, FRAMES - 1) < 0.03
+
+
+def test_depth_alone_starts_by_itself_and_excluded_nobody_is_there(run, tmp_path):
+    """The bundled recording, without and with what lies beside it; and with a box around the person."""
+    whole, bare = tmp_path / "rec", tmp_path / "bare" / "rec"
+    shutil.copytree(sample_path(), whole)
+    shutil.copytree(sample_path() / "bag", bare / "bag")
+    for folder, name in ((whole, "with"), (bare, "without")):
+        run("track", folder, "--init", "auto", "--use", "depth", "--out", f"{name}.csv")
+    assert (tmp_path / "with.csv").read_bytes() == (tmp_path / "without.csv").read_bytes()
+    result = Track.load("with.csv")
+    assert "searching" not in result.status[5:] and result.status[-1] != "lost"
+    box = "--exclude=0.5,-3,-1,6,3,3"
+    done = run("track", bare, box, "--use", "depth", "--out", "nobody.csv")
+    assert set(Track.load("nobody.csv").status) == {"searching"}
+    assert "nobody was found in 90 frames" in done.stderr
