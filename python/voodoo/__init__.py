@@ -7,7 +7,7 @@ from voodoo._moved import MOVED, install
 
 if TYPE_CHECKING:
     from voodoo import ik
-    from voodoo._core import ClosestPoints, Estimate, Frame, TaperedEllipticCylinder, __version__
+    from voodoo._core import ClosestPoints, Detection, Detector, Estimate, Frame, TaperedEllipticCylinder, __version__
     from voodoo.config import Config
     from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
     from voodoo.model.body import Body, Joint, Limb, Place
@@ -24,6 +24,8 @@ __all__ = [
     "ClosestPoints",
     "Config",
     "ConfigError",
+    "Detection",
+    "Detector",
     "Estimate",
     "Frame",
     "Joint",
@@ -43,7 +45,15 @@ __all__ = [
 
 # Names are imported when they are first used: `voodoo --help` needs neither NumPy nor OpenCV.
 _HOMES = {
-    "voodoo._core": ("ClosestPoints", "Estimate", "Frame", "TaperedEllipticCylinder", "__version__"),
+    "voodoo._core": (
+        "ClosestPoints",
+        "Detection",
+        "Detector",
+        "Estimate",
+        "Frame",
+        "TaperedEllipticCylinder",
+        "__version__",
+    ),
     "voodoo.config": ("Config",),
     "voodoo.errors": (
         "BodyError",

@@ -1,5 +1,6 @@
 """The compiled core. Arrays are NumPy; lengths in metres, times in seconds, angles in radians."""
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol, final
 
@@ -10,14 +11,18 @@ __all__ = [
     "Body",
     "Chain",
     "ClosestPoints",
+    "Detection",
+    "Detector",
     "Estimate",
     "Frame",
+    "PersonCandidate",
     "TaperedEllipticCylinder",
     "Tracker",
     "View",
     "__version__",
     "_estimate",
     "config_fields",
+    "person_candidates",
     "nearest_surface",
     "points_within",
     "render_depth",
@@ -343,6 +348,110 @@ class Frame:
         """
 
 @final
+class PersonCandidate:
+    """What may be a person in a depth image, with the picture of it that the network looks at. Camera frame, metres."""
+
+    @property
+    def crop(self) -> npt.NDArray[np.float32]:
+        """The picture (2, 96, 96): depth behind the middle by 1.2 m from -1 to 1, and the mask."""
+    @property
+    def mask(self) -> npt.NDArray[np.bool_]:
+        """Its pixels (H, W)."""
+    @property
+    def middle(self) -> tuple[float, float, float]:
+        """The picture's middle: (x/z, y/z) in the turned camera, and the depth [m]."""
+    @property
+    def roll(self) -> float:
+        """Angle by which the camera is turned about its optical axis for up to be up [rad]."""
+    @property
+    def area(self) -> float:
+        """Surface seen [m^2]."""
+    @property
+    def floor(self) -> tuple[tuple[float, float, float], float] | None:
+        """Normal and offset of the floor, told or found."""
+
+def person_candidates(
+    depth: npt.NDArray[np.float32],
+    *,
+    intrinsics: Sequence[float],
+    up: Sequence[float] | None = None,
+    floor: tuple[Sequence[float], float] | None = None,
+    most: int = 8,
+) -> list[PersonCandidate]:
+    """What may be a person in a depth image (H, W) [m]: what training cuts its pictures with.
+
+    Args:
+        depth: float32, 0 or NaN means no return.
+        intrinsics: (fx, fy, cx, cy) [px].
+        up: unit vector upwards in the camera's optical frame; None means upwards in the image.
+        floor: its unit normal and offset in that frame, normal . p = offset; None means that it is looked for.
+        most: so many are returned, those of a standing person's size first.
+
+    Raises:
+        MeasurementError: not such an array.
+    """
+
+@final
+class Detector:
+    """Finds people in depth images, with a small network that comes with the library.
+
+    Args:
+        weights: path of another network's weights, as training/ exports them; None means those that come with the library.
+
+    Raises:
+        MeasurementError: a file that holds no such weights.
+    """
+
+    def __new__(cls, *, weights: str | os.PathLike[str] | None = None) -> Detector: ...
+    def detect(self, frame: Frame, *, up: Sequence[float] | npt.NDArray[np.float64] | None = None) -> list[Detection]:
+        """The people in the depth images of a frame, the surest first.
+
+        Floor and boxes to leave out are those of the frame; what else it holds is not looked at. Releases the GIL.
+
+        Args:
+            frame: with at least one depth image.
+            up: (3,) unit vector upwards in the world, where the frame tells no floor; None means upwards in the image.
+
+        Raises:
+            MeasurementError: a measurement that cannot be used.
+        """
+
+@final
+class Detection:
+    """A person in a depth image. World frame, metres."""
+
+    @property
+    def joints(self) -> dict[str, npt.NDArray[np.float64]]:
+        """Joint name -> position (3,) [m]; `l_` and `r_` are the person's own."""
+    @property
+    def joint_sigma(self) -> dict[str, float]:
+        """Joint name -> standard deviation along each axis [m]."""
+    @property
+    def visible(self) -> dict[str, float]:
+        """Joint name -> probability that it is in the image and not hidden."""
+    @property
+    def lengths(self) -> dict[str, float]:
+        """Upper arm, forearm, thigh, shank, shoulder and hip width, trunk, neck and stature [m]."""
+    @property
+    def length_sigma(self) -> dict[str, float]:
+        """The same names -> standard deviation [m]."""
+    @property
+    def stature(self) -> float:
+        """Height of the person when standing upright [m]."""
+    @property
+    def facing(self) -> float:
+        """Probability that the front of the trunk shows."""
+    @property
+    def confidence(self) -> float:
+        """Probability that it is a person."""
+    @property
+    def source(self) -> str:
+        """The depth image it was found in."""
+    @property
+    def mask(self) -> npt.NDArray[np.bool_]:
+        """The pixels (H, W) of that image that show it."""
+
+@final
 class Estimate:
     """What a step found; immutable. World frame, metres, seconds."""
 
@@ -352,7 +461,7 @@ class Estimate:
     @property
     def status(self) -> str:
         """tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured,
-        or what is seen there is flat)."""
+        or what is seen there is flat), or searching (there is no pose: nobody was found)."""
     @property
     def steps(self) -> int:
         """ICP steps used."""

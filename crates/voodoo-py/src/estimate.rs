@@ -127,7 +127,7 @@ impl PyEstimate {
     }
 
     /// tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured,
-    /// or what is seen there is flat).
+    /// or what is seen there is flat), or searching (there is no pose: nobody was found).
     #[getter]
     fn status(&self) -> &'static str {
         status_word(self.estimate.status)

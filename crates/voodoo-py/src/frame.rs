@@ -37,6 +37,11 @@ impl PyFrame {
         Held { clouds, images, sites, ground: *ground }.borrow_for(py, body)
     }
 
+    /// Borrows the depth images alone.
+    pub fn borrow_images<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
+        Held { clouds: &[], images: &self.images, sites: &[], ground: self.ground }.borrow_for(py, body)
+    }
+
     fn source(&mut self, name: &str) -> u16 {
         let index = self.sources.iter().position(|known| known == name).unwrap_or_else(|| {
             self.sources.push(name.to_owned());

@@ -29,7 +29,7 @@ mod _core {
     #[pymodule_export]
     use super::config::config_fields;
     #[pymodule_export]
-    use super::detect::{PyCandidate, person_candidates};
+    use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
     #[pymodule_export]
     use super::estimate::{_estimate, PyEstimate};
     #[pymodule_export]

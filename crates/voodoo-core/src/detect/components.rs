@@ -96,7 +96,12 @@ impl Candidate {
         /// A place within several boxes belongs to the one whose middle is nearest.
         const TO_MIDDLE: f64 = 0.1;
         let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
-        outside + TO_MIDDLE * point.distance(0.5 * (self.low + self.high))
+        outside + TO_MIDDLE * point.distance(self.middle())
+    }
+
+    /// The middle of its box, camera frame.
+    pub(super) fn middle(&self) -> Vec3 {
+        0.5 * (self.low + self.high)
     }
 
     /// Whether both have a part in common.
@@ -307,4 +312,53 @@ fn unlikely(candidate: &Candidate) -> f64 {
     /// Surface of a standing person that a camera sees, square metres.
     const STANDING: f64 = 0.55;
     (candidate.area / STANDING).ln().abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::view::Surroundings;
+    use crate::testing::{before_wall, put_board, standing, with_frame};
+
+    /// What may be a person in an image of the unit tests' camera.
+    fn candidates(pixels: &[u16]) -> Vec<Candidate> {
+        with_frame(pixels, 0.0, |frame| {
+            let (mut view, mut found) = (View::default(), Vec::new());
+            view.read(&frame.images[0], &Surroundings::default());
+            Components::default().find(&view, &mut found);
+            found
+        })
+    }
+
+    #[test]
+    fn a_person_before_a_wall_is_a_candidate_and_the_wall_is_none() {
+        let (model, poses) = standing();
+        let found = candidates(&before_wall(&model.body, &poses));
+        assert_eq!(found.len(), 1, "{found:?}");
+        let (size, middle) = (found[0].high - found[0].low, found[0].middle());
+        assert!((1.5..1.85).contains(&size.y) && size.z < 0.5, "{size}");
+        assert!(middle.distance(poses[0].translation) < 0.25, "{middle}");
+    }
+
+    #[test]
+    fn a_person_cut_in_two_by_something_before_it_is_one_candidate() {
+        let (model, poses) = standing();
+        let mut pixels = before_wall(&model.body, &poses);
+        // A rail at the height of the hips, a metre before the body.
+        put_board(&mut pixels, Vec3::new(0.0, 0.03, 1.6), [1.5, 0.03]);
+        let found = candidates(&pixels);
+        let whole = found.iter().find(|candidate| candidate.labels.len() > 1);
+        assert!(whole.is_some_and(|whole| (whole.high - whole.low).y > 1.5), "{found:?}");
+    }
+
+    #[test]
+    fn nothing_and_what_is_flat_small_or_too_large_are_no_candidates() {
+        let size = before_wall(&standing().0.body, &standing().1).len();
+        assert_eq!(candidates(&vec![0; size]), []);
+        for (depth, half) in [(2.6, [0.3, 0.8]), (2.0, [0.05, 0.1]), (3.0, [1.4, 1.2])] {
+            let mut pixels = vec![0; size];
+            put_board(&mut pixels, Vec3::new(0.0, 0.0, depth), half);
+            assert_eq!(candidates(&pixels), [], "{half:?}");
+        }
+    }
 }

@@ -142,3 +142,51 @@ impl Draw {
         ((value ^ (value >> 31)) % count as u64) as usize
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::detect::view::Surroundings;
+    use crate::testing::image;
+
+    /// Edge of the image, and its focal length, pixels.
+    const EDGE: usize = 120;
+    const FOCAL: f64 = 100.0;
+
+    /// The floor found by a camera that looks down by `tilt` radians from 1.2 m above a floor, in a room that ends at 4.5 m.
+    fn found(tilt: f64, seen: impl Fn(Vec3) -> bool) -> Option<Ground> {
+        let (sin, cos) = tilt.sin_cos();
+        let up = Vec3::new(0.0, -cos, -sin);
+        let pixels: Vec<f32> = (0..EDGE * EDGE)
+            .map(|index| {
+                let half = 0.5 * (EDGE as f64 - 1.0);
+                let ray =
+                    Vec3::new(((index % EDGE) as f64 - half) / FOCAL, ((index / EDGE) as f64 - half) / FOCAL, 1.0);
+                let wall = 4.5;
+                let floor = -1.2 / up.dot(ray);
+                let z = if floor > 0.0 && floor < wall { floor } else { wall };
+                if seen(z * ray) { (z + 0.01 * (index as f64 * 12.9898).sin()) as f32 } else { 0.0 }
+            })
+            .collect();
+        let mut view = View::default();
+        view.read(&image(&pixels, EDGE, FOCAL), &Surroundings::default());
+        FloorFinder::default().find(&view, -Vec3::Y)
+    }
+
+    #[test]
+    fn a_floor_is_found_under_tilted_cameras() {
+        for tilt in [0.0_f64, 0.25, 0.5] {
+            let floor = found(tilt, |_| true).unwrap();
+            let up = Vec3::new(0.0, -tilt.cos(), -tilt.sin());
+            assert!(floor.normal.dot(up) > 0.9998, "tilt {tilt}: {:?}", floor.normal);
+            assert!((floor.offset + 1.2).abs() < 0.03, "tilt {tilt}: {}", floor.offset);
+        }
+    }
+
+    #[test]
+    fn a_wall_alone_is_no_floor_and_neither_is_nothing() {
+        assert_eq!(found(0.0, |point| point.z > 4.4), None);
+        assert_eq!(found(0.0, |_| false), None);
+    }
+}

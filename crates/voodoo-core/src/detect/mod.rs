@@ -4,6 +4,7 @@ mod components;
 pub mod crop;
 mod floor;
 pub mod network;
+mod rejections;
 pub mod segmentation;
 mod skeleton;
 mod view;
@@ -14,6 +15,7 @@ use crate::observation::frame::DepthImage;
 pub use components::Candidate;
 use crop::Crop;
 use network::{Answer, Memory, Network};
+use rejections::Rejections;
 use segmentation::Segmentation;
 pub use skeleton::take_lengths;
 use std::sync::{Arc, OnceLock};
@@ -45,10 +47,8 @@ pub const LENGTHS: [&str; 9] =
     ["upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck", "stature"];
 /// Log odds from which on a candidate is taken for a person.
 const PERSON: f32 = 0.0;
-/// Candidates of an image that the network looks at: costs time in proportion.
-const MOST_LOOKS: usize = 3;
-/// Log odds that make further candidates needless where one person is wanted.
-const SURE: f32 = 4.0;
+/// Candidates of an image that the network looks at where everybody is wanted: costs time in proportion.
+const MOST_LOOKS: usize = 12;
 /// The standard deviation of a Laplace distribution is this many times its scale.
 const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
 
@@ -57,8 +57,8 @@ const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
 pub enum Wanted {
     /// Everybody.
     All,
-    /// One person: the search ends at the first sure one.
-    Surest,
+    /// Anybody: one candidate is looked at in each image, those first that were not found to be nobody in the images before.
+    Anybody,
     /// The person at this place of the world, metres.
     Near(Vec3),
 }
@@ -102,6 +102,7 @@ pub struct Detector {
     found: Vec<Detection>,
     /// Log odds that what was looked at first of the last image is a person, and its box in the world.
     nearest: Option<(f64, Aabb)>,
+    rejections: Rejections,
 }
 
 /// The network that comes with the library, read once.
@@ -156,21 +157,26 @@ impl Detector {
             segmentation: Segmentation::default(),
             found: Vec::new(),
             nearest: None,
+            rejections: Rejections::default(),
         }
     }
 
     /// The people in an image, the surest first.
     pub fn detect(&mut self, image: &DepthImage, around: &Surroundings, wanted: Wanted) -> &[Detection] {
-        let Self { network, memory, segmentation, found, nearest } = self;
+        let Self { network, memory, segmentation, found, nearest, rejections } = self;
         found.clear();
         *nearest = None;
         segmentation.find(image, around);
         let camera_from_world = image.world_from_sensor.inverse();
         let mut order: Vec<usize> = (0..segmentation.candidates().len()).collect();
-        if let Wanted::Near(place) = wanted {
-            let place = camera_from_world * place;
-            let distance = |number: &usize| segmentation.candidates()[*number].distance(place);
-            order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let at = |number: usize| &segmentation.candidates()[number];
+        match wanted {
+            Wanted::All => {}
+            Wanted::Anybody => order.sort_by_key(|number| rejections.last(at(*number))),
+            Wanted::Near(place) => {
+                let place = camera_from_world * place;
+                order.sort_by(|a, b| at(*a).distance(place).total_cmp(&at(*b).distance(place)));
+            }
         }
         let mut looks = 0;
         for number in order {
@@ -184,12 +190,8 @@ impl Detector {
             if answer.person > PERSON {
                 found.push(detection(&answer, &crop, candidate, number, &image.world_from_sensor));
             }
-            let enough = match wanted {
-                Wanted::All => false,
-                Wanted::Surest => answer.person > SURE,
-                Wanted::Near(_) => answer.person > PERSON,
-            };
-            if looks == MOST_LOOKS || enough {
+            rejections.note(candidate, answer.person > PERSON);
+            if looks == MOST_LOOKS || wanted != Wanted::All {
                 break;
             }
         }

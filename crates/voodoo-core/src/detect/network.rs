@@ -362,3 +362,82 @@ fn place(map: &Map, joint: usize) -> [f32; 3] {
     }
     place.map(|value| value / sum)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that look random.
+    fn noise(count: usize, seed: f32) -> Vec<f32> {
+        (0..count).map(|index| ((index as f32 + seed) * 12.9898).sin()).collect()
+    }
+
+    #[test]
+    fn a_convolution_is_the_sum_over_its_kernel() {
+        for (edge, channels, outputs, kernel, stride, padding) in
+            [(8, 3, 5, 3, 2, 1), (12, 2, 4, 6, 4, 1), (5, 6, 2, 1, 1, 0)]
+        {
+            let map = Map { edge, channels, values: noise(edge * edge * channels, 0.3) };
+            let weights = noise(outputs * kernel * kernel * channels, 7.1);
+            let weight = DMatrix::from_row_slice(outputs, kernel * kernel * channels, &weights);
+            let layer = Convolution { weight, bias: noise(outputs, 1.7), kernel, stride, padding };
+            let (mut out, mut columns) = (Map::default(), vec![5.0; 3]);
+            layer.apply(&map, &mut out, &mut columns, false);
+            assert_eq!(out.edge, (edge + 2 * padding - kernel) / stride + 1);
+            for row in 0..out.edge {
+                for column in 0..out.edge {
+                    for output in 0..outputs {
+                        let mut sum = layer.bias[output];
+                        for (ky, kx) in (0..kernel).flat_map(|ky| (0..kernel).map(move |kx| (ky, kx))) {
+                            let (y, x) = (row * stride + ky, column * stride + kx);
+                            if y < padding || x < padding || y - padding >= edge || x - padding >= edge {
+                                continue;
+                            }
+                            for channel in 0..channels {
+                                let seen = map.values[((y - padding) * edge + x - padding) * channels + channel];
+                                sum += seen * weights[((output * kernel + ky) * kernel + kx) * channels + channel];
+                            }
+                        }
+                        let found = out.values[(row * out.edge + column) * outputs + output];
+                        assert!((found - sum).abs() < 1e-4, "{found} for {sum}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_joint_is_where_the_cells_that_count_put_it() {
+        let edge = 12;
+        let mut map = Map { edge, channels: 2 * A_JOINT, values: vec![0.0; edge * edge * 2 * A_JOINT] };
+        // Of the second joint one cell counts, in row 2 and column 9: half a cell beside its middle, 0.4 m behind.
+        let cell = WIDTH as f32 / edge as f32;
+        let at = (2 * edge + 9) * map.channels + A_JOINT;
+        map.values[at..at + A_JOINT].copy_from_slice(&[60.0, 0.5 * cell, -0.5 * cell, 0.4]);
+        let [x, y, z] = place(&map, 1);
+        assert!(
+            (x - 4.0 * cell).abs() < 1e-5 && (y + 4.0 * cell).abs() < 1e-5 && (z - 0.4).abs() < 1e-5,
+            "{x} {y} {z}"
+        );
+        // Of the first all count the same, and the middle is between them.
+        assert!(place(&map, 0).iter().all(|value| value.abs() < 1e-5));
+    }
+
+    #[test]
+    fn layers_that_do_not_fit_are_refused() {
+        let good = include_bytes!("person.weights");
+        let network = Network::read(good);
+        assert!(
+            network.as_ref().is_ok_and(|network| network.joints() == super::super::JOINTS.len()),
+            "{:?}",
+            network.err()
+        );
+        let end = good.windows(2).position(|pair| pair == b"\n\n").unwrap_or(0);
+        let header = String::from_utf8_lossy(&good[..end]).into_owned();
+        let line = header.lines().find(|line| line.starts_with("top4.weight")).unwrap_or_default();
+        // The same number of values in another shape.
+        let [name, out, ky, kx, inputs] = line.split(' ').collect::<Vec<_>>()[..] else { panic!("{line}") };
+        let changed = header.replace(line, &format!("{name} {inputs} {ky} {kx} {out}"));
+        assert!(Network::read(&[changed.as_bytes(), &good[end..]].concat()).is_err());
+    }
+}

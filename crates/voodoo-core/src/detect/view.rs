@@ -4,8 +4,8 @@ use crate::math::{Aabb, Pose, Vec3};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Ground};
 
-/// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 60 wide.
-const MOST_PIXELS: usize = 80_000;
+/// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 30 wide and 80 high.
+const MOST_PIXELS: usize = 26_000;
 /// What lies less than this above the floor is left out, metres: feet would join the person to the floor.
 const FLOOR_CLEARANCE: f64 = 0.06;
 /// Depths between which persons are looked for, metres.

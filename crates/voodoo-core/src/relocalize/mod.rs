@@ -68,7 +68,7 @@ impl Relocalizer {
 
     /// Body and poses of the surest person in a frame.
     pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.look(frame, None, Wanted::Surest)?;
+        let detection = self.people.look(frame, None, Wanted::Anybody)?;
         people::sized(model, detection)
     }
 
@@ -81,7 +81,7 @@ impl Relocalizer {
     /// was not where it should be in the frame before, or the body `lost`.
     pub fn look(&mut self, frame: &Frame, body: &Body, root: Vec3, doubtful: bool, lost: bool) {
         if self.doubt.due(frame.stamp, doubtful, lost) && People::know(body) {
-            self.people.look(frame, None, if lost { Wanted::Surest } else { Wanted::Near(root) });
+            self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
         } else {
             self.people.forget();
         }
