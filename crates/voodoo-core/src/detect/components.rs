@@ -19,9 +19,9 @@ const LEAST_PART: f64 = 0.004;
 /// Parts of a person that something hides the link of are at most so far apart, metres.
 const GAP: f64 = 0.28;
 /// Standard deviation of a flat part's points across it, metres: walls and table tops are no people.
-const FLAT: f64 = 0.022;
+const FLAT_PART: f64 = 0.022;
 /// Points of a part that distances are taken from.
-const SAMPLES: usize = 48;
+const PART_SAMPLES: usize = 48;
 /// Parts that are looked at, the largest first.
 const MOST_PARTS: usize = 40;
 /// No label.
@@ -34,7 +34,7 @@ struct Part {
     area: f64,
     low: Vec3,
     high: Vec3,
-    samples: [Vec3; SAMPLES],
+    samples: [Vec3; PART_SAMPLES],
     sampled: usize,
     /// Points so far, of which every so manyth was kept.
     seen: usize,
@@ -44,7 +44,7 @@ struct Part {
 
 impl Part {
     fn new(label: u32, area: f64) -> Self {
-        let samples = [Vec3::ZERO; SAMPLES];
+        let samples = [Vec3::ZERO; PART_SAMPLES];
         Self {
             label,
             area,
@@ -63,12 +63,12 @@ impl Part {
         self.low = self.low.min(point);
         self.high = self.high.max(point);
         if self.seen.is_multiple_of(self.every) {
-            if self.sampled == SAMPLES {
+            if self.sampled == PART_SAMPLES {
                 // Half of those that are kept make room.
-                for number in 0..SAMPLES / 2 {
+                for number in 0..PART_SAMPLES / 2 {
                     self.samples[number] = self.samples[2 * number];
                 }
-                (self.sampled, self.every) = (SAMPLES / 2, 2 * self.every);
+                (self.sampled, self.every) = (PART_SAMPLES / 2, 2 * self.every);
             }
             self.samples[self.sampled] = point;
             self.sampled += 1;
@@ -304,7 +304,7 @@ fn is_flat(points: &[Vec3]) -> bool {
         let from = Vector3::from((*point - mean).to_array());
         scatter += from * from.transpose() / count;
     }
-    scatter.symmetric_eigenvalues().min() < FLAT * FLAT
+    scatter.symmetric_eigenvalues().min() < FLAT_PART * FLAT_PART
 }
 
 /// How far the seen surface is from a standing person's, in powers of e.

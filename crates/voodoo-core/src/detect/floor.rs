@@ -5,7 +5,7 @@ use crate::math::Vec3;
 use crate::observation::frame::Ground;
 
 /// Points that are looked at, about.
-const SAMPLES: usize = 1200;
+const FLOOR_SAMPLES: usize = 1200;
 /// Planes that are tried.
 const TRIALS: usize = 96;
 /// A point is on the floor up to this distance from it, metres, and so much more by the square of its depth, 1/m.
@@ -63,7 +63,7 @@ impl FloorFinder {
         self.points.clear();
         self.level.clear();
         let seen = view.depth.iter().filter(|z| **z > 0.0).count();
-        let step = (seen / SAMPLES).max(1);
+        let step = (seen / FLOOR_SAMPLES).max(1);
         let beside = ((NEIGHBOUR * view.width as f64) as usize).max(2);
         for index in (0..view.depth.len()).filter(|index| view.depth[*index] > 0.0).step_by(step) {
             let point = view.point(index);

@@ -3,6 +3,7 @@
 mod components;
 pub mod crop;
 mod floor;
+mod names;
 pub mod network;
 mod rejections;
 pub mod segmentation;
@@ -14,6 +15,7 @@ use crate::math::{Aabb, Pose, Vec3};
 use crate::observation::frame::DepthImage;
 pub use components::Candidate;
 use crop::Crop;
+pub use names::{JOINTS, LENGTHS};
 use network::{Answer, Memory, Network};
 use rejections::Rejections;
 use segmentation::Segmentation;
@@ -22,29 +24,6 @@ use std::sync::{Arc, OnceLock};
 pub use view::Surroundings;
 use weights::WeightsError;
 
-/// Joints that the network tells, in its order (H-Anim names; `l_` and `r_` are the person's own).
-pub const JOINTS: [&str; 17] = [
-    "head_center",
-    "vc7",
-    "humanoid_root",
-    "l_shoulder",
-    "r_shoulder",
-    "l_elbow",
-    "r_elbow",
-    "l_wrist",
-    "r_wrist",
-    "l_hand",
-    "r_hand",
-    "l_hip",
-    "r_hip",
-    "l_knee",
-    "r_knee",
-    "l_ankle",
-    "r_ankle",
-];
-/// Lengths that it tells, in its order: distances of joints, and the stature.
-pub const LENGTHS: [&str; 9] =
-    ["upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck", "stature"];
 /// Log odds from which on a candidate is taken for a person.
 const PERSON: f32 = 0.0;
 /// Candidates of an image that the network looks at where everybody is wanted: costs time in proportion.

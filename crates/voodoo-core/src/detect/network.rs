@@ -428,7 +428,7 @@ mod tests {
         let good = include_bytes!("person.weights");
         let network = Network::read(good);
         assert!(
-            network.as_ref().is_ok_and(|network| network.joints() == super::super::JOINTS.len()),
+            network.as_ref().is_ok_and(|network| network.joints() == crate::detect::names::JOINTS.len()),
             "{:?}",
             network.err()
         );

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 const SAME_PLACE: f64 = 0.15;
 const SAME_AREA: f64 = 1.3;
 /// Things that are remembered, the last ones.
-const MOST: usize = 16;
+const MOST_REJECTED: usize = 16;
 
 /// Places in the camera's frame, the last one last.
 #[derive(Debug, Default)]
@@ -34,7 +34,7 @@ impl Rejections {
         self.looks += 1;
         self.places.retain(|place| !place.is(candidate));
         if !person {
-            if self.places.len() == MOST {
+            if self.places.len() == MOST_REJECTED {
                 self.places.remove(0);
             }
             self.places.push(Rejected { middle: candidate.middle(), area: candidate.area, look: self.looks });

@@ -1,13 +1,13 @@
 //! Joints at the distances that a person's sizes demand: every joint by itself is drawn towards the mean of where it may be,
 //! which makes limbs short.
 
-use super::JOINTS;
+use super::names::JOINTS;
 use crate::math::Vec3;
 
 /// Sides of the body, the person's own.
 const SIDES: [&str; 2] = ["l_", "r_"];
 
-/// Gives the limbs of joints as in [`JOINTS`] the lengths of [`LENGTHS`](super::LENGTHS), in directions that stay. The trunk's
+/// Gives the limbs of joints as in [`JOINTS`] the lengths of [`LENGTHS`](super::names::LENGTHS), in directions that stay. The trunk's
 /// middle stays where it is.
 pub fn take_lengths(joints: &mut [Vec3], lengths: &[f64]) {
     Skeleton { joints }.take_lengths(lengths);

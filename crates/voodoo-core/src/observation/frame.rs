@@ -250,6 +250,11 @@ impl<'a> Frame<'a> {
                 ));
             }
         }
+        self.check_scene()
+    }
+
+    /// Refuses a floor or boxes that cannot be meant.
+    fn check_scene(&self) -> Result<(), TrackError> {
         if let Some(ground) = self.ground
             && (!ground.offset.is_finite() || !ground.normal.is_normalized())
         {

@@ -11,9 +11,9 @@ const EVERY: [usize; 2] = [3, 5];
 /// A detection is elsewhere when the joints of its trunk are this far from the tracked ones in the mean, metres.
 const ELSEWHERE: f64 = 0.25;
 /// One detection counts for at most this, in log odds.
-const MOST: f64 = 4.0;
+const MOST_ODDS: f64 = 4.0;
 /// From this sum of log odds on it is tried.
-const ENOUGH: f64 = 4.0;
+const SURE_ELSEWHERE: f64 = 4.0;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
 /// A body that has been lost for so long is gone, seconds.
@@ -52,6 +52,11 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
+    /// Whether detections still tell the sizes.
+    pub(super) fn sizes_open(&self, stamp: f64) -> bool {
+        self.found_itself && self.young(stamp)
+    }
+
     /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;
@@ -77,11 +82,11 @@ impl Doubt {
         }
         let mean = apart.iter().sum::<f64>() / apart.len().max(1) as f64;
         if mean > ELSEWHERE {
-            self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST);
+            self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST_ODDS);
         } else {
             self.elsewhere = 0.0;
         }
-        self.elsewhere >= ENOUGH
+        self.elsewhere >= SURE_ELSEWHERE
     }
 
     /// Notes what a frame said: whether the body was lost, and what a detector says of what stands where it is tracked. Whether
@@ -89,7 +94,7 @@ impl Doubt {
     pub(super) fn nobody(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
         self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
         if let Some(person) = verdict {
-            self.nobody = if person > 0.0 { 0.0 } else { self.nobody + (-person).min(MOST) };
+            self.nobody = if person > 0.0 { 0.0 } else { self.nobody + (-person).min(MOST_ODDS) };
         }
         self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= GONE)
     }

@@ -81,16 +81,31 @@ impl People {
 
 /// A body of a detected person's sizes, like on both sides, and the pose that fits the joints best, world frame.
 pub(super) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<Pose>)> {
-    let reference = &model.reference_body;
+    let body = with_sizes(&model.reference_body, &detection.sizes())?;
+    let poses = posed(&body, detection)?;
+    Some((body, poses))
+}
+
+/// A body with the lengths of `LENGTHS`, like on both sides.
+pub(super) fn with_sizes(reference: &Body, lengths: &[f64]) -> Option<Body> {
     let rest = reference.rest_pose(Pose::identity());
     let mut joints = Vec::with_capacity(JOINTS.len());
     for name in JOINTS {
         joints.push(reference.site_position(&rest, reference.site_index(name).ok()?));
     }
-    take_lengths(&mut joints, &detection.sizes());
-    let (body, _) = reference.fit(&positions(reference, &joints), true).ok()?;
-    let poses = posed(&body, detection)?;
-    Some((body, poses))
+    take_lengths(&mut joints, lengths);
+    reference.fit(&positions(reference, &joints), true).ok().map(|(body, _)| body)
+}
+
+/// The pose of the same body in other sizes: its limbs point where they did, and its sites lie there in the mean; world frame.
+pub(super) fn placed(body: &Body, before: &Body, world_from_limb: &[Pose]) -> Vec<Pose> {
+    let mut poses = world_from_limb.to_vec();
+    body.close_joints(&mut poses);
+    let count = body.sites().len();
+    let moved = |site: usize| before.site_position(world_from_limb, site) - body.site_position(&poses, site);
+    let shift = (0..count).map(moved).sum::<Vec3>() / count.max(1) as f64;
+    poses.iter_mut().for_each(|pose| pose.translation += shift);
+    poses
 }
 
 /// The pose of a body that fits a detected person's joints best, world frame.

@@ -28,8 +28,8 @@ const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 #[derive(Debug, Default)]
 pub struct Sizes {
     open: bool,
-    /// Frames until the pose is good enough to fit the girths by it.
-    wait: usize,
+    /// The pose was not set exactly: it is fitted before the girths are.
+    rough: bool,
     /// What is known about the girths since the first frame fitted them; empty when they were given.
     girths: Vec<Girth>,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
@@ -39,10 +39,10 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// The pose was set: with `fit`, the next frame fits the sizes, and those that follow refine the lengths.
-    pub fn restart(&mut self, model: &Model, fit: bool, config: &Config) {
-        self.open = fit;
-        self.wait = 0;
+    /// The pose was set, exactly or as a detector saw it: with `fit`, the next frame fits the sizes, and those that follow refine
+    /// the lengths.
+    pub fn restart(&mut self, model: &Model, fit: bool, rough: bool, config: &Config) {
+        (self.open, self.rough) = (fit, rough);
         self.girths.clear();
         self.pairs.clear();
         if fit && config.fit_lengths {
@@ -50,9 +50,9 @@ impl Sizes {
         }
     }
 
-    /// The pose is rough: girths wait for it.
-    pub fn wait(&mut self, frames: usize) {
-        self.wait = frames;
+    /// The sizes are to be fitted, but the pose has to be first.
+    pub fn wait_for_pose(&self) -> bool {
+        self.open && self.rough
     }
 
     /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
@@ -72,10 +72,6 @@ impl Sizes {
     /// Fits the sizes to the first frame after a reset, whose pose is known.
     pub fn initialise(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
         if !self.open {
-            return;
-        }
-        if self.wait > 0 {
-            self.wait -= 1;
             return;
         }
         self.open = false;
@@ -255,7 +251,7 @@ mod tests {
         let (mut model, mut poses) = (Model::new(set.clone()), stand(set));
         let (before, start) = (model.clone(), poses.clone());
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
-        sizes.restart(&model, true, config);
+        sizes.restart(&model, true, false, config);
         with_setting(&pixels, config, &before, &start, |setting| {
             sizes.initialise(setting, &mut model, &mut poses, &mut fit);
             // The next frame is not the first.

@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, shifted};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
@@ -82,7 +82,7 @@ impl Tracker {
         self.fit.clear();
         self.hypotheses.restart(&self.model);
         self.relocalizer.restart(&self.model, &self.motion.poses);
-        self.sizes.restart(&self.model, fit_sizes, &self.config);
+        self.sizes.restart(&self.model, fit_sizes, false, &self.config);
         self.assessor.trust_pose();
         self.report(f64::NAN, 0);
     }
@@ -104,7 +104,7 @@ impl Tracker {
             self.restart(body, poses, true);
             self.assessor.doubt_pose();
             self.relocalizer.found_itself();
-            self.sizes.wait(std::env::var("WAIT").ok().and_then(|v| v.parse().ok()).unwrap_or(0));
+            self.sizes.restart(&self.model, true, true, &self.config);
             self.follow(frame);
             if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
                 return;
@@ -127,8 +127,12 @@ impl Tracker {
         observer.observe(frame, expected, config);
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
+        let mut steps = 0;
+        if sizes.wait_for_pose() {
+            steps += fit.run(setting.of(model), predicted, poses);
+        }
         sizes.initialise(setting, model, poses, fit);
-        let mut steps = fit.run(setting.of(model), predicted, poses);
+        steps += fit.run(setting.of(model), predicted, poses);
         // Other configurations of arms and legs.
         if schedule.whole_body {
             let lost = assessor.status() == Status::Lost;
@@ -149,10 +153,27 @@ impl Tracker {
         }
         self.remember();
         self.report(frame.stamp, steps);
+        self.resize(frame.stamp);
         let lost = self.estimate.status == Status::Lost;
         if self.relocalizer.nobody(frame.stamp, lost) {
             self.stop(frame.stamp);
         }
+    }
+
+    /// Takes the sizes that a detector tells of a body that it found; the next frame fits its girths.
+    fn resize(&mut self, stamp: f64) {
+        let Self { model, estimate, relocalizer, .. } = self;
+        if std::env::var("NORESIZE").is_ok() {
+            return;
+        }
+        let Some((body, mut poses)) = relocalizer.resized(model, &estimate.world_from_limb, stamp) else { return };
+        self.model.adopt(body);
+        poses.iter_mut().for_each(|pose| *pose = shifted(pose, self.motion.origin));
+        self.motion.poses = poses;
+        self.motion.forget();
+        self.sizes.restart(&self.model, true, true, &self.config);
+        self.hypotheses.restart(&self.model);
+        self.fit.clear();
     }
 
     /// There is nobody: from the next frame on somebody is looked for.
