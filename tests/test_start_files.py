@@ -2,18 +2,22 @@
 
 import json
 import shutil
+from itertools import islice
 
 import cv2
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import voodoo
 from test_starts import AROUND, CAMERA, keypoints, person
 from voodoo import cli
 from voodoo.export import write_trc
 from voodoo.export.track import Track
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.pose2sim import SITES
+from voodoo.sensors.settings import FrontEndSettings
 
 FRAMES, EMPTY = 6, 2
 """In the first EMPTY frames nobody is in view."""
@@ -134,8 +138,8 @@ def test_markers_are_measurements_not_a_start_beside(run, tmp_path):
     assert error_of(result, FRAMES - 1) < 0.03
 
 
-def test_depth_alone_starts_by_itself_and_excluded_nobody_is_there(run, tmp_path):
-    """The bundled recording, without and with what lies beside it; and with a box around the person."""
+def test_depth_alone_starts_by_itself(run, tmp_path):
+    """The bundled recording, with and without what lies beside it."""
     whole, bare = tmp_path / "rec", tmp_path / "bare" / "rec"
     shutil.copytree(sample_path(), whole)
     shutil.copytree(sample_path() / "bag", bare / "bag")
@@ -144,7 +148,13 @@ def test_depth_alone_starts_by_itself_and_excluded_nobody_is_there(run, tmp_path
     assert (tmp_path / "with.csv").read_bytes() == (tmp_path / "without.csv").read_bytes()
     result = Track.load("with.csv")
     assert "searching" not in result.status[5:] and result.status[-1] != "lost"
-    box = "--exclude=0.5,-3,-1,6,3,3"
-    done = run("track", bare, box, "--use", "depth", "--out", "nobody.csv")
-    assert set(Track.load("nobody.csv").status) == {"searching"}
-    assert "nobody was found in 90 frames" in done.stderr
+
+
+@pytest.mark.parametrize("box", [None, ((0.5, -3.0, -1.0), (6.0, 3.0, 3.0))])
+def test_nobody_is_found_in_a_box_that_is_left_out(box):
+    recording = open_recording(sample_path(), bare=True, use=("depth",))
+    front_end = FrontEnd(
+        voodoo.Tracker(voodoo.Body.human()), settings=FrontEndSettings(exclude=() if box is None else (box,))
+    )
+    found = [str(front_end.step(recorded).status) != "searching" for recorded in islice(recording, 3)]
+    assert found[-1] == (box is None)
