@@ -241,7 +241,7 @@ def install(monkeypatch):
     import voodoo.pipeline.start
     from voodoo.export import track as results
 
-    monkeypatch.setattr(voodoo.pipeline.search, "can_search", lambda tracker: True)
+    monkeypatch.setattr(voodoo.pipeline.search, "knows", lambda body: True)
     # The fake body has no joints to take angles from.
     monkeypatch.setattr(results, "Chain", lambda body: body)
     monkeypatch.setattr(results, "angle_names_of", lambda body: ("l_elbow_flexion",))

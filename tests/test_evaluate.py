@@ -294,6 +294,7 @@ def test_who_is_there_and_not_found_counts_as_lost(opened):
     score, frames = evaluate(Path("fake"))
     assert score.searching_share == 0.5 and score.error_m == pytest.approx(0.0, abs=1e-6)
     assert score.tracking_class == 1 and np.isnan(frames.errors[:20]).all()
+    assert score.first_pose_s == pytest.approx(20 / 30.0) and score.first_pose_error_m == pytest.approx(0.0, abs=1e-6)
     become()
     score, _ = evaluate(Path("fake"), init="auto")
     assert score.searching_share == 0.5

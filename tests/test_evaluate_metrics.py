@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from scene import turn
 from voodoo.evaluation import metrics
 
 STAMPS = np.arange(60) / 30.0
@@ -162,3 +163,22 @@ def test_match_takes_the_nearest_stamp_within_tolerance():
 def test_twelve_joints():
     assert len(set(metrics.JOINTS)) == 12
     assert {"l_shoulder", "r_ankle"} <= set(metrics.JOINTS)
+
+
+def test_a_constant_offset_of_a_joint_is_no_error():
+    """In the trunk's axes: the person turns, and the offset turns with them."""
+    rng = np.random.default_rng(0)
+    rest = rng.normal(0.0, 0.05, (len(metrics.JOINTS), 3))
+    rest[:4, 2] += 0.5
+    rest[[0, 6], 1] += 0.2
+    rest[[1, 7], 1] -= 0.2
+    offsets = rng.normal(0.0, 0.04, rest.shape)
+    turns = [turn((0.0, 0.0, 1.0), angle) for angle in np.linspace(0.0, 3.0, 20)]
+    reference = np.array([way @ rest.T for way in turns]).transpose(0, 2, 1)
+    estimate = np.array([way @ (rest + offsets).T for way in turns]).transpose(0, 2, 1)
+    estimate[5, 3] += (0.0, 0.0, 0.1)
+    estimate[7] = np.nan
+    errors = metrics.without_offsets(estimate, reference)
+    assert errors[5, 3] == pytest.approx(0.1) and np.isnan(errors[7]).all()
+    errors[5, 3] = 0.0
+    assert np.nanmax(errors) < 1e-9 < np.nanmin(metrics.joint_errors(estimate, reference))

@@ -2,18 +2,22 @@
 
 import json
 import shutil
+from itertools import islice
 
 import cv2
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import voodoo
 from test_starts import AROUND, CAMERA, keypoints, person
 from voodoo import cli
 from voodoo.export import write_trc
 from voodoo.export.track import Track
-from voodoo.recordings import open_recording
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.pose2sim import SITES
+from voodoo.sensors.settings import FrontEndSettings
 
 FRAMES, EMPTY = 6, 2
 """In the first EMPTY frames nobody is in view."""
@@ -132,3 +136,25 @@ def test_markers_are_measurements_not_a_start_beside(run, tmp_path):
     result = Track.load("pose.csv")
     assert result.status[:EMPTY] == ("searching",) * EMPTY and "searching" not in result.status[EMPTY:]
     assert error_of(result, FRAMES - 1) < 0.03
+
+
+def test_depth_alone_starts_by_itself(run, tmp_path):
+    """The bundled recording, with and without what lies beside it."""
+    whole, bare = tmp_path / "rec", tmp_path / "bare" / "rec"
+    shutil.copytree(sample_path(), whole)
+    shutil.copytree(sample_path() / "bag", bare / "bag")
+    for folder, name in ((whole, "with"), (bare, "without")):
+        run("track", folder, "--init", "auto", "--use", "depth", "--out", f"{name}.csv")
+    assert (tmp_path / "with.csv").read_bytes() == (tmp_path / "without.csv").read_bytes()
+    result = Track.load("with.csv")
+    assert "searching" not in result.status[5:] and result.status[-1] != "lost"
+
+
+@pytest.mark.parametrize("box", [None, ((0.5, -3.0, -1.0), (6.0, 3.0, 3.0))])
+def test_nobody_is_found_in_a_box_that_is_left_out(box):
+    recording = open_recording(sample_path(), bare=True, use=("depth",))
+    front_end = FrontEnd(
+        voodoo.Tracker(voodoo.Body.human()), settings=FrontEndSettings(exclude=() if box is None else (box,))
+    )
+    found = [str(front_end.step(recorded).status) != "searching" for recorded in islice(recording, 3)]
+    assert found[-1] == (box is None)

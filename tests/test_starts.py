@@ -2,13 +2,14 @@
 
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import voodoo
 from scene import standing_joints, turn
-from voodoo.errors import BodyError, MeasurementError
+from voodoo.errors import BodyError, MeasurementError, VoodooError
 from voodoo.measurements import DepthImage, KeypointImage, LaserScan, MarkerSet, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.legs import legs_body
@@ -302,6 +303,17 @@ def test_the_found_pose_is_a_start(tmp_path):
     assert written.height_m == pytest.approx(recording.start["height_m"], abs=0.08)
     assert np.linalg.norm(np.subtract(written.joints["l_knee"], rows["l_knee"])) < 0.06
     assert stature(voodoo.Body.human(1.6, model="papers")) == 1.6 and stature(legs_body()) is None
+
+
+def test_what_nothing_can_find_is_told_at_once(tmp_path):
+    recording = open_recording(sample_path(), bare=True)
+    lamp = voodoo.Body.load(Path(__file__).parent.parent / "examples" / "bodies" / "lamp.toml")
+    with pytest.raises(VoodooError, match=r"by depth, scan, skin alone the body 'lamp' is not found.*--init FILE"):
+        start_tracker(recording, body=lamp)
+    with pytest.raises(VoodooError, match="by scan alone"):
+        start_tracker(recording, use=("scan",), model="full")
+    assert start_tracker(recording, use=("scan",)).body.name == "standing legs"
+    assert start_tracker(recording, use=("scan", "depth")).body.name == "human"
 
 
 def test_nothing_beside_a_recording_is_read_where_a_start_is_looked_for(tmp_path):

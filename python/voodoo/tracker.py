@@ -27,7 +27,7 @@ class Tracker:
     """
 
     def __init__(self, body: Body, *, config: Config | None = None) -> None:
-        """Make a tracker without a pose; `reset` gives it one.
+        """Make a tracker without a pose: `step` looks for somebody, `reset` puts the body where it is known to be.
 
         Raises:
             BodyError: `body` is not a Body.
@@ -48,7 +48,7 @@ class Tracker:
 
     @property
     def estimate(self) -> Estimate:
-        """The last estimate; before the first reset one that is lost, with NaN as its stamp and no poses."""
+        """The last estimate; at first one with status "searching", NaN as its stamp and no poses."""
         return self._core.estimate
 
     def reset(self, *, joints: Mapping[str, Sequence[float]], fit_sizes: bool = True) -> Estimate:
@@ -84,8 +84,13 @@ class Tracker:
     def step(self, frame: Frame) -> Estimate:
         """The pose at the frame's time. Releases the GIL; a refused frame leaves the tracker as it was.
 
+        Without a pose a person is looked for in the frame's depth images. Where one is found the estimate is that of the body
+        in their sizes, else it has the status "searching" and no poses. A tracker that found the person itself goes back to
+        searching when they are gone for good.
+
         Raises:
-            MeasurementError: no pose yet, time not after the last frame, or a measurement that cannot be used.
+            MeasurementError: time not after the last frame, a measurement that cannot be used, or no pose yet of a body that
+                is not looked for, because it lacks sites of a person.
             BodyError: the frame names a limb or site that is not in the body.
         """
         return self._core.step(frame)

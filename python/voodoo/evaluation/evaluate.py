@@ -222,6 +222,8 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     distances = np.concatenate([step.witness.distances for step in steps])
     about_joints = np.concatenate([step.witness.about_joints for step in steps])
     measured = np.array([step.measured for step in steps])
+    compared = metrics.shifted(reference, 0 if exact else lag)
+    first_wait, first_error = _first_pose(stamps, status, reference, errors0)
     far, near = (limb_ends(errors, far=which) for which in (True, False))
     score = Score(
         name=recording.name,
@@ -232,6 +234,9 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         error_lag0_m=metrics.mean_or_nan(errors0),
         error_best_lag_m=metrics.mean_or_nan(errors_best),
         best_lag=None if class_ is None else lag,
+        error_without_offsets_m=metrics.mean_or_nan(metrics.without_offsets(positions, compared)),
+        first_pose_s=first_wait,
+        first_pose_error_m=first_error,
         within_5cm=metrics.share_within(errors, 0.05),
         within_10cm=metrics.share_within(errors, 0.10),
         joint_error_m={name: metrics.mean_or_nan(errors[:, index]) for index, name in enumerate(metrics.JOINTS)},
@@ -258,6 +263,17 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     )
     within = np.array([step.witness.within for step in steps])
     return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
+
+
+def _first_pose(
+    stamps: FloatArray, status: Sequence[str], reference: FloatArray, errors: FloatArray
+) -> tuple[float, float]:
+    """How long after the reference's first frame the first pose came [s], and its mean error [m]; NaN without either."""
+    found = [index for index, word in enumerate(status) if word != SEARCHING]
+    known = np.flatnonzero(np.isfinite(reference).all(axis=(1, 2)))
+    if not found or not len(known):
+        return float("nan"), float("nan")
+    return max(float(stamps[found[0]] - stamps[known[0]]), 0.0), metrics.mean_or_nan(errors[found[0]])
 
 
 def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:

@@ -55,12 +55,40 @@ def joint_errors(estimated: FloatArray, reference: FloatArray, *, lag: int = 0) 
         lag: frame i of the estimate is compared with frame i - lag of the reference: positive means that the estimate
             is late. Frames whose partner is outside are NaN.
     """
-    frames = len(estimated)
-    shifted = np.full(reference.shape, np.nan)
-    source = np.arange(frames) - lag
-    inside = (source >= 0) & (source < frames)
-    shifted[inside] = reference[source[inside]]
-    return np.asarray(np.linalg.norm(estimated - shifted, axis=2))
+    return np.asarray(np.linalg.norm(estimated - shifted(reference, lag), axis=2))
+
+
+def without_offsets(estimated: FloatArray, reference: FloatArray) -> FloatArray:
+    """Distances (F, J) of estimated to reference positions of JOINTS, each joint's constant offset removed.
+
+    Another tracker's hip is another place on the body than ours, always by the same: the median, over the frames, of each
+    joint's difference in the reference's trunk axes (from right to left shoulder, from the hips up) is no error.
+
+    Args:
+        estimated, reference: (F, 12, 3) [m], frame by frame.
+    """
+    column = {name: index for index, name in enumerate(JOINTS)}
+    sides = [[reference[:, column[f"{side}_{joint}"]] for side in "lr"] for joint in ("shoulder", "hip")]
+    up = np.mean(sides[0], axis=0) - np.mean(sides[1], axis=0)
+    left = sides[0][0] - sides[0][1]
+    ahead = np.cross(left, up)
+    axes = np.stack([ahead, np.cross(up, ahead), up], axis=1)
+    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
+    differences = np.einsum("fij,fkj->fki", axes, estimated - reference)
+    known = np.isfinite(differences).all(axis=2)
+    for joint in range(differences.shape[1]):
+        if known[:, joint].any():
+            differences[:, joint] -= np.median(differences[known[:, joint], joint], axis=0)
+    return np.asarray(np.linalg.norm(differences, axis=2))
+
+
+def shifted(reference: FloatArray, lag: int) -> FloatArray:
+    """The reference (F, ...) as an estimate that is `lag` frames late is compared with it; NaN where it has no frame."""
+    moved = np.full(reference.shape, np.nan)
+    source = np.arange(len(reference)) - lag
+    inside = (source >= 0) & (source < len(reference))
+    moved[inside] = reference[source[inside]]
+    return moved
 
 
 def best_lag(estimated: FloatArray, reference: FloatArray, *, max_lag: int = MAX_LAG) -> int:

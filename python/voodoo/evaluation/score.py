@@ -28,6 +28,9 @@ class Score:
         error_m: mean error of the twelve joints: at lag 0 against exact truth, at the best lag against a reference.
         error_lag0_m, error_best_lag_m: both.
         best_lag: constant lag [frames] with the least error; positive: the estimate is late.
+        error_without_offsets_m: the same error, each joint's constant offset removed, see metrics.without_offsets.
+        first_pose_s: time from the first frame with a reference to the first with a pose.
+        first_pose_error_m: mean error in that frame, at lag 0.
         within_5cm, within_10cm: share of joint errors, at the same lag as `error_m`.
         joint_error_m: mean error of each of the twelve joints, at the same lag.
         tracking_class: 2, 1 or 0 as in K06 Table I, see metrics.tracking_class, at the same lag.
@@ -56,6 +59,9 @@ class Score:
     error_lag0_m: float = np.nan
     error_best_lag_m: float = np.nan
     best_lag: int | None = None
+    error_without_offsets_m: float = np.nan
+    first_pose_s: float = np.nan
+    first_pose_error_m: float = np.nan
     within_5cm: float = np.nan
     within_10cm: float = np.nan
     joint_error_m: dict[str, float] = field(default_factory=dict)

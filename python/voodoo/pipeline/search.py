@@ -8,6 +8,7 @@ from typing import Any
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
+from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.pipeline.starts.base import Found, Seen, StartFinder
 from voodoo.pipeline.starts.chosen import Starts, automatic_starts
@@ -87,7 +88,7 @@ class Search:
     @property
     def by_tracker(self) -> bool:
         """Whether the tracker looks for somebody in the depth images itself."""
-        return self._starts.by_tracker and can_search(self._tracker)
+        return self._starts.by_tracker and knows(self._tracker.body)
 
     def learn(self, estimate: Estimate) -> Estimate:
         """Take up what a step found; the same, or an estimate of nobody where the person is gone for good.
@@ -119,6 +120,6 @@ def nobody(stamp: float) -> Estimate:
     return _core._estimate((stamp, SEARCHING, float("nan"), 0), ([], [], [], []), ([], [], [], [], [], [], []))
 
 
-def can_search(tracker: Tracker) -> bool:
-    """Whether the tracker looks for its body in depth images: it knows people."""
-    return _KNOWN <= set(tracker.body.site_names)
+def knows(body: Body) -> bool:
+    """Whether a tracker looks for a body in depth images itself: it knows people."""
+    return set(body.site_names) >= _KNOWN

@@ -19,8 +19,10 @@ from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.search import knows
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
+from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.kinds import input_of, inputs
@@ -134,8 +136,8 @@ def start_tracker(
         use: kinds of inputs in use; None: all.
 
     Raises:
-        VoodooError: the first pose does not fix that of this body, both body and height are given, or a marker stands for a
-            site that the body has not.
+        VoodooError: the first pose does not fix that of this body, both body and height are given, a marker stands for a
+            site that the body has not, or there is no pose and nothing by which this body could be found.
     """
     if body is not None and height is not None:
         raise VoodooError("body and height: expected at most one of them, found both")
@@ -155,6 +157,8 @@ def start_tracker(
                 f"marker {marker}: expected one of the sites {', '.join(body.site_names)}, found {site!r}"
             )
     tracker = Tracker(body, config=config if config is not None else Config())
+    if init == AUTO:
+        _check_findable(recording, body, use)
     if isinstance(init, Init) and init.stamp_s is None:
         tracker.reset(joints=dict(init.joints), fit_sizes=True)
     return tracker
@@ -223,10 +227,31 @@ def _upright(body: Body) -> float:
     return float(max(heights) - min(heights))
 
 
+def _kinds(recording: Recording, use: Sequence[str] | None) -> set[str | None]:
+    """Kinds of inputs that a recording has and that are in use."""
+    return {input_of(sensor.kind) for sensor in recording.info().sensors} & set(use if use is not None else inputs())
+
+
 def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
     """Whether there is nothing but lasers to start from: skin tells no posture."""
-    kinds = {input_of(sensor.kind) for sensor in recording.info().sensors} - {None, "skin"}
-    return kinds & set(use if use is not None else inputs()) == {"scan"}
+    return _kinds(recording, use) - {"skin"} == {"scan"}
+
+
+def _check_findable(recording: Recording, body: Body, use: Sequence[str] | None) -> None:
+    """Refuse to look for a body that nothing in the recording can show."""
+    kinds = _kinds(recording, use)
+    blind = {"points", "skin"}
+    if not knows(body):
+        blind.add("depth")
+    if not serves(body):
+        blind.add("scan")
+    if kinds and kinds <= blind:
+        raise VoodooError(
+            f"{recording.name}: expected a first pose, found none, and by {', '.join(sorted(map(str, kinds)))} alone the body "
+            f"{body.name!r} is not found; give a pose with --init FILE, a JSON file like "
+            '{"height_m": 1.76, "joints": {"l_shoulder": [x, y, z], "r_hip": [x, y, z], ...}} '
+            f"in metres in the frame {recording.root_frame!r}"
+        )
 
 
 def _first_problem(error: ValidationError) -> str:

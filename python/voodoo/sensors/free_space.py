@@ -15,7 +15,7 @@ CELL_M, SIZE_M = 0.10, 40.0
 _LEAST_PASSES = 3
 _SHARE = 0.2
 """A cell that returned more than this share of the beams that came to it may be furniture, as may its neighbours."""
-_ALL_NEW = 0.4
+_ALL_NEW = 0.25
 """Where more than this share of all returns has come, the map is wrong: the frame moves."""
 
 

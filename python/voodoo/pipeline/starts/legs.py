@@ -8,6 +8,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from voodoo.measurements import LaserScan
+from voodoo.model.body import Body
 from voodoo.model.legs import HALF_WIDTH, HIP, LEG
 from voodoo.model.projection import transform
 from voodoo.pipeline.starts.base import Found, Seen, StartFinder
@@ -57,8 +58,7 @@ class LegsStart(StartFinder):
 
     def look(self, seen: Seen) -> Found | None:
         """See StartFinder."""
-        names = seen.body.site_names
-        if not set(SITES) <= set(names) or "l_shoulder" in names:
+        if not serves(seen.body):
             return None
         for item in seen.measurements:
             if isinstance(item, LaserScan) and item.root_from_sensor[2, 2] >= _LEVEL:
@@ -87,6 +87,11 @@ class LegsStart(StartFinder):
             return None
         _, legs, moved = min(pairs, key=lambda pair: pair[0])
         return legs, moved
+
+
+def serves(body: Body) -> bool:
+    """Whether a body is one of legs, which a laser can find."""
+    return set(SITES) <= set(body.site_names) and "l_shoulder" not in body.site_names
 
 
 def _leg_middles(scan: LaserScan, free: FreeSpace, exclude: Sequence[Box]) -> list[FloatArray]:
