@@ -52,11 +52,6 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
-    /// Whether detections still tell the sizes.
-    pub(super) fn sizes_open(&self, stamp: f64) -> bool {
-        self.found_itself && self.young(stamp)
-    }
-
     /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;

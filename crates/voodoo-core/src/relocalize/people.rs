@@ -116,17 +116,6 @@ fn in_proportion(reference: &[f64], sizes: &[[f64; 2]]) -> Vec<f64> {
     reference.iter().zip(ratios()).map(|(own, ratio)| own * known(ratio).exp()).collect()
 }
 
-/// The pose of the same body in other sizes: its limbs point where they did, and its sites lie there in the mean; world frame.
-pub(super) fn placed(body: &Body, before: &Body, world_from_limb: &[Pose]) -> Vec<Pose> {
-    let mut poses = world_from_limb.to_vec();
-    body.close_joints(&mut poses);
-    let count = body.sites().len();
-    let moved = |site: usize| before.site_position(world_from_limb, site) - body.site_position(&poses, site);
-    let shift = (0..count).map(moved).sum::<Vec3>() / count.max(1) as f64;
-    poses.iter_mut().for_each(|pose| pose.translation += shift);
-    poses
-}
-
 /// The pose of a body that fits a detected person's joints best, world frame.
 pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
     let mut joints: Vec<Vec3> = detection.joints.iter().map(|joint| joint.position).collect();
