@@ -54,8 +54,9 @@ struct Surface {
 // `scripts/calibrate_human` finds it. The calf's muscle lies behind its joints, the chest before the spine. What it leaves
 // open are halves of the mean breadths and depths, and girths over 2 pi, of ANSUR II (Gordon et al., "2012 Anthropometric
 // Survey of U.S. Army Personnel", 2014), both sexes, over stature: breadth of the papers' torso, clavicle, hand and foot.
-const TORSO: Surface = surface([0.0, 0.0], [0.015, 0.0], dressed([0.068, 0.098, 0.064, 0.096]));
-const PELVIS: Surface = surface([-0.004, 0.0], [0.029, 0.0], dressed([0.069, 0.109, 0.057, 0.087]));
+/// The root stands upright at rest, in both models: its axis is the body's.
+const TORSO: Surface = surface([0.008, 0.0], [0.008, 0.0], dressed([0.068, 0.098, 0.064, 0.096]));
+const PELVIS: Surface = surface([0.012, 0.0], [0.012, 0.0], dressed([0.069, 0.109, 0.057, 0.087]));
 const THORAX: Surface = surface([0.030, 0.0], [0.009, 0.0], dressed([0.057, 0.099, 0.075, 0.099]));
 /// Up and forward: the trapezius on the shoulder's slope.
 const CLAVICLE: Surface = surface([0.0, 0.0], [0.0, 0.0], dressed([0.034, 0.040, 0.030, 0.034]));
