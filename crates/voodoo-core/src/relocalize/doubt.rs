@@ -89,7 +89,7 @@ impl Doubt {
     pub(super) fn nobody(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
         self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
         if let Some(person) = verdict {
-            self.nobody = if person > 0.0 { 0.0 } else { self.nobody + (-person).min(MOST_ODDS) };
+            self.nobody = (self.nobody - person.clamp(-MOST_ODDS, MOST_ODDS)).max(0.0);
         }
         self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= GONE)
     }

@@ -3,6 +3,7 @@
 //! The body is put there as it stood when it was last tracked and as it stands at rest, upright, turned every way; the best are
 //! refined, and the one that explains the frame best by the score of all hypotheses is taken if it is not lost itself.
 
+mod belief;
 mod doubt;
 mod facing;
 mod people;
@@ -21,6 +22,7 @@ use crate::observation::candidates::Candidates;
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
 use crate::observation::segments::Segments;
+use belief::Belief;
 use doubt::Doubt;
 use facing::Known;
 use people::People;
@@ -50,6 +52,7 @@ pub struct Relocalizer {
     winner: Place,
     people: People,
     doubt: Doubt,
+    belief: Belief,
 }
 
 impl Relocalizer {
@@ -68,7 +71,9 @@ impl Relocalizer {
 
     /// Body and poses of the surest person in a frame.
     pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.look(frame, None, Wanted::Anybody)?;
+        let detection = self.people.look(frame, None, Wanted::Anybody);
+        let detection = detection.filter(|_| self.belief.observe(detection))?;
+        self.belief = Belief::default();
         people::sized(model, detection)
     }
 
