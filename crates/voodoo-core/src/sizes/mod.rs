@@ -24,6 +24,17 @@ const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
 /// All frames together make a limb shorter or longer by these factors at most.
 const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
+/// How a pose was set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Exactly, and the sizes are known.
+    SizesKnown,
+    /// Exactly: the first frame fits the sizes by it.
+    Positions,
+    /// As a detector saw it: the first frame fits the pose before the sizes.
+    Detected,
+}
+
 /// What is known of the sizes, and whether the next frame shall fit them.
 #[derive(Debug, Default)]
 pub struct Sizes {
@@ -39,10 +50,10 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// The pose was set, exactly or as a detector saw it: with `fit`, the next frame fits the sizes, and those that follow refine
-    /// the lengths.
-    pub fn restart(&mut self, model: &Model, fit: bool, rough: bool, config: &Config) {
-        (self.open, self.rough) = (fit, rough);
+    /// The pose was set: unless the sizes are known, the next frame fits them, and those that follow refine the lengths.
+    pub fn restart(&mut self, model: &Model, start: Start, config: &Config) {
+        let fit = start != Start::SizesKnown;
+        (self.open, self.rough) = (fit, start == Start::Detected);
         self.girths.clear();
         self.pairs.clear();
         if fit && config.fit_lengths {
@@ -251,7 +262,7 @@ mod tests {
         let (mut model, mut poses) = (Model::new(set.clone()), stand(set));
         let (before, start) = (model.clone(), poses.clone());
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
-        sizes.restart(&model, true, false, config);
+        sizes.restart(&model, Start::Positions, config);
         with_setting(&pixels, config, &before, &start, |setting| {
             sizes.initialise(setting, &mut model, &mut poses, &mut fit);
             // The next frame is not the first.
@@ -315,7 +326,7 @@ mod tests {
         let mut model = Model::new(set.clone());
         let mut poses = stand(set);
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
-        sizes.restart(&model, true, config);
+        sizes.restart(&model, Start::Positions, config);
         for _ in 0..frames {
             let (before, predicted) = (model.clone(), poses.clone());
             with_setting(&pixels, config, &before, &predicted, |setting| {
@@ -351,7 +362,7 @@ mod tests {
         let (mut model, mut poses) = (Model::new(body.clone()), stand(&body));
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(&config).unwrap());
         // As if a first frame had fitted girths to what it showed.
-        sizes.restart(&model, true, &config);
+        sizes.restart(&model, Start::Positions, &config);
         (sizes.open, sizes.girths) = (false, vec![Girth::default(); poses.len()]);
         let left = |limb: usize| body.limbs()[limb].name.starts_with("l_");
         for _ in 0..20 {

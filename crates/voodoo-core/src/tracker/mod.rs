@@ -16,7 +16,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
 use crate::relocalize::{Relocalizer, Sighting};
-use crate::sizes::{Reliance, Sizes};
+use crate::sizes::{Reliance, Sizes, Start};
 use assess::Assessor;
 use estimate::{Estimate, Status};
 
@@ -82,7 +82,8 @@ impl Tracker {
         self.fit.clear();
         self.hypotheses.restart(&self.model);
         self.relocalizer.restart(&self.model, &self.motion.poses);
-        self.sizes.restart(&self.model, fit_sizes, false, &self.config);
+        let start = if fit_sizes { Start::Positions } else { Start::SizesKnown };
+        self.sizes.restart(&self.model, start, &self.config);
         self.assessor.trust_pose();
         self.report(f64::NAN, 0);
     }
@@ -104,7 +105,7 @@ impl Tracker {
             self.restart(body, poses, true);
             self.assessor.doubt_pose();
             self.relocalizer.found_itself();
-            self.sizes.restart(&self.model, true, true, &self.config);
+            self.sizes.restart(&self.model, Start::Detected, &self.config);
             self.follow(frame);
             if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
                 return;
