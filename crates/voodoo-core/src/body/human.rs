@@ -25,7 +25,7 @@ const SHOULDER: [f64; 3] = [0.009, 0.112, 0.818];
 /// Forward, outward and height of the sternoclavicular joint's centre.
 const STERNOCLAVICULAR: [f64; 3] = [0.015, 0.030, 0.800];
 /// The middle of the shoulder's slope, beside the neck and at the arm: forward, outward and height.
-const SLOPE: [[f64; 3]; 2] = [[-0.003, 0.024, 0.833], [0.000, 0.114, 0.824]];
+const SLOPE: [[f64; 3]; 2] = [[-0.002, 0.024, 0.833], [0.002, 0.113, 0.824]];
 const UPPER_ARM: f64 = 0.186;
 /// The shoulder's muscle rises above the joint's centre.
 const DELTOID: f64 = 0.022;
@@ -37,8 +37,8 @@ const HAND_CENTRE: f64 = 0.045;
 const WAIST: f64 = 0.630;
 const VC7: f64 = 0.860;
 /// Forward and height, as of the other two: the neck leans forward.
-const SKULLBASE: [f64; 2] = [0.022, 0.912];
-const HEAD_CENTRE: [f64; 2] = [0.036, 0.937];
+const SKULLBASE: [f64; 2] = [0.024, 0.912];
+const HEAD_CENTRE: [f64; 2] = [0.039, 0.937];
 const ROOT: [f64; 2] = [0.005, 0.535];
 const TOE: f64 = 0.115;
 const HEEL: f64 = 0.035;
@@ -53,19 +53,20 @@ struct Surface {
 // Where joints lie in the limbs, and how thick these are, is the mean of 120 bodies of all sizes (MakeHuman, CC0), as
 // `scripts/calibrate_human` finds it. The calf's muscle lies behind its joints, the chest before the spine. What it leaves
 // open are halves of the mean breadths and depths, and girths over 2 pi, of ANSUR II (Gordon et al., "2012 Anthropometric
-// Survey of U.S. Army Personnel", 2014), both sexes, over stature: breadth of the papers' torso, clavicle, hand and foot.
-const TORSO: Surface = surface([0.0, 0.0], [0.015, 0.0], dressed([0.068, 0.098, 0.064, 0.096]));
-const PELVIS: Surface = surface([-0.004, 0.0], [0.029, 0.0], dressed([0.069, 0.109, 0.057, 0.087]));
+// Survey of U.S. Army Personnel", 2014), both sexes, over stature: the papers' torso, clavicle, hand and foot.
+/// The root stands upright at rest, in both models: its axis is the body's, and its middle the mean of both ends'.
+const TORSO: Surface = surface([0.008, 0.0], [0.008, 0.0], dressed([0.068, 0.098, 0.064, 0.096]));
+const PELVIS: Surface = surface([0.012, 0.0], [0.012, 0.0], dressed([0.072, 0.111, 0.058, 0.089]));
 const THORAX: Surface = surface([0.030, 0.0], [0.009, 0.0], dressed([0.057, 0.099, 0.075, 0.099]));
 /// Up and forward: the trapezius on the shoulder's slope.
 const CLAVICLE: Surface = surface([0.0, 0.0], [0.0, 0.0], dressed([0.034, 0.040, 0.030, 0.034]));
-const NECK: Surface = surface([0.001, 0.0], [0.025, 0.0], [0.035, 0.037, 0.035, 0.037]);
-const HEAD: Surface = surface([0.034, 0.0], [0.027, 0.0], [0.056, 0.038, 0.060, 0.045]);
-const UPPER_ARM_SURFACE: Surface = surface([-0.003, -0.006], [-0.001, 0.001], dressed([0.041, 0.036, 0.023, 0.020]));
+const NECK: Surface = surface([0.002, 0.0], [0.025, 0.0], [0.035, 0.038, 0.035, 0.038]);
+const HEAD: Surface = surface([0.037, 0.0], [0.026, 0.0], [0.053, 0.035, 0.062, 0.048]);
+const UPPER_ARM_SURFACE: Surface = surface([-0.003, -0.005], [-0.001, 0.0], dressed([0.041, 0.035, 0.023, 0.021]));
 const FOREARM_SURFACE: Surface = surface([0.003, -0.001], [-0.001, 0.0], dressed([0.025, 0.026, 0.015, 0.012]));
 const HAND_SURFACE: Surface = surface([0.0, 0.0], [0.0, 0.0], [0.022, 0.012, 0.019, 0.010]);
-const THIGH: Surface = surface([0.012, -0.010], [0.008, -0.004], dressed([0.062, 0.061, 0.037, 0.031]));
-const CALF: Surface = surface([-0.017, 0.006], [-0.006, 0.006], dressed([0.041, 0.038, 0.022, 0.016]));
+const THIGH: Surface = surface([0.013, -0.010], [0.007, -0.004], dressed([0.064, 0.061, 0.037, 0.032]));
+const CALF: Surface = surface([-0.017, 0.006], [-0.005, 0.006], dressed([0.040, 0.039, 0.023, 0.015]));
 /// Up and outward: the sole is on the floor.
 const FOOT: Surface = surface([0.020, 0.0], [0.014, 0.0], [0.020, 0.022, 0.014, 0.017]);
 /// The bodies are undressed, people are not: trousers and a shirt, 9 mm of a stature of 1.75 m.

@@ -28,8 +28,6 @@ use weights::WeightsError;
 const PERSON: f32 = 0.0;
 /// Candidates of an image that the network looks at where everybody is wanted: costs time in proportion.
 const MOST_LOOKS: usize = 12;
-/// Relative standard deviation of a joints' distance: limbs that are foreshortened come out short.
-const UNTOLD: f64 = 0.1;
 /// The standard deviation of a Laplace distribution is this many times its scale.
 const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
 
@@ -103,14 +101,13 @@ impl Detection {
         JOINTS.iter().position(|joint| *joint == name).and_then(|index| self.joints.get(index))
     }
 
-    /// The person's sizes as in [`LENGTHS`], each with its relative standard deviation: those that the network tells, metres, else
-    /// the joints' distances, without the stature.
-    pub fn sizes(&self) -> Vec<[f64; 2]> {
+    /// The person's sizes as in [`LENGTHS`], metres: those that the network tells, else the joints' distances without the stature.
+    pub fn sizes(&self) -> Vec<f64> {
         if !self.lengths.is_empty() {
-            return self.lengths.clone();
+            return self.lengths.iter().map(|length| length[0]).collect();
         }
         let joints: Vec<Vec3> = self.joints.iter().map(|joint| joint.position).collect();
-        skeleton::lengths(&joints).into_iter().map(|length| [length, UNTOLD]).collect()
+        lengths(&joints)
     }
 }
 

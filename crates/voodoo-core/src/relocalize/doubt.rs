@@ -52,11 +52,6 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
-    /// Whether detections still tell the sizes.
-    pub(super) fn sizes_open(&self, stamp: f64) -> bool {
-        self.found_itself && self.young(stamp)
-    }
-
     /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;
@@ -94,7 +89,7 @@ impl Doubt {
     pub(super) fn nobody(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
         self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
         if let Some(person) = verdict {
-            self.nobody = if person > 0.0 { 0.0 } else { self.nobody + (-person).min(MOST_ODDS) };
+            self.nobody = (self.nobody - person.clamp(-MOST_ODDS, MOST_ODDS)).max(0.0);
         }
         self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= GONE)
     }

@@ -3,12 +3,12 @@
 //! The body is put there as it stood when it was last tracked and as it stands at rest, upright, turned every way; the best are
 //! refined, and the one that explains the frame best by the score of all hypotheses is taken if it is not lost itself.
 
+mod belief;
 mod doubt;
 mod facing;
 mod people;
 mod posture;
 mod seeds;
-mod seen_sizes;
 mod segment_motion;
 mod trials;
 mod watch;
@@ -22,11 +22,11 @@ use crate::observation::candidates::Candidates;
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
 use crate::observation::segments::Segments;
+use belief::Belief;
 use doubt::Doubt;
 use facing::Known;
 use people::People;
 use posture::{Place, Postures};
-use seen_sizes::SeenSizes;
 use segment_motion::SegmentMotion;
 use trials::Trials;
 pub use watch::Sighting;
@@ -52,7 +52,7 @@ pub struct Relocalizer {
     winner: Place,
     people: People,
     doubt: Doubt,
-    seen_sizes: SeenSizes,
+    belief: Belief,
 }
 
 impl Relocalizer {
@@ -71,22 +71,10 @@ impl Relocalizer {
 
     /// Body and poses of the surest person in a frame.
     pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.look(frame, None, Wanted::Anybody)?;
-        self.seen_sizes.clear();
-        self.seen_sizes.add(detection);
+        let detection = self.people.look(frame, None, Wanted::Anybody);
+        let detection = detection.filter(|_| self.belief.observe(detection))?;
+        self.belief = Belief::default();
         people::sized(model, detection)
-    }
-
-    /// The body in the sizes that detections have told since it was found, and its poses with its joints at the same places; in
-    /// frames of its first second in which a detector looked.
-    pub fn resized(&mut self, model: &Model, world_from_limb: &[Pose], stamp: f64) -> Option<(Body, Vec<Pose>)> {
-        if !self.doubt.sizes_open(stamp) {
-            return None;
-        }
-        self.seen_sizes.add(self.people.seen()?);
-        let body = people::with_sizes(&model.reference_body, &self.seen_sizes.mean()?)?;
-        let poses = people::placed(&body, &model.body, world_from_limb);
-        Some((body, poses))
     }
 
     /// The track was started where a detector saw somebody.
@@ -138,8 +126,7 @@ impl Relocalizer {
         self.candidates.gather(context.seen.frame(), origin, &bounds, context.seen.views.backgrounds, context.config);
         let seen = context.seen.with(&self.candidates);
         let at = Context { seen, previous: &[], time_scale: FREEDOM, ..context };
-        let known = Known { postures: &self.postures, motion: &self.motion, lost: self.watch.lost() };
-        let better = self.trials.at_detection(at, known, fit, present, &place);
+        let better = self.trials.at_detection(at, fit, present, &place);
         fit.exchange(&mut self.matched);
         better.then(|| self.trials.best().as_slice())
     }

@@ -86,45 +86,15 @@ pub(super) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<P
     Some((body, poses))
 }
 
-/// People of one stature differ in the length of a limb by this share of it (standard deviation).
-const PROPORTIONS: f64 = 0.04;
-
-/// A body of these sizes, in the order of `LENGTHS`, each with its relative standard deviation; like on both sides. What is known
-/// badly is drawn to the proportions of the reference body.
-pub(super) fn with_sizes(reference: &Body, sizes: &[[f64; 2]]) -> Option<Body> {
+/// A body with the lengths of `LENGTHS`, like on both sides.
+fn with_sizes(reference: &Body, lengths: &[f64]) -> Option<Body> {
     let rest = reference.rest_pose(Pose::identity());
     let mut joints = Vec::with_capacity(JOINTS.len());
     for name in JOINTS {
         joints.push(reference.site_position(&rest, reference.site_index(name).ok()?));
     }
-    let lengths = in_proportion(&lengths(&joints), sizes);
-    take_lengths(&mut joints, &lengths);
+    take_lengths(&mut joints, lengths);
     reference.fit(&positions(reference, &joints), true).ok().map(|(body, _)| body)
-}
-
-/// Lengths between those measured and the reference body's at the scale that fits best, by what is known of each.
-fn in_proportion(reference: &[f64], sizes: &[[f64; 2]]) -> Vec<f64> {
-    let ratios = || reference.iter().zip(sizes).map(|(own, [length, sigma])| ((length / own).ln(), sigma * sigma));
-    let spread = PROPORTIONS * PROPORTIONS;
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for (ratio, variance) in ratios() {
-        sum += ratio / (variance + spread);
-        weights += 1.0 / (variance + spread);
-    }
-    let scale = sum / weights;
-    let known = |(ratio, variance): (f64, f64)| scale + (ratio - scale) * spread / (spread + variance);
-    reference.iter().zip(ratios()).map(|(own, ratio)| own * known(ratio).exp()).collect()
-}
-
-/// The pose of the same body in other sizes: its limbs point where they did, and its sites lie there in the mean; world frame.
-pub(super) fn placed(body: &Body, before: &Body, world_from_limb: &[Pose]) -> Vec<Pose> {
-    let mut poses = world_from_limb.to_vec();
-    body.close_joints(&mut poses);
-    let count = body.sites().len();
-    let moved = |site: usize| before.site_position(world_from_limb, site) - body.site_position(&poses, site);
-    let shift = (0..count).map(moved).sum::<Vec3>() / count.max(1) as f64;
-    poses.iter_mut().for_each(|pose| pose.translation += shift);
-    poses
 }
 
 /// The pose of a body that fits a detected person's joints best, world frame.

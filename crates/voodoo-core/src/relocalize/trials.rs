@@ -59,13 +59,17 @@ impl Trials {
         present: &[Pose],
         segment: &Segment,
     ) -> Outcome {
-        let candidates = context.seen.candidates;
-        let total: f64 = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+        let total = self.take_sample(context);
         fit.match_all(context, present, context.config.max_steps);
-        let present_score = place_score(context, known, fit, present, total);
-        self.rough.sample.assign(&candidates.points, &candidates.weight);
-        self.rough.sample.subsample(SEED_SAMPLE);
+        let mut present_score = place_score(context, known, fit, present, total);
         let explained = stray_share(&mut self.rough, context, present) < MOST_STRAY;
+        if explained {
+            // Refined as the others are: a body that is 2 cm off shall not be turned about for that.
+            self.poses.clear();
+            self.poses.extend_from_slice(present);
+            self.refine(context, fit);
+            present_score = present_score.min(place_score(context, known, fit, &self.poses, total));
+        }
         find_seeds(&mut self.rough, context, known, segment, &mut self.seeds);
         let mut least = present_score - PLACE_GAIN;
         let mut found = false;
@@ -100,43 +104,27 @@ impl Trials {
 
     /// Tries the body where a detector saw it, with the points there as the candidates of `context`; whether it explains them no
     /// worse than the present pose does.
-    pub(super) fn at_detection(
-        &mut self,
-        context: Context,
-        known: Known,
-        fit: &mut Fit,
-        present: &[Pose],
-        place: &[Pose],
-    ) -> bool {
-        let candidates = context.seen.candidates;
-        let total: f64 = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+    pub(super) fn at_detection(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
+        let total = self.take_sample(context);
         fit.match_all(context, present, context.config.max_steps);
-        let score = |fit: &Fit, poses: &[Pose]| {
-            overall_cost(context, fit.matched(poses)).total.min(MOST_COST * total)
-                + body_landmark_cost(fit.matched(poses))
-                + other_joints_strain(context.model, poses)
-        };
-        let present_score = score(fit, present);
+        let present_score = pose_score(context, fit, present, total);
         self.poses.clear();
         self.poses.extend_from_slice(place);
         self.refine(context, fit);
-        self.rough.sample.assign(&candidates.points, &candidates.weight);
-        self.rough.sample.subsample(SEED_SAMPLE);
         let stray = stray_share(&mut self.rough, context, &self.poses);
-        let found = score(fit, &self.poses) < present_score + DECIDED && stray < MOST_STRAY;
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "detected: {} present {} stray {} lost {}",
-                score(fit, &self.poses),
-                present_score,
-                stray,
-                known.lost
-            );
-        }
+        let found = pose_score(context, fit, &self.poses, total) < present_score + DECIDED && stray < MOST_STRAY;
         if found {
             self.best.clone_from(&self.poses);
         }
         found
+    }
+
+    /// Takes the points at which rough looks are taken; the weight of all points there.
+    fn take_sample(&mut self, context: Context) -> f64 {
+        let candidates = context.seen.candidates;
+        self.rough.sample.assign(&candidates.points, &candidates.weight);
+        self.rough.sample.subsample(SEED_SAMPLE);
+        candidates.weight.iter().map(|weight| f64::from(*weight)).sum()
     }
 
     /// Refines `poses` in some ICP steps; `fit` then holds their matches.
@@ -162,14 +150,16 @@ fn stray_share(rough: &mut RoughLook, context: Context, poses: &[Pose]) -> f64 {
     stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
 }
 
-/// The score of all hypotheses, and what facing, named sites and the other joints say.
-fn place_score(context: Context, known: Known, fit: &Fit, poses: &[Pose], total: f64) -> f64 {
+/// The score of all hypotheses, and what named sites and the other joints say.
+fn pose_score(context: Context, fit: &Fit, poses: &[Pose], total: f64) -> f64 {
     let matched = fit.matched(poses);
     let score = overall_cost(context, matched).total;
-    score.min(MOST_COST * total)
-        + facing_cost(known, poses[0].rotation, context.seen.frame().stamp)
-        + body_landmark_cost(matched)
-        + other_joints_strain(context.model, poses)
+    score.min(MOST_COST * total) + body_landmark_cost(matched) + other_joints_strain(context.model, poses)
+}
+
+/// The same, and what the facing says.
+fn place_score(context: Context, known: Known, fit: &Fit, poses: &[Pose], total: f64) -> f64 {
+    pose_score(context, fit, poses, total) + facing_cost(known, poses[0].rotation, context.seen.frame().stamp)
 }
 
 /// Cost of the broken limits of joints that belong to no arm or leg, or end one: a foot that points backwards.

@@ -55,11 +55,7 @@ impl Solver for WholeBody {
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
         self.sum_terms(problem, poses, false);
         let Self { normal, chain, lengths, .. } = self;
-        {
-            let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-            let info = [e("LI", LENGTH_INFORMATION[0]), e("LP", LENGTH_INFORMATION[1])];
-            chain.lengths(problem.body, normal, poses, pairs, info, change, lengths)
-        }
+        chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
     }
 
     fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {

@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
-use crate::math::{Pose, Vec3, shifted};
+use crate::math::{Pose, Vec3};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
@@ -153,27 +153,10 @@ impl Tracker {
         }
         self.remember();
         self.report(frame.stamp, steps);
-        self.resize(frame.stamp);
         let lost = self.estimate.status == Status::Lost;
         if self.relocalizer.nobody(frame.stamp, lost) {
             self.stop(frame.stamp);
         }
-    }
-
-    /// Takes the sizes that a detector tells of a body that it found; the next frame fits its girths.
-    fn resize(&mut self, stamp: f64) {
-        let Self { model, estimate, relocalizer, .. } = self;
-        if std::env::var("NORESIZE").is_ok() {
-            return;
-        }
-        let Some((body, mut poses)) = relocalizer.resized(model, &estimate.world_from_limb, stamp) else { return };
-        self.model.adopt(body);
-        poses.iter_mut().for_each(|pose| *pose = shifted(pose, self.motion.origin));
-        self.motion.poses = poses;
-        self.motion.forget();
-        self.sizes.restart(&self.model, true, true, &self.config);
-        self.hypotheses.restart(&self.model);
-        self.fit.clear();
     }
 
     /// There is nobody: from the next frame on somebody is looked for.
