@@ -139,7 +139,9 @@ def main() -> None:
     if options.every < 1 or options.jobs < 1:
         parser.error(f"--every, --jobs: expected at least 1, found {options.every} and {options.jobs}")
     poses = list(poses_of(find_recordings(options.recordings)[:: options.every], options.jobs))
-    print("| reference | recordings | exchanged: first, later | late | frame: median, worst | error, cm | no offsets, cm |")
+    print(
+        "| reference | recordings | exchanged: first, later | late | frame: median, worst | error, cm | no offsets, cm |"
+    )
     print("|---|---|---|---|---|---|---|")
     for which, exact in (("exact truth", True), ("a skeleton", False)):
         group = [pose for pose in poses if pose.exact == exact]

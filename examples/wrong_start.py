@@ -76,7 +76,9 @@ def errors(
     for frame in frames:
         places = front_end.step(frame).joints
         truth = reference.positions[np.argmin(np.abs(reference.stamps - frame.stamp)), columns]
-        away = [np.linalg.norm(places[name] - there) for name, there in zip(metrics.JOINTS, truth, strict=True) if places]
+        away = [
+            np.linalg.norm(places[name] - there) for name, there in zip(metrics.JOINTS, truth, strict=True) if places
+        ]
         found.append(np.nanmean(away) if away else np.inf)
     return np.array(found)
 
@@ -127,7 +129,9 @@ def row(what: str, times: Sequence[float]) -> str:
     """A line of the table."""
     seconds = np.array(times)
     median = float(np.median(seconds)) if len(seconds) else float("nan")
-    shares = [f"{100.0 * np.mean(seconds <= within + 1e-6):.0f} %" for within in (0.3, 1.0)] if len(seconds) else ["", ""]
+    shares = (
+        [f"{100.0 * np.mean(seconds <= within + 1e-6):.0f} %" for within in (0.3, 1.0)] if len(seconds) else ["", ""]
+    )
     never = int(np.isinf(seconds).sum())
     cells = [what, f"{median:.2f}" if np.isfinite(median) else "never", *shares, f"{never}", f"{len(seconds)}"]
     return "| " + " | ".join(cells) + " |"
@@ -136,7 +140,9 @@ def row(what: str, times: Sequence[float]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", type=Path, help="recordings, or folders of them")
-    parser.add_argument("--at", nargs="+", type=float, default=[0.1, 0.3, 0.5], help="resets, in shares of the recording")
+    parser.add_argument(
+        "--at", nargs="+", type=float, default=[0.1, 0.3, 0.5], help="resets, in shares of the recording"
+    )
     parser.add_argument("--every", type=int, default=1, help="use every n-th recording (default 1)")
     options = parser.parse_args()
     if options.every < 1 or not all(0.0 <= share < 1.0 for share in options.at):
@@ -148,10 +154,12 @@ def main() -> None:
         left_out += out
         for total, new in zip(all_times, times, strict=True):
             total += new
-    print("| start | right again after, s (median) | within 0.3 s | within 1 s | never | runs |\n|---|---|---|---|---|---|")
+    print(
+        "| start | right again after, s (median) | within 0.3 s | within 1 s | never | runs |\n|---|---|---|---|---|---|"
+    )
     for (turn, move), times in zip(CASES, all_times, strict=True):
         print(row(words(turn, move), times))
-    print(row("all", sum(all_times, [])))
+    print(row("all", [seconds for times in all_times for seconds in times]))
     print(f"\nstarts left out, since the right one goes wrong: {left_out}")
 
 
