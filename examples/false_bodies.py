@@ -1,9 +1,9 @@
 """False bodies: what a tracker without a pose takes for a person where there is none.
 
-    python examples/false_bodies.py --rooms 42 --seconds 5
+    python examples/false_bodies.py --rooms 48 --seconds 5
     python examples/false_bodies.py D/people/pp_* --rooms 0
 
-Rooms come from examples/rooms.py: cupboards, coat stands, lamps, pillars and dummies, three in each, one seed a room, in turn by
+Rooms come from examples/rooms.py: cupboards, coat stands, lamps, pillars, palms and dummies, three in each, one seed a room, in turn by
 three sensors and with the floor known and not. They stand still, and so they do in the synthetic room of `voodoo.synthetic`
 without its person. Of recordings of people the frames without a person in view count, and what is tracked counts as false
 while its root is farther than 0.5 m from everybody.
@@ -117,7 +117,7 @@ def row(watched: Watched) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="*", type=Path, help="folders with a bag and truth_people.csv")
-    parser.add_argument("--rooms", type=int, default=42, help="rooms that are made (default 42)")
+    parser.add_argument("--rooms", type=int, default=48, help="rooms that are made (default 48)")
     parser.add_argument("--first", type=int, default=0, help="seed of the first of them (default 0)")
     parser.add_argument("--seconds", type=float, default=5.0, help="how long each stands still (default 5)")
     options = parser.parse_args()

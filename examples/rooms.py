@@ -198,6 +198,13 @@ def furniture(name: str, x: float, y: float, chance: np.random.Generator) -> lis
         parts = [solid("cylinder", (0.03, 0.03, 0.4), 0.4), solid("cylinder", (0.2, 0.2, 0.02), 0.02)]
         parts.append(solid("ellipsoid", (0.19, 0.12, 0.2), 0.95))
         return [*parts, solid("ellipsoid", (0.2, 0.13, 0.24), 1.25), solid("cylinder", (0.06, 0.06, 0.06), 1.52)]
+    if name == "palm":
+        parts = [solid("cylinder", (0.18, 0.18, 0.2), 0.2), solid("cylinder", (0.03, 0.03, tall / 3), 0.4 + tall / 3)]
+        for height in np.linspace(0.55, 1.0, 16) * tall:
+            angle, half = float(chance.uniform(0.0, 2.0 * np.pi)), np.array([chance.uniform(0.15, 0.3), 0.05, 0.02])
+            out = np.array([np.cos(angle), np.sin(angle)]) * half[0]
+            parts.append(Solid("ellipsoid", np.array([x + out[0], y + out[1], height]), half, angle))
+        return parts
     if name == "chair with a coat":
         parts = [solid("box", (0.22, 0.22, 0.02), 0.45), solid("box", (0.22, 0.02, 0.25), 0.72, 0.0, 0.22)]
         for dx, dy in ((-0.2, -0.2), (0.2, -0.2), (-0.2, 0.2), (0.2, 0.2)):
@@ -206,7 +213,16 @@ def furniture(name: str, x: float, y: float, chance: np.random.Generator) -> lis
     return [solid("box", (0.2, 0.2, tall / 2), tall / 2), solid("ellipsoid", (0.13, 0.13, 0.15), tall + 0.13)]
 
 
-THINGS = ("cupboard", "pillar", "floor lamp", "coat stand", "dressmaker's dummy", "chair with a coat", "box and ball")
+THINGS = (
+    "cupboard",
+    "pillar",
+    "floor lamp",
+    "coat stand",
+    "dressmaker's dummy",
+    "palm",
+    "chair with a coat",
+    "box and ball",
+)
 
 
 def room(seed: int, *, sensor: Sensor | None = None) -> Room:
