@@ -3,10 +3,10 @@
     python examples/false_bodies.py --rooms 48 --seconds 5
     python examples/false_bodies.py D/people/pp_* --rooms 0
 
-Rooms come from examples/rooms.py: cupboards, coat stands, lamps, pillars, palms and dummies, three in each, one seed a room, in turn by
-three sensors and with the floor known and not. They stand still, and so they do in the synthetic room of `voodoo.synthetic`
-without its person. Of recordings of people the frames without a person in view count, and what is tracked counts as false
-while its root is farther than 0.5 m from everybody.
+Rooms come from examples/rooms.py: cupboards, coat stands, lamps, pillars, palms and dummies, three in each, one seed a room,
+in turn by three sensors and with the floor known and not. They stand still, and so they do in the synthetic room of
+`voodoo.synthetic` without its person. Of recordings of people the frames without a person in view count, and what is tracked
+counts as false while its root is farther than 0.5 m from everybody.
 
 A false body is a run of frames in which one is tracked, whatever its status. One that is left behind by a person who was
 followed is counted by itself, and so is one that begins while people are in view.
