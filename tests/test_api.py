@@ -5,6 +5,7 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -227,8 +228,6 @@ def test_time_goes_forward_only(tracker, cloud):
 
 def test_a_reset_needs_positions_that_fix_the_pose(body):
     tracker = voodoo.Tracker(body)
-    with pytest.raises(MeasurementError, match="call reset first"):
-        tracker.step(voodoo.Frame(stamp=0.0))
     with pytest.raises(MeasurementError, match="three positions"):
         tracker.reset(joints={"l_wrist": (0, 0, 0)})
     with pytest.raises(BodyError, match="nose"):
@@ -256,10 +255,22 @@ def test_a_reset_in_millimetres_is_refused(body):
     assert child.joints["l_wrist"] == pytest.approx(0.4 * wanted["l_wrist"], abs=1e-6)
 
 
-def test_before_a_reset_nothing_is_known(body):
-    estimate = voodoo.Tracker(body).estimate
-    assert estimate.status == "lost" and np.isnan(estimate.stamp) and np.isnan(estimate.residual)
-    assert not estimate.joints and not estimate.world_from_limb
+def test_before_a_reset_nothing_is_known_and_a_step_searches(body):
+    tracker = voodoo.Tracker(body)
+    assert np.isnan(tracker.estimate.stamp)
+    for estimate in (tracker.estimate, tracker.step(voodoo.Frame(stamp=0.5))):
+        assert estimate.status == "searching" and np.isnan(estimate.residual)
+        assert not estimate.joints and not estimate.world_from_limb
+    assert tracker.estimate.stamp == 0.5
+
+
+def test_a_body_that_is_no_person_needs_a_reset():
+    """Nothing knows how it looks."""
+    lamp = voodoo.Body.load(Path(__file__).resolve().parent.parent / "examples" / "bodies" / "lamp.toml")
+    tracker = voodoo.Tracker(lamp)
+    with pytest.raises(MeasurementError, match="call reset first"):
+        tracker.step(voodoo.Frame(stamp=0.0))
+    assert tracker.estimate.status == "searching"
 
 
 def test_a_tracker_is_not_copied(tracker):

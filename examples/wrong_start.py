@@ -1,0 +1,167 @@
+"""A start that was given wrongly: how soon the body is right again.
+
+    python examples/wrong_start.py D/rendered/dev_* --at 0.2 0.4 0.6
+    python examples/wrong_start.py D/utd-mhad --every 40
+
+A tracker is put, by `reset`, where the reference has the joints at some frames, but turned about the vertical through the root
+by 90 or 180 degrees, or moved by 0.2 to 1 m in a level direction that a seed draws; then it tracks by depth alone. It is right
+again in the first frame from which on, to WINDOW_S after the reset, the mean error of the twelve joints is within 10 cm, or
+within 1.5 times that of the same run from the right start, whichever is more. Prints for each disturbance the median of the
+seconds until then, the share of the runs within 0.3 and 1 s, those that are never right, and how many runs there were.
+A run whose right start goes wrong itself, beyond 10 cm on average, is left out.
+"""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+import voodoo
+from voodoo.evaluation import metrics
+from voodoo.evaluation.search import find_recordings
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
+from voodoo.recordings import RecordedFrame, Recording
+from voodoo.sensors.settings import FrontEndSettings
+
+WINDOW_S = 2.5
+"""What is not right so long after the reset counts as never right."""
+RIGHT_M = 0.10
+FACTOR = 1.5
+TURNS_DEG = (90.0, 180.0)
+MOVES_M = (0.2, 0.4, 0.6, 1.0)
+CASES = [(turn, 0.0) for turn in TURNS_DEG] + [(0.0, move) for move in MOVES_M]
+"""Degrees and metres."""
+
+
+def words(turn: float, move: float) -> str:
+    """A disturbance, for the table."""
+    return f"turned by {turn:g} degrees" if turn else f"moved by {move:g} m"
+
+
+def up_of(recording: Recording) -> np.ndarray:
+    """The vertical (3,) in the root frame: z, or -y of a camera's frame."""
+    return np.array([0.0, -1.0, 0.0] if recording.root_frame.endswith("optical_frame") else [0.0, 0.0, 1.0])
+
+
+def disturbed(
+    joints: dict[str, np.ndarray], turn: float, move: float, up: np.ndarray, angle: float
+) -> dict[str, np.ndarray]:
+    """The joints turned about the vertical through the root by `turn` degrees, and moved by `move` metres in the level
+    direction that an angle [rad] says."""
+    root = joints["humanoid_root"]
+    a = np.radians(turn)
+    level = np.eye(3)[np.argsort(np.abs(up))[:2]]
+    step = move * (np.cos(angle) * level[0] + np.sin(angle) * level[1])
+
+    def placed(place: np.ndarray) -> np.ndarray:
+        rel = place - root
+        turned = rel * np.cos(a) + np.cross(up, rel) * np.sin(a) + up * (up @ rel) * (1.0 - np.cos(a))
+        return root + turned + step
+
+    return {name: placed(place) for name, place in joints.items()}
+
+
+def errors(
+    recording: Recording, frames: Sequence[RecordedFrame], joints: dict[str, np.ndarray], body: voodoo.Body
+) -> np.ndarray:
+    """Mean error [m] of the twelve joints in each of the frames (F,), from a start; infinite where nobody is tracked."""
+    reference = recording.reference
+    tracker = voodoo.Tracker(body)
+    tracker.reset(joints=joints)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings.of(recording, use=("depth",)))
+    columns = [reference.names.index(name) for name in metrics.JOINTS]
+    found = []
+    for frame in frames:
+        places = front_end.step(frame).joints
+        truth = reference.positions[np.argmin(np.abs(reference.stamps - frame.stamp)), columns]
+        away = [
+            np.linalg.norm(places[name] - there) for name, there in zip(metrics.JOINTS, truth, strict=True) if places
+        ]
+        found.append(np.nanmean(away) if away else np.inf)
+    return np.array(found)
+
+
+def seconds_until_right(wrong: np.ndarray, right: np.ndarray, stamps: np.ndarray) -> float:
+    """Seconds from the first frame to the first from which on the errors (F,) are small enough; infinite without one."""
+    good = wrong <= np.maximum(RIGHT_M, FACTOR * right)
+    if not good[-1]:
+        return float("inf")
+    bad = np.flatnonzero(~good)
+    return float(stamps[bad[-1] + 1] - stamps[0]) if len(bad) else 0.0
+
+
+def run(path: Path, at: Sequence[float], seed: int) -> tuple[list[list[float]], int]:
+    """Seconds until the body is right again, for each of CASES a list over the starts; and how many starts were left out."""
+    recording = voodoo.open_recording(path)
+    reference = recording.reference
+    if reference is None or "humanoid_root" not in reference.names:
+        raise SystemExit(f"{recording.name}: expected a recording with a reference, found none")
+    frames = list(paired(recording))
+    stamps = np.array([frame.stamp for frame in frames])
+    height = (recording.start or {}).get("height_m")
+    body = voodoo.Body.human() if height is None else voodoo.Body.human(height)
+    chance = np.random.default_rng(seed)
+    times: list[list[float]] = [[] for _ in CASES]
+    left_out = 0
+    for share in at:
+        angles = chance.uniform(0.0, 2.0 * np.pi, len(CASES))
+        first = round(share * (len(frames) - 1))
+        part = slice(first, int(np.searchsorted(stamps, stamps[first] + WINDOW_S)))
+        there = reference.positions[np.argmin(np.abs(reference.stamps - stamps[first]))]
+        joints = {
+            name: place
+            for name, place in zip(reference.names, there, strict=True)
+            if np.isfinite(place).all() and not name.endswith("_toe")
+        }
+        right = errors(recording, frames[part], joints, body)
+        if right.mean() > RIGHT_M or len(right) < 2:
+            left_out += 1
+            continue
+        for times_of, (turn, move), angle in zip(times, CASES, angles, strict=True):
+            start = disturbed(joints, turn, move, up_of(recording), angle)
+            times_of.append(seconds_until_right(errors(recording, frames[part], start, body), right, stamps[part]))
+    return times, left_out
+
+
+def row(what: str, times: Sequence[float]) -> str:
+    """A line of the table."""
+    seconds = np.array(times)
+    median = float(np.median(seconds)) if len(seconds) else float("nan")
+    shares = (
+        [f"{100.0 * np.mean(seconds <= within + 1e-6):.0f} %" for within in (0.3, 1.0)] if len(seconds) else ["", ""]
+    )
+    never = int(np.isinf(seconds).sum())
+    cells = [what, f"{median:.2f}" if np.isfinite(median) else "never", *shares, f"{never}", f"{len(seconds)}"]
+    return "| " + " | ".join(cells) + " |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recordings", nargs="+", type=Path, help="recordings, or folders of them")
+    parser.add_argument(
+        "--at", nargs="+", type=float, default=[0.1, 0.3, 0.5], help="resets, in shares of the recording"
+    )
+    parser.add_argument("--every", type=int, default=1, help="use every n-th recording (default 1)")
+    options = parser.parse_args()
+    if options.every < 1 or not all(0.0 <= share < 1.0 for share in options.at):
+        parser.error(f"--every, --at: expected at least 1 and shares in [0, 1), found {options.every} and {options.at}")
+    all_times: list[list[float]] = [[] for _ in CASES]
+    left_out = 0
+    for seed, path in enumerate(find_recordings(options.recordings)[:: options.every]):
+        times, out = run(path, options.at, seed)
+        left_out += out
+        for total, new in zip(all_times, times, strict=True):
+            total += new
+    print(
+        "| start | right again after, s (median) | within 0.3 s | within 1 s | never | runs |\n|---|---|---|---|---|---|"
+    )
+    for (turn, move), times in zip(CASES, all_times, strict=True):
+        print(row(words(turn, move), times))
+    print(row("all", [seconds for times in all_times for seconds in times]))
+    print(f"\nstarts left out, since the right one goes wrong: {left_out}")
+
+
+if __name__ == "__main__":
+    main()
