@@ -43,9 +43,16 @@ static ALLOCATOR: Counting = Counting;
 const WARM_UP: usize = 26;
 const COUNTED: usize = 60;
 
+/// A human that no detector knows, since one of its joints has no name: frames in which one looks may allocate.
+fn unknown() -> Body {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let sites = body.sites().iter().filter(|site| site.name != "l_hand").cloned().collect();
+    Body::new("unknown", body.limbs().to_vec(), sites).unwrap()
+}
+
 /// Allocations inside `step` in the frames after the warm-up.
 fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
-    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let body = unknown();
     let camera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };
     let wrist = body.site_index("l_wrist").unwrap();
     let knee = body.site_index("r_knee").unwrap();

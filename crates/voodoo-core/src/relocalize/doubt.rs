@@ -6,8 +6,9 @@ use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 const YOUNG: f64 = 1.0;
-/// Every so manyth frame of a young track is looked at, and of one that is in doubt.
-const EVERY: [usize; 2] = [3, 5];
+/// Every so manyth frame of a young or lost track is looked at, and of one with a limb in doubt: a look costs as much as five
+/// frames.
+const EVERY: [usize; 2] = [3, 15];
 /// A detection is elsewhere when the joints of its trunk are this far from the tracked ones in the mean, metres.
 const ELSEWHERE: f64 = 0.25;
 /// One detection counts for at most this, in log odds.

@@ -190,8 +190,9 @@ impl Tracker {
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         let seen = observer.seen(frame, motion.origin);
         let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-        let place = relocalizer.search(setting.of(model), fit, &motion.poses).map(<[Pose]>::to_vec);
-        let found = place.is_some_and(|place| self.move_to(frame, place));
+        let place = relocalizer.search(setting.of(model), fit, &motion.poses);
+        let found =
+            place.map(|place| motion.predicted.clone_from_slice(place)).is_some() && self.move_to_predicted(frame);
         let sighting = self.sighting(frame);
         if self.relocalizer.conclude(found, sighting, &self.motion.poses) {
             self.assessor.give_up();
@@ -204,20 +205,22 @@ impl Tracker {
         observer.release(frame, relocalizer.own());
         let seen = observer.seen(frame, motion.origin);
         let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-        let place = relocalizer.detected(setting.of(model), fit, &motion.poses).map(<[Pose]>::to_vec);
-        place.is_some_and(|place| self.move_to(frame, place))
+        let place = relocalizer.detected(setting.of(model), fit, &motion.poses);
+        place.map(|place| motion.predicted.clone_from_slice(place)).is_some() && self.move_to_predicted(frame)
     }
 
-    /// Moves the body to another place, if it is not lost there; whether it is there now.
-    fn move_to(&mut self, frame: &Frame, place: Vec<Pose>) -> bool {
-        let before = std::mem::replace(&mut self.motion.poses, place);
+    /// Moves the body to another place, the predicted one, if it is not lost there; whether it is there now.
+    fn move_to_predicted(&mut self, frame: &Frame) -> bool {
+        let Motion { poses, predicted, .. } = &mut self.motion;
+        std::mem::swap(poses, predicted);
         self.settle(frame);
         if self.assessor.status() != Status::Lost {
             // Nothing is known of how it moves.
             self.motion.forget();
             return true;
         }
-        self.motion.poses = before;
+        let Motion { poses, predicted, .. } = &mut self.motion;
+        std::mem::swap(poses, predicted);
         self.settle(frame);
         false
     }
@@ -340,7 +343,7 @@ mod tests {
         }
         for (frame, width) in [0.15, 0.2, 0.25].into_iter().flat_map(|width| [width; 3]).enumerate() {
             let mut board = nothing.clone();
-            put_board(&mut board, Vec3::new(-0.7, 0.1, 2.6), [width, 0.85]);
+            put_board(&mut board, Vec3::new(-0.9, 0.1, 2.6), [width, 0.85]);
             assert_eq!(show(&mut tracker, &board, 8 + frame), Status::Lost, "{width} m wide");
             let moved = poses[0].translation.distance(tracker.estimate().world_from_limb[0].translation);
             assert!(moved < 0.1, "{width} m wide: moved by {moved} m");
