@@ -67,7 +67,7 @@ def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sampl
         total = max(len(inside), 1)
         held = {label: int((inside == label).sum()) for label in counts}
         if sum(held.values()) < PERSON_SHARE[0] * total:
-            if len(no) < (1 if frame.people else most):
+            if len(no) < (1 if frame.people else most) and (not frame.people or rng.random() < 0.5):
                 no.append(_sample(candidate, None, 0.0, 0.0, up is not None))
             continue
         for person in frame.people:

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 Rng = np.random.Generator
 NOBODY = 0.2  # share of images without a person
 SECOND = 0.06  # share of images with another person
+CUT = 0.35  # share of images whose border may cut the person
 
 
 @dataclass(frozen=True)
@@ -64,21 +65,24 @@ class Scenes:
         """One random frame."""
         sensor = sensors.draw_sensor(rng)
         world = _World()
-        near, far = (0.9, 1.7) if rng.random() < 0.15 else (1.8, 3.6) if sensor.user_mask else (1.6, 4.8)
+        cut = rng.random() < CUT
+        near, far = (0.9, 1.7) if cut and rng.random() < 0.4 else (1.8, 3.6) if sensor.user_mask else (1.6, 4.8)
+        if not cut:
+            near = float(np.clip(0.9 / np.tan(sensor.vfov / 2), near, far))
         away = float(np.exp(rng.uniform(np.log(near), np.log(far))))
         people = 0 if rng.random() < NOBODY else 1 + int(rng.random() < SECOND)
-        at = self._place(rng, sensor, away)
+        at = self._place(rng, sensor, away, cut)
         bare = sensor.user_mask and people > 0
         placed = [self._person(rng, world, i + 1, at[i], bare) for i in range(people)]
         height = rng.uniform(0.4, 2.6) if rng.random() < 0.35 else rng.normal(1.1, 0.3)
         if placed and rng.random() < 0.05:
             height = max(height, 1.8)
-        view = _camera(rng, sensor, float(np.clip(height, 0.35, 2.6)), at[0], away)
+        view = _camera(rng, sensor, float(np.clip(height, 0.35, 2.6)), away, cut)
         _furnish(rng, world, at, away, people, bare)
         depth, labels = _render(world, sensor, view)
         return self._seen(rng, sensor, view, depth, labels, placed)
 
-    def _place(self, rng: Rng, sensor: sensors.Sensor, away: float) -> list[Array]:
+    def _place(self, rng: Rng, sensor: sensors.Sensor, away: float, cut: bool) -> list[Array]:
         half = 0.5 * sensor.hfov
         bearing = half * (
             rng.uniform(-0.6, 0.6) if rng.random() < 0.8 else rng.choice([-1, 1]) * rng.uniform(0.6, 1.05)
@@ -168,13 +172,12 @@ def _skirt(rng: Rng, joints: dict[str, Array]) -> shapes.Mesh:
     return shapes.tube(top, end, (waist, 0.5 * (waist + wide) + 0.05, wide + rng.uniform(0, 0.08)))
 
 
-def _camera(rng: Rng, sensor: sensors.Sensor, height: float, at: Array, away: float) -> tuple[Array, Array]:
+def _camera(rng: Rng, sensor: sensors.Sensor, height: float, away: float, cut: bool) -> tuple[Array, Array]:
     """Rotation and shift from the world to the camera: it looks about along x, at the person up and down."""
-    vertical = np.arctan(np.tan(sensor.hfov / 2) * sensor.height / sensor.width)
-    aim = np.arctan2(height - rng.uniform(0.6, 1.2), away)
-    if rng.random() < 0.18:
-        aim += rng.choice([-1, 1]) * rng.uniform(0.2, 0.9) * vertical  # the image's border cuts the person
-    elif rng.random() < 0.4:
+    aim = np.arctan2(height - rng.uniform(0.75, 1.05), away)
+    if cut and rng.random() < 0.5:
+        aim += rng.choice([-1, 1]) * rng.uniform(0.2, 0.9) * sensor.vfov / 2  # the image's border cuts the person
+    elif cut:
         aim = 0.5 * aim
     tilt = float(np.clip(aim + rng.normal(0, 0.05), -0.55, 0.6))
     roll = rng.normal(0, 0.03)

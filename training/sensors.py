@@ -25,6 +25,11 @@ class Sensor:
     user_mask: bool
 
     @property
+    def vfov(self) -> float:
+        """Vertical field of view, radians."""
+        return float(2 * np.arctan(np.tan(self.hfov / 2) * self.height / self.width))
+
+    @property
     def intrinsics(self) -> tuple[float, float, float, float]:
         """fx, fy, cx, cy in pixels."""
         f = 0.5 * self.width / np.tan(0.5 * self.hfov)
@@ -88,6 +93,12 @@ def edges(depth: Array, step: float = 0.08) -> NDArray[np.bool_]:
     return out
 
 
+def grazing(depth: Array, focal: float) -> Array:
+    """About the cosine of the angle between a pixel's ray and its surface's normal."""
+    dy, dx = np.gradient(depth)
+    return 1 / np.sqrt(1 + (np.hypot(dx, dy) * focal / depth) ** 2)
+
+
 def sense(
     rng: np.random.Generator, sensor: Sensor, true: Array, labels: NDArray[np.uint8]
 ) -> tuple[Array, NDArray[np.uint8]]:
@@ -114,8 +125,9 @@ def sense(
         lost |= _smooth(rng, depth.shape, int(rng.integers(6, 16))) > rng.uniform(1.6, 4)
         lost |= border & (rng.random(depth.shape) < rng.uniform(0.0, 0.5))
     else:
-        depth = depth + rng.normal(0, 1, depth.shape) * (0.002 + 0.0015 * depth) * gain
-        y, x = np.nonzero(border & (rng.random(depth.shape) < rng.uniform(0, 0.3)))
+        depth = depth + rng.normal(0, 1, depth.shape) * (0.003 + 0.0015 * depth) * gain * rng.choice([1.0, 2.0])
+        lost |= grazing(true, f) < rng.choice([0.0, 0.08, 0.2])
+        y, x = np.nonzero(border & (rng.random(depth.shape) < rng.uniform(0, 0.65)))
         other = true[
             np.clip(y + rng.integers(-1, 2, len(y)), 0, h - 1), np.clip(x + rng.integers(-1, 2, len(x)), 0, w - 1)
         ]
@@ -153,6 +165,10 @@ def user_mask(rng: np.random.Generator, depth: Array, labels: NDArray[np.uint8],
             g[:, :-1] |= grown[:, 1:] & (np.abs(np.diff(depth, axis=1)) < 0.06)
             grown = g & (depth > 0)
         keep = grown
+    if rng.random() < 0.3:  # the floor is cut away in blocks, with parts of the feet
+        rows, columns = (-(-n // 8) for n in keep.shape)
+        blocks = np.kron(rng.random((rows, columns)) < 0.5, np.ones((8, 8), bool))[: keep.shape[0], : keep.shape[1]]
+        keep &= ~(blocks & (height < rng.uniform(0.03, 0.12)))
     if rng.random() < 0.4:  # a border of a pixel is lost
         keep[1:] &= keep[:-1]
         keep[:, 1:] &= keep[:, :-1]
