@@ -54,7 +54,7 @@ pub struct DetectedJoint {
 }
 
 /// A person in a depth image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Detection {
     /// Every joint of [`JOINTS`].
     pub joints: Vec<DetectedJoint>,
@@ -69,7 +69,7 @@ pub struct Detection {
     /// The other corner.
     pub high: Vec3,
     /// Number of its candidate, see [`Detector::mask`].
-    candidate: usize,
+    pub(crate) candidate: usize,
 }
 
 /// Finds people in depth images.

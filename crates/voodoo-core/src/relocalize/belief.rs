@@ -4,9 +4,9 @@ use crate::detect::Detection;
 use crate::math::Vec3;
 
 /// From this sum of log odds on it is a person.
-const ENOUGH_ODDS: f64 = 3.0;
+const ENOUGH_ODDS: f64 = 4.0;
 /// What a look counts less than its log odds: looks at a thing that stands still err alike.
-const LOOK_COSTS: f64 = 1.0;
+const LOOK_COSTS: f64 = 1.5;
 /// What is seen within this of the last place is the same, metres.
 const SAME_PERSON: f64 = 0.5;
 /// Share that is left of what was believed after a frame without it.
@@ -32,5 +32,36 @@ impl Belief {
         }
         (self.place, self.sum) = (place, (self.sum + person - LOOK_COSTS).max(0.0));
         self.sum >= ENOUGH_ODDS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::{DetectedJoint, JOINTS};
+
+    fn seen(person: f64, x: f64) -> Detection {
+        let joint = DetectedJoint { position: Vec3::new(x, 0.0, 1.0), sigma: 0.05, visible: 1.0 };
+        Detection { person, joints: vec![joint; JOINTS.len()], ..Detection::default() }
+    }
+
+    /// At which of these looks, log odds and place, a person is believed.
+    fn believed(looks: &[Option<(f64, f64)>]) -> Option<usize> {
+        let mut belief = Belief::default();
+        looks.iter().position(|look| belief.observe(look.map(|(person, x)| seen(person, x)).as_ref()))
+    }
+
+    #[test]
+    fn a_sure_look_is_enough_and_unsure_ones_at_one_place_add_up() {
+        assert_eq!(believed(&[Some((6.0, 2.0))]), Some(0));
+        assert_eq!(believed(&[Some((3.0, 2.0)); 5]), Some(2));
+        assert_eq!(believed(&[Some((3.0, 2.0)), Some((3.0, 2.2)), Some((3.0, 2.4))]), Some(2), "people walk");
+    }
+
+    #[test]
+    fn what_flickers_or_jumps_is_nobody() {
+        assert_eq!(believed(&[Some((4.0, 2.0)), None, None, None].repeat(5)), None);
+        assert_eq!(believed(&[Some((1.4, 2.0)); 50]), None);
+        assert_eq!(believed(&[Some((4.0, 2.0)), Some((4.0, 4.0))].repeat(5)), None);
     }
 }

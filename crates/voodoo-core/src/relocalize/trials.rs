@@ -112,7 +112,10 @@ impl Trials {
         self.poses.extend_from_slice(place);
         self.refine(context, fit);
         let stray = stray_share(&mut self.rough, context, &self.poses);
-        let found = pose_score(context, fit, &self.poses, total) < present_score + DECIDED && stray < MOST_STRAY;
+        // Depth hardly tells a person's front from the back; the detector does.
+        let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
+        let allowed = present_score + if turned { DECIDED } else { 0.0 };
+        let found = pose_score(context, fit, &self.poses, total) < allowed && stray < MOST_STRAY;
         if found {
             self.best.clone_from(&self.poses);
         }
