@@ -34,7 +34,7 @@ EMA = 0.999
 class Plan:
     """How long and how fast: steps or (if > 0) minutes; the learning rate falls as a cosine over them."""
 
-    steps: int = 20_000
+    steps: int = 10_300
     minutes: float = 0.0
     people: int = 52  # pictures of a step, of all processes together
     others: int = 12
@@ -229,7 +229,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--state", type=Path, required=True, help="folder; a training that lies there goes on")
-    parser.add_argument("--steps", type=int, default=Plan.steps)
+    parser.add_argument("--steps", type=int, default=Plan.steps, help="of 64 pictures")
     parser.add_argument("--minutes", type=float, default=0.0, help="instead of steps")
     parser.add_argument("--rate", type=float, default=Plan.rate)
     parser.add_argument("--seed", type=int, default=1)
