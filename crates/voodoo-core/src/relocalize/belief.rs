@@ -6,7 +6,7 @@ use crate::math::Vec3;
 /// From this sum of log odds on it is a person.
 const ENOUGH_ODDS: f64 = 4.0;
 /// What a look counts less than its log odds: looks at a thing that stands still err alike.
-const LOOK_COSTS: f64 = 1.5;
+const LOOK_COSTS: f64 = 1.0;
 /// What is seen within this of the last place is the same, metres.
 const SAME_PERSON: f64 = 0.5;
 /// Share that is left of what was believed after a frame without it.
