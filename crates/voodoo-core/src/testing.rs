@@ -1,7 +1,6 @@
 //! What unit tests of the tracker's parts share: a synthetic depth camera, and a part's view of one frame.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use crate::body::two_bone::TwoBone;
 use crate::body::{Body, HumanModel, Model};
 use crate::config::Config;
 use crate::fit::{Context, Setting};
@@ -29,25 +28,12 @@ pub(crate) fn standing() -> (Model, Vec<Pose>) {
     (Model::new(body), poses)
 }
 
-/// Arms hang beside the hips, not in them, radians.
-const SPREAD: f64 = 0.16;
-
 /// Any body as it stands there.
 pub(crate) fn stand(body: &Body) -> Vec<Pose> {
     // The body's x looks forward and z up; the camera's y points down.
     let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
     let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
-    let mut poses = body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces));
-    for chain in TwoBone::of(body).iter().filter(|chain| !chain.leg) {
-        let root = chain.root(body, &poses);
-        let aside = (root.x - poses[0].translation.x).signum();
-        let turn = Quat::from_axis_angle(Vec3::Z, -aside * SPREAD);
-        for limb in chain.limbs() {
-            let pose = poses[limb];
-            poses[limb] = Pose::from_parts(root + turn * (pose.translation - root), turn * pose.rotation);
-        }
-    }
-    poses
+    body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces))
 }
 
 /// Depth in millimetres, as the camera sees a posed body before nothing.

@@ -48,7 +48,10 @@ ExcludeOption = Annotated[
 ]
 ModelOption = Annotated[
     HumanModel | None,
-    typer.Option("--model", help="The default human: of eighteen limbs (full, the default), or of the papers' ten."),
+    typer.Option(
+        "--model",
+        help="The human: full (eighteen limbs), papers (their ten), or measured (full, as bodies are; if nobody tells a pose).",
+    ),
 ]
 FrameOption = Annotated[
     str | None,

@@ -33,6 +33,11 @@ class Limb:
     shape: TaperedEllipticCylinder
 
 
+_MEASURED = Path(__file__).resolve().parent.parent / "data" / "human_measured.toml"
+_MEASURED_M = 1.75
+"""Stature of the body in that file."""
+
+
 class Body:
     """A body to track. Immutable; made by `human`, `load` or `from_toml`."""
 
@@ -60,11 +65,17 @@ class Body:
 
         Args:
             height: stature [m], 0.3 to 3.0.
-            model: "papers": ten limbs and nine joints (K06 III-C); "full": eighteen, with waist, neck, clavicles, hands and feet.
+            model: "papers": ten limbs and nine joints (K06 III-C); "full": eighteen, with waist, neck, clavicles, hands and feet;
+                "measured": the same with joints and girths as the mean of 120 bodies has them, for people whose first pose
+                nobody tells.
 
         Raises:
             BodyError: the stature is out of range, or the model unknown.
         """
+        if model == "measured":
+            # Heights are checked where the other models are made.
+            _core.Body.human(height, "full")
+            return cls.load(_MEASURED).scaled(height / _MEASURED_M)
         return cls(_core.Body.human(height, model))
 
     @classmethod

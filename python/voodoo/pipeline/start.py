@@ -130,7 +130,7 @@ def start_tracker(
             tracker without a pose; give `starts_of(init)` to `track`.
         body: what to track; None means the default human, or two legs where there is nothing but a laser to start from.
         height: stature of the default body [m]; not together with `body`.
-        model: how finely that human is divided, see `Body.human`; None: "full".
+        model: which human, see `Body.human`; None: "measured" without a first pose, else "full".
         config: None means the defaults.
         markers: those worn on limbs become sites of the body.
         use: kinds of inputs in use; None: all.
@@ -148,7 +148,7 @@ def start_tracker(
         if init == AUTO and model is None and _only_laser(recording, use):
             body = legs_body(**known)
         else:
-            body = Body.human(**known, model=model or "full")
+            body = Body.human(**known, model=model or ("measured" if init == AUTO else "full"))
     if markers is not None and markers.limbs:
         body = body_with_markers(body, markers.worn())
     for marker, site in () if markers is None else markers.sites.items():

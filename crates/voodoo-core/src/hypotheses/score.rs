@@ -155,9 +155,7 @@ mod tests {
         }
         tried.push(raised(&model, &poses, 0.2).0);
         let costs = costs(&model, &poses, &tried);
-        // Limbs of real girths run into each other at their joints: that is not free.
-        let least = costs[1..].iter().map(|cost| cost.total).fold(f64::INFINITY, f64::min);
-        assert!(3.0 * costs[0].total < least, "{:?} of {least}", costs[0]);
+        assert!(costs[0].total < GAIN, "{:?}", costs[0]);
         for (index, cost) in costs.iter().enumerate().skip(1) {
             assert!(cost.total > costs[0].total + GAIN && cost.evidence > costs[0].evidence, "{index}: {cost:?}");
         }

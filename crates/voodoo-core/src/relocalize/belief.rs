@@ -54,14 +54,14 @@ mod tests {
     #[test]
     fn a_sure_look_is_enough_and_unsure_ones_at_one_place_add_up() {
         assert_eq!(believed(&[Some((6.0, 2.0))]), Some(0));
-        assert_eq!(believed(&[Some((3.0, 2.0)); 5]), Some(2));
-        assert_eq!(believed(&[Some((3.0, 2.0)), Some((3.0, 2.2)), Some((3.0, 2.4))]), Some(2), "people walk");
+        assert_eq!(believed(&[Some((3.0, 2.0)); 5]), Some(1));
+        assert_eq!(believed(&[Some((2.5, 2.0)), Some((2.5, 2.2)), Some((2.5, 2.4))]), Some(2), "people walk");
     }
 
     #[test]
     fn what_flickers_or_jumps_is_nobody() {
         assert_eq!(believed(&[Some((4.0, 2.0)), None, None, None].repeat(5)), None);
-        assert_eq!(believed(&[Some((1.4, 2.0)); 50]), None);
+        assert_eq!(believed(&[Some((1.0, 2.0)); 50]), None);
         assert_eq!(believed(&[Some((4.0, 2.0)), Some((4.0, 4.0))].repeat(5)), None);
     }
 }
