@@ -85,11 +85,11 @@ def test_started_on_a_wrong_place_it_finds_the_person_that_moves(body):
     for pose in wrong.values():
         pose[:3, 3] += (0.3, 1.2, 0.0)
     tracker.reset_pose(wrong)
-    status = []
+    status, off = [], []
     for frame in walk:
         estimate = tracker.step(walk.measurement(frame))
         status.append(str(estimate.status))
-    assert status[3:15] == ["lost"] * 12
-    assert status[-1] == "tracking"
-    off = [np.linalg.norm(estimate.joints[name] - frame.joints[name]) for name in metrics.JOINTS]
-    assert np.mean(off) < 0.05
+        off.append(np.mean([np.linalg.norm(estimate.joints[name] - frame.joints[name]) for name in metrics.JOINTS]))
+    # A detector sees the person; before there was one, the tracker had to wait until the person moved.
+    assert max(off[10:]) < 0.1 and "lost" not in status[10:]
+    assert status[-1] == "tracking" and off[-1] < 0.05

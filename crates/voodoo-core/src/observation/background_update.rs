@@ -28,14 +28,20 @@ impl Backgrounds {
         });
     }
 
-    /// Forgets what was learnt at pixels that show the body.
-    pub(super) fn release(&mut self, frame: &Frame, own: Own) {
-        let Some(image) = frame.images.get(own.image) else { return };
-        if let Some(depth) = self.depth_mut(image) {
-            for pixel in own.pixels {
-                if let Some(depth) = depth.get_mut(*pixel) {
-                    *depth = 0.0;
-                }
+    /// Forgets, and returns, what was learnt at pixels that show the body.
+    pub(super) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
+        let Some(depth) = frame.images.get(own.image).and_then(|image| self.depth_mut(image)) else {
+            return Vec::new();
+        };
+        own.pixels.iter().map(|pixel| depth.get_mut(*pixel).map_or(0.0, std::mem::take)).collect()
+    }
+
+    /// Learns again what was forgotten.
+    pub(super) fn restore(&mut self, frame: &Frame, own: Own, learnt: &[f32]) {
+        let Some(depth) = frame.images.get(own.image).and_then(|image| self.depth_mut(image)) else { return };
+        for (pixel, learnt) in own.pixels.iter().zip(learnt) {
+            if let Some(depth) = depth.get_mut(*pixel) {
+                *depth = *learnt;
             }
         }
     }

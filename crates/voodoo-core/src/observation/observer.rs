@@ -85,9 +85,14 @@ impl Observer {
         self.gather(frame, expected.origin, &bounds, config);
     }
 
-    /// Pixels that were taken for the scene show the body.
-    pub fn release(&mut self, frame: &Frame, own: Own) {
-        self.backgrounds.release(frame, own);
+    /// Pixels that were taken for the scene may show the body; what was learnt there, for `restore`.
+    pub fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
+        self.backgrounds.release(frame, own)
+    }
+
+    /// They do not.
+    pub fn restore(&mut self, frame: &Frame, own: Own, learnt: &[f32]) {
+        self.backgrounds.restore(frame, own, learnt);
     }
 
     /// The candidates in another box.

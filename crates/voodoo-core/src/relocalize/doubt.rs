@@ -65,11 +65,7 @@ impl Doubt {
     }
 
     /// Weighs a detection against the pose, world frame; whether the detection's is to be tried.
-    /// A lost body is where it is seen.
-    pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose], lost: bool) -> bool {
-        if lost {
-            return true;
-        }
+    pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose]) -> bool {
         let mut apart = Vec::with_capacity(TRUNK.len());
         for name in TRUNK {
             if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
@@ -133,9 +129,8 @@ mod tests {
         let about = Pose::from_parts(Vec3::ZERO, Quat::from_rotation_z(std::f64::consts::PI));
         let aside = Pose::from_parts(0.4 * Vec3::X, Quat::IDENTITY);
         let near = Pose::from_parts(0.1 * Vec3::X, Quat::IDENTITY);
-        let tried = |root, lost| Doubt::default().weigh(&seen_at(root), &body, &tracked, lost);
-        assert_eq!([tried(about, false), tried(aside, false), tried(near, false)], [true, true, false]);
-        assert!(tried(near, true), "a lost body is where it is seen");
+        let tried = |root| Doubt::default().weigh(&seen_at(root), &body, &tracked);
+        assert_eq!([about, aside, near].map(tried), [true, true, false]);
     }
 
     #[test]

@@ -104,7 +104,9 @@ impl Relocalizer {
 
     /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame.
     pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool) -> bool {
-        self.people.seen().is_some_and(|detection| self.doubt.weigh(detection, body, world_from_limb, lost))
+        let Some(detection) = self.people.seen() else { return false };
+        // A lost body is where a person is seen for sure.
+        if lost { self.belief.observe(Some(detection)) } else { self.doubt.weigh(detection, body, world_from_limb) }
     }
 
     /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.

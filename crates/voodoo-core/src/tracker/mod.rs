@@ -202,11 +202,16 @@ impl Tracker {
     /// Moves the body to where a detector sees it; whether it is there now.
     fn move_to_detection(&mut self, frame: &Frame) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
-        observer.release(frame, relocalizer.own());
+        let learnt = observer.release(frame, relocalizer.own());
         let seen = observer.seen(frame, motion.origin);
         let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
         let place = relocalizer.detected(setting.of(model), fit, &motion.poses);
-        place.map(|place| motion.predicted.clone_from_slice(place)).is_some() && self.move_to_predicted(frame)
+        let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
+        let moved = better && self.move_to_predicted(frame);
+        if !moved {
+            self.observer.restore(frame, self.relocalizer.own(), &learnt);
+        }
+        moved
     }
 
     /// Moves the body to another place, the predicted one, if it is not lost there; whether it is there now.
