@@ -9,7 +9,7 @@ use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{
     Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };
-use voodoo_core::{Body, BodyError, Config, ConfigError, TaperedEllipticCylinder, TrackError, Tracker};
+use voodoo_core::{Body, BodyError, Config, ConfigError, Status, TaperedEllipticCylinder, TrackError, Tracker};
 
 fn started() -> (Tracker, Vec<[f64; 3]>) {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
@@ -129,8 +129,15 @@ fn bad_sites_and_floors_are_refused() {
 }
 
 #[test]
-fn a_tracker_without_a_pose_refuses_every_frame() {
-    let mut tracker = Tracker::new(Body::human(1.75, HumanModel::Papers).unwrap(), Config::default()).unwrap();
+fn a_tracker_without_a_pose_searches_and_refuses_every_frame_of_a_body_that_no_detector_knows() {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    let estimate = tracker.step(&Frame::empty(0.0)).unwrap();
+    assert_eq!((estimate.status, estimate.stamp, estimate.sites.len()), (Status::Searching, 0.0, 0));
+    assert!(matches!(tracker.step(&Frame::empty(0.0)), Err(TrackError::TimeBackwards { .. })));
+    let sites = body.sites().iter().filter(|site| site.name != "l_hand").cloned().collect();
+    let unknown = Body::new("unknown", body.limbs().to_vec(), sites).unwrap();
+    let mut tracker = Tracker::new(unknown, Config::default()).unwrap();
     assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
     // No residual of zero before anything was measured.
     assert!(tracker.estimate().stamp.is_nan() && tracker.estimate().mean_squared_distance.is_nan());

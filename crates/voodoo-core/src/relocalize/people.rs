@@ -23,7 +23,7 @@ pub(super) struct People {
 impl People {
     /// Whether a body has the joints that a detector tells.
     pub(super) fn know(body: &Body) -> bool {
-        JOINTS.iter().all(|joint| body.site_index(joint).is_ok())
+        JOINTS.iter().all(|joint| body.sites().iter().any(|site| site.name == *joint))
     }
 
     /// What was seen in this frame.
