@@ -60,6 +60,7 @@ impl Relocalizer {
     pub fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.watch.restart();
         self.doubt.restart();
+        self.belief = Belief::default();
         self.motion.clear();
         self.postures.restart(&model.body, poses);
     }
@@ -71,7 +72,7 @@ impl Relocalizer {
 
     /// Body and poses of the surest person in a frame.
     pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.look(frame, None, Wanted::Anybody);
+        let detection = self.people.look(frame, Wanted::Anybody);
         let detection = detection.filter(|_| self.belief.observe(detection))?;
         self.belief = Belief::default();
         people::sized(model, detection)
@@ -86,7 +87,7 @@ impl Relocalizer {
     /// was not where it should be in the frame before, or the body `lost`.
     pub fn look(&mut self, frame: &Frame, body: &Body, root: Vec3, doubtful: bool, lost: bool) {
         if self.doubt.due(frame.stamp, doubtful, lost) && People::know(body) {
-            self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+            self.people.look(frame, if lost { Wanted::Anybody } else { Wanted::Near(root) });
         } else {
             self.people.forget();
         }
@@ -123,7 +124,9 @@ impl Relocalizer {
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
         let (low, high) = (detection.low - origin, detection.high - origin);
         let bounds = Aabb::new(low - Vec3::splat(MARGIN), high + Vec3::splat(MARGIN));
+        // What was believed is tried now: the next time it has to be believed anew.
         self.doubt.tried();
+        self.belief = Belief::default();
         fit.exchange(&mut self.matched);
         self.candidates.gather(context.seen.frame(), origin, &bounds, context.seen.views.backgrounds, context.config);
         let seen = context.seen.with(&self.candidates);

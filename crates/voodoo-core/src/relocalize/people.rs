@@ -4,7 +4,6 @@
 use crate::body::{Body, Model};
 use crate::detect::{Detection, Detector, JOINTS, Surroundings, Wanted, lengths, take_lengths};
 use crate::math::{Pose, Vec3};
-use crate::observation::background::{Background, Backgrounds};
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
 
@@ -48,21 +47,14 @@ impl People {
     }
 
     /// Looks at all depth images of a frame; keeps and returns the surest person.
-    pub(super) fn look(
-        &mut self,
-        frame: &Frame,
-        backgrounds: Option<&Backgrounds>,
-        wanted: Wanted,
-    ) -> Option<&Detection> {
+    pub(super) fn look(&mut self, frame: &Frame, wanted: Wanted) -> Option<&Detection> {
         self.forget();
         if self.detector.is_none() {
             self.detector = Detector::new().ok();
         }
         let detector = self.detector.as_mut()?;
         for (number, image) in frame.images.iter().enumerate() {
-            let background = backgrounds.and_then(|all| all.of(image)).map_or(&[][..], Background::depth);
-            let around =
-                Surroundings { ground: frame.ground, background, excluded: frame.excluded, ..Surroundings::default() };
+            let around = Surroundings { ground: frame.ground, excluded: frame.excluded, ..Surroundings::default() };
             let found = detector.detect(image, &around, wanted).first();
             let surer = |found: &&Detection| self.seen.as_ref().is_none_or(|best| found.person > best.person);
             if let Some(found) = found.filter(surer).cloned() {
