@@ -82,8 +82,8 @@ def test_the_shipped_human_is_the_default_one():
 
 
 def test_names_of_any_kind_survive():
-    odd = 'a "quoted" \\ name\nof two lines \u2028 \x7f \U0001f9b4'
-    quoted = '"""a \\"quoted\\" \\\\ name\nof two lines \u2028 \\u007f \U0001f9b4"""'
+    odd = 'a "quoted" \\ name, 100 % \u00e4 \U0001f9b4'
+    quoted = '"""a \\"quoted\\" \\\\ name, 100 % \u00e4 \U0001f9b4"""'
     text = THING
     for word in ("thing", "base", "arm", "shoulder", "tip"):
         text = text.replace(f'"{word}"', quoted.replace('"""a', f'"""{word}'))

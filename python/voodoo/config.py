@@ -74,7 +74,11 @@ class Config(ConfigFields, frozen=True):
 
     @classmethod
     def load(cls, path: str | Path) -> Config:
-        """A configuration from a TOML file."""
+        """A configuration from a TOML file.
+
+        Raises:
+            ConfigError: it cannot be read, or a key is wrong; it names the file.
+        """
         return cls.from_toml(read_text(path, error=ConfigError), source=str(path))
 
     def to_toml(self, *, edit: str | None = None) -> str:

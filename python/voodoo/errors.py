@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from os import PathLike, fspath
+from pathlib import Path
 
 
 class VoodooError(ValueError):
@@ -31,8 +33,8 @@ class RecordingError(VoodooError):
 
 
 @contextmanager
-def reading(source: object, expected: str) -> Iterator[None]:
-    """Turn whatever a third-party reader throws inside the block into a RecordingError.
+def reading(source: object, expected: str, *, error: type[VoodooError] = RecordingError) -> Iterator[None]:
+    """Turn whatever a parser throws inside the block into one error: the one place where that is done.
 
     Decoders of damaged files fail in many ways (struct.error, KeyError, zlib.error, AssertionError, MemoryError...);
     the caller needs one. Errors that are already clear pass unchanged.
@@ -40,16 +42,46 @@ def reading(source: object, expected: str) -> Iterator[None]:
     Args:
         source: file, or file and topic, being read.
         expected: what should have been there, e.g. "a readable ROS 2 bag".
+        error: what to raise.
 
     Raises:
-        RecordingError: for any other Exception raised in the block.
+        VoodooError: of the class `error`, for any other Exception raised in the block.
     """
     try:
         yield
     except VoodooError:
         raise
     except FileNotFoundError:
-        raise RecordingError(f"{source}: expected {expected}, found no such file") from None
-    except Exception as error:
-        found = str(error).strip() or "no further detail"
-        raise RecordingError(f"{source}: expected {expected}, found damage: {type(error).__name__}: {found}") from error
+        raise error(f"{source}: expected {expected}, found no such file") from None
+    except OSError as cause:
+        raise error(f"{source}: expected {expected}, found: {cause.strerror or cause}") from cause
+    except Exception as cause:
+        found = shortened(str(cause).strip() or "no further detail")
+        raise error(f"{source}: expected {expected}, found damage: {type(cause).__name__}: {found}") from cause
+
+
+def shortened(text: str, *, most: int = 300) -> str:
+    """A text for a message: what a file holds may be megabytes."""
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Path:
+    """A path that a caller gave, `~` expanded.
+
+    Args:
+        path: what was given.
+        error: what to raise.
+        name: of the argument.
+
+    Raises:
+        VoodooError: of the class `error`: no path, a home of nobody, or a NUL within; it names the argument.
+    """
+    if not isinstance(path, str | PathLike) or not isinstance(fspath(path), str):
+        raise error(f"{name}: expected a file or folder, found {type(path).__name__}")
+    text = fspath(path)
+    if "\0" in text:
+        raise error(f"{name}: expected a file or folder, found a name with a NUL: {text!r:.80}")
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        raise error(f"{name}: expected a file or folder, found the home of an unknown user: {text}") from None

@@ -10,8 +10,9 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
 from voodoo.config import Config
-from voodoo.errors import BodyError, ConfigError
+from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
+from voodoo.model.joint import number_of
 
 
 class Tracker:
@@ -93,6 +94,8 @@ class Tracker:
                 is not looked for, because it lacks sites of a person.
             BodyError: the frame names a limb or site that is not in the body.
         """
+        if not isinstance(frame, Frame):
+            raise MeasurementError(f"frame: expected a voodoo.Frame, found {type(frame).__name__}")
         return self._core.step(frame)
 
     def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
@@ -117,7 +120,7 @@ class Tracker:
         Raises:
             BodyError: a factor that leaves no body.
         """
-        self._core.scale(factor)
+        self._core.scale(number_of("factor", factor))
 
     def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None:
         """Change the dimensions [m] of one limb without losing the track; joints and sites on it move along with its length.
@@ -125,6 +128,7 @@ class Tracker:
         Raises:
             BodyError: an unknown limb.
         """
+        _check_parts(limb=(limb, str), shape=(shape, TaperedEllipticCylinder))
         self._core.set_shape(limb, shape)
 
     def add_limb(
@@ -148,6 +152,9 @@ class Tracker:
         Raises:
             BodyError: a name that is taken, an unknown parent, or numbers that make no joint.
         """
+        _check_parts(
+            name=(name, str), parent=(parent, str), shape=(shape, TaperedEllipticCylinder), joint=(joint, Joint)
+        )
         places = list(checked_joints(sites or {}, what="sites").items())
         self._core._add_limb(name, parent, shape, joint.parts(), places)
 
@@ -157,6 +164,7 @@ class Tracker:
         Raises:
             BodyError: an unknown limb, or the root.
         """
+        _check_parts(name=(name, str))
         self._core.remove_limb(name)
 
     def __copy__(self) -> Tracker:
@@ -166,3 +174,15 @@ class Tracker:
     def __repr__(self) -> str:
         """Body, limbs and last estimate."""
         return repr(self._core)
+
+
+def _check_parts(**parts: tuple[object, type]) -> None:
+    """Refuse arguments of another kind.
+
+    Raises:
+        BodyError: it names the argument.
+    """
+    for name, (value, kind) in parts.items():
+        if not isinstance(value, kind):
+            expected = "a name" if kind is str else f"a voodoo.{kind.__name__}"
+            raise BodyError(f"{name}: expected {expected}, found {type(value).__name__}")

@@ -228,8 +228,8 @@ fn refuses_what_it_cannot_use_and_keeps_the_last_image() {
     let mut skewed = view;
     skewed.world_from_sensor.rotation.x = 3.0;
     for (poses, view, word) in [
-        (&poses[1..], view, "one finite pose a limb"),
-        (&lame[..], view, "one finite pose a limb"),
+        (&poses[1..], view, "one rigid pose a limb"),
+        (&lame[..], view, "one rigid pose a limb"),
         (&poses[..], Viewpoint { width: 0, ..view }, "at least one pixel"),
         (&poses[..], Viewpoint { intrinsics: [0.0, 1.0, 1.0, 1.0], ..view }, "positive focal lengths"),
         (&poses[..], Viewpoint { intrinsics: [1.0, 1.0, f64::NAN, 1.0], ..view }, "finite centre"),

@@ -6,6 +6,7 @@ use voodoo_core::Body;
 use voodoo_core::math::Aabb;
 use voodoo_core::observation::frame::Ground;
 
+use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
 use crate::borrowed::{Borrowed, CloudData, DepthArray, Held, ImageData, SiteData};
 use crate::errors::exception;
@@ -55,7 +56,7 @@ impl PyFrame {
 impl PyFrame {
     #[new]
     #[pyo3(signature = (stamp))]
-    fn new(stamp: f64) -> Self {
+    fn new(#[pyo3(from_py_with = arguments::stamp)] stamp: f64) -> Self {
         let (clouds, images, sites, excluded, sources) = Default::default();
         Self { stamp, clouds, images, sites, ground: None, excluded, sources }
     }
@@ -79,7 +80,7 @@ impl PyFrame {
         &mut self,
         points: &Bound<'_, PyAny>,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
-        weight: f64,
+        #[pyo3(from_py_with = arguments::weight)] weight: f64,
         limb: Option<String>,
         on_body: bool,
         source: &str,
@@ -113,9 +114,9 @@ impl PyFrame {
         &mut self,
         image: &Bound<'_, PyAny>,
         camera: &Bound<'_, PyAny>,
-        metres_per_unit: f64,
+        #[pyo3(from_py_with = arguments::metres_per_unit)] metres_per_unit: f64,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
-        weight: f64,
+        #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
         let number = |name: &str| camera.getattr(name)?.extract::<f64>();
@@ -187,10 +188,10 @@ impl PyFrame {
     #[pyo3(signature = (site, position, *, weight=1.0, bias=0.0, source="positions"))]
     fn add_position(
         &mut self,
-        site: String,
+        #[pyo3(from_py_with = arguments::site)] site: String,
         position: &Bound<'_, PyAny>,
-        weight: f64,
-        bias: f64,
+        #[pyo3(from_py_with = arguments::weight)] weight: f64,
+        #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
         let data = SiteData {
@@ -218,11 +219,11 @@ impl PyFrame {
     #[pyo3(signature = (site, *, origin, direction, weight=1.0, bias=0.0, source="rays"))]
     fn add_ray(
         &mut self,
-        site: String,
+        #[pyo3(from_py_with = arguments::site)] site: String,
         origin: &Bound<'_, PyAny>,
         direction: &Bound<'_, PyAny>,
-        weight: f64,
-        bias: f64,
+        #[pyo3(from_py_with = arguments::weight)] weight: f64,
+        #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
         let data = SiteData {
@@ -246,7 +247,11 @@ impl PyFrame {
     /// Raises:
     ///     MeasurementError: not three numbers.
     #[pyo3(signature = (*, normal, offset=0.0))]
-    fn set_ground(&mut self, normal: &Bound<'_, PyAny>, offset: f64) -> PyResult<()> {
+    fn set_ground(
+        &mut self,
+        normal: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = arguments::offset)] offset: f64,
+    ) -> PyResult<()> {
         self.ground = Some(Ground { normal: vector("normal", normal)?, offset });
         Ok(())
     }

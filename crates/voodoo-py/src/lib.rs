@@ -4,8 +4,8 @@
     reason = "the documentation of the Python side stands in _core.pyi, that of what voodoo exports here, too: a test compares"
 )]
 
+mod arguments;
 mod arrays;
-
 mod body;
 mod borrowed;
 mod config;

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use voodoo_core::math::{Points, Pose};
 use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};
 
+use crate::arguments;
 use crate::arrays::{PointArray, vector};
 use crate::errors::IntoPy;
 
@@ -31,7 +32,14 @@ type Array<'py> = Bound<'py, PyArray1<f64>>;
 impl PyShape {
     #[new]
     #[pyo3(signature = (length, a0, b0, a1, b1))]
-    fn new(py: Python<'_>, length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::length)] length: f64,
+        #[pyo3(from_py_with = arguments::a0)] a0: f64,
+        #[pyo3(from_py_with = arguments::b0)] b0: f64,
+        #[pyo3(from_py_with = arguments::a1)] a1: f64,
+        #[pyo3(from_py_with = arguments::b1)] b1: f64,
+    ) -> PyResult<Self> {
         TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(|error| error.into_py(py))
     }
 

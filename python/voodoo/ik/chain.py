@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import MeasurementError
+from voodoo.errors import BodyError, MeasurementError
 from voodoo.ik.image import Silhouette, seen_views
 from voodoo.ik.options import Options
 from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, vector
@@ -32,7 +32,10 @@ class Chain:
             BodyError: an unknown limb, or limbs that do not hang together.
             MeasurementError: another word for root, or a single name for limbs.
         """
-        if isinstance(limbs, str):
+        if not isinstance(body, Body):
+            raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
+        listed = not isinstance(limbs, str) and isinstance(limbs, Iterable)
+        if not listed or not all(isinstance(name, str) for name in limbs):
             raise MeasurementError(f"limbs: expected a list of names, found {limbs!r}")
         root = root if root is not None else ("fixed" if limbs else "free")
         if root not in ("free", "fixed"):

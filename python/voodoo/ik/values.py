@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -28,12 +28,14 @@ def listed_bones(bones: Sequence[Bone] | None) -> list[Bone] | None:
     """
     if bones is None:
         return None
+    if isinstance(bones, str) or not isinstance(bones, Iterable):
+        raise MeasurementError(f"bones: expected a list of (site, site, radius), found {bones!r}")
     found: list[Bone] = []
     for bone in bones:
         try:
             first, second, radius = bone
             found.append((str(first), str(second), float(radius)))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise MeasurementError(f"bones: expected (site, site, radius), found {bone!r}") from None
         if not 0.0 <= found[-1][2] < math.inf:
             raise MeasurementError(f"bones: expected a radius of at least 0 m, found {radius!r}")
@@ -84,7 +86,7 @@ def numbers(what: str, values: npt.ArrayLike) -> FloatArray:
     """
     try:
         return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise MeasurementError(f"{what}: expected numbers, found {values!r}") from None
 
 
@@ -96,6 +98,6 @@ def three(what: str, values: Vector) -> tuple[float, float, float]:
     """
     try:
         x, y, z = np.asarray(values, dtype=np.float64).reshape(-1).tolist()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise MeasurementError(f"{what}: expected three numbers, found {values!r}") from None
     return x, y, z

@@ -14,7 +14,7 @@ import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, MeasurementError
 from voodoo.model.body_toml import body_text, core_body
-from voodoo.model.joint import Joint, Place, short
+from voodoo.model.joint import Joint, Place, number_of, short
 from voodoo.model.toml_io import read_text
 from voodoo.names import HumanModel
 
@@ -72,11 +72,12 @@ class Body:
         Raises:
             BodyError: the stature is out of range, or the model unknown.
         """
+        height = number_of("height", height, "a stature in metres")
         if model == "measured":
             # Heights are checked where the other models are made.
             _core.Body.human(height, "full")
             return cls.load(_MEASURED).scaled(height / _MEASURED_M)
-        return cls(_core.Body.human(height, model))
+        return cls(_core.Body.human(height, str(model)))
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = "body") -> Body:
@@ -89,12 +90,20 @@ class Body:
 
     @classmethod
     def load(cls, path: str | Path) -> Body:
-        """A body from a TOML file."""
+        """A body from a TOML file.
+
+        Raises:
+            BodyError: it cannot be read, or as `from_toml`; it names the file.
+        """
         return cls.from_toml(read_text(path, error=BodyError), source=str(path))
 
     def scaled(self, factor: float) -> Body:
-        """The body with all lengths multiplied by a factor."""
-        return Body(self._core.scaled(factor))
+        """The body with all lengths multiplied by a factor.
+
+        Raises:
+            BodyError: no number, or one that leaves no body.
+        """
+        return Body(self._core.scaled(number_of("factor", factor)))
 
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
@@ -129,7 +138,7 @@ def checked_joints(
     for name, position in joints.items():
         try:
             x, y, z = (float(value) for value in np.asarray(position, dtype=np.float64).reshape(-1))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise BodyError(f"{what}[{name}]: expected three numbers in metres, found {position!r}") from None
         if not all(map(math.isfinite, (x, y, z))):
             raise BodyError(f"{what}[{name}]: expected finite metres, found {position!r}")
@@ -157,7 +166,7 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
     for name in names:
         try:
             poses.append(np.asarray(world_from_limb[name], dtype=np.float64))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             found = short(world_from_limb[name])
             raise MeasurementError(f"world_from_limb[{name}]: expected a rigid 4x4 transform, found {found}") from None
     return poses

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import CameraError
+from voodoo.model.joint import short
 
 CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant"]
 """Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
@@ -25,6 +26,10 @@ _COEFFICIENTS: dict[str, tuple[int, ...]] = {
 }
 _ALIASES = {"": "plumb_bob", "none": "plumb_bob", "fisheye": "equidistant", "kannala_brandt4": "equidistant"}
 _ROUND_TRIP_PX = 0.1
+MOST_PIXELS = 2**25
+"""Of an image: those of an 8K picture. What is larger was mistyped, and would take gigabytes; the core has the same limit."""
+_STRIP = 2**20
+"""Pixels whose rays are found at a time: the memory of the whole picture's would be eight times as much."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,13 @@ class Camera:
         for name in ("width", "height"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-                raise CameraError(f"camera {name}: expected a whole number of pixels >= 1, found {value!r}")
+                raise CameraError(f"camera {name}: expected a whole number of pixels >= 1, found {short(value)}")
             object.__setattr__(self, name, int(value))
+        if self.width * self.height > MOST_PIXELS:
+            raise CameraError(
+                f"camera size: expected at most {MOST_PIXELS} pixels, as an 8K picture has, "
+                f"found {short(self.width)}x{short(self.height)}"
+            )
         for name in ("fx", "fy", "cx", "cy"):
             value = _number(f"camera {name}", getattr(self, name))
             if name in ("fx", "fy") and value <= 0.0:
@@ -206,9 +216,13 @@ class Camera:
 
 @lru_cache(maxsize=16)
 def _rays(camera: Camera) -> npt.NDArray[np.float32]:
-    u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
-    pixels = np.stack([u, v], axis=-1).reshape(-1, 2)
-    rays = camera.undistorted(pixels).reshape(camera.height, camera.width, 2).astype(np.float32)
+    rays = np.empty((camera.height, camera.width, 2), dtype=np.float32)
+    columns = np.arange(camera.width, dtype=np.float64)
+    rows_together = max(_STRIP // camera.width, 1)
+    for start in range(0, camera.height, rows_together):
+        rows = np.arange(start, min(start + rows_together, camera.height), dtype=np.float64)
+        pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        rays[start : start + len(rows)] = camera.undistorted(pixels).reshape(len(rows), camera.width, 2)
     rays.setflags(write=False)
     return rays
 
@@ -216,8 +230,8 @@ def _rays(camera: Camera) -> npt.NDArray[np.float32]:
 def _number(name: str, value: object) -> float:
     try:
         number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise CameraError(f"{name}: expected a number, found {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise CameraError(f"{name}: expected a number, found {short(value)}") from None
     if not math.isfinite(number):
         raise CameraError(f"{name}: expected a finite number, found {number!r}")
     return number
@@ -227,8 +241,8 @@ def _numbers(name: str, values: Any, *, count: int | None = None) -> tuple[float
     """The numbers of an iterable, or of an array of any shape row by row."""
     try:
         rows = np.asarray(values if hasattr(values, "__len__") else list(values), dtype=np.float64)
-    except (TypeError, ValueError):
-        raise CameraError(f"{name}: expected numbers, found {values!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise CameraError(f"{name}: expected numbers, found {short(values)}") from None
     if count is not None and rows.size != count:
         raise CameraError(f"{name}: expected {count} numbers, found {rows.size}")
     return tuple(_number(name, value) for value in rows.reshape(-1).tolist())

@@ -99,6 +99,20 @@ def _child(node: object, part: str | int) -> object:
     return node[part] if isinstance(node, list) and isinstance(part, int) and part < len(node) else None
 
 
+def number_of(name: str, value: object, expected: str = "a number") -> float:
+    """A plain number that a caller gave.
+
+    Raises:
+        BodyError: it is none; names the argument.
+    """
+    try:
+        if isinstance(value, str):
+            raise TypeError
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise BodyError(f"{name}: expected {expected}, found {short(value)}") from None
+
+
 def short(value: object) -> str:
     """A value as it is shown in a message."""
     text = repr(value)

@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, a_path, reading, shortened
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+_LARGEST = 10_000_000
+"""Bytes of a TOML file; no body or configuration has a thousandth of it."""
 
 
 def parse_toml(text: str, *, source: str, error: type[VoodooError]) -> dict[str, Any]:
@@ -28,10 +31,12 @@ def parse_toml(text: str, *, source: str, error: type[VoodooError]) -> dict[str,
     """
     if not isinstance(text, str):
         raise error(f"{source}: expected TOML text, found {type(text).__name__}")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as cause:
-        raise error(f"{source}: expected a TOML file, found a syntax error: {cause}") from None
+    # Tables nested a thousand deep and numbers of ten thousand digits make the parser fail in other ways.
+    with reading(source, "a TOML file", error=error):
+        try:
+            return tomllib.loads(text)
+        except tomllib.TOMLDecodeError as cause:
+            raise error(f"{source}: expected a TOML file, found a syntax error: {shortened(str(cause))}") from None
 
 
 def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
@@ -40,10 +45,11 @@ def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
     Raises:
         VoodooError: of the class `error`, naming the file.
     """
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as cause:
-        raise error(f"{path}: expected a readable TOML file, found: {cause}") from None
+    file = a_path(path, error=error)
+    with reading(path, "a readable TOML file", error=error):
+        if file.stat().st_size > _LARGEST:
+            raise error(f"{path}: expected a readable TOML file, found {file.stat().st_size} bytes")
+        return file.read_text(encoding="utf-8")
 
 
 def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequence[str]]) -> str:

@@ -19,7 +19,7 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
     """
     try:
         pose = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         pose = np.empty(0)
     if pose.shape != (4, 4) or not np.isfinite(pose).all() or not _turns_and_shifts(pose.tolist()):
         raise MeasurementError(f"{name}: expected a rigid 4x4 transform, found {value!r}")

@@ -99,7 +99,7 @@ def _pose(rows: object, where: str) -> FloatArray:
         return np.eye(4)
     try:
         pose = np.array(rows, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         pose = np.empty(0)
     rigid = (
         pose.shape == (4, 4)

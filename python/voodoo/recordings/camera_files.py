@@ -79,7 +79,7 @@ def _camera(where: str, key: str, table: dict[str, Any]) -> PlacedCamera:
 def _numbers(where: str, table: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> FloatArray:
     try:
         values = np.array(table[key], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = np.array([np.nan])
     if not np.isfinite(values).all() or (shape is not None and values.shape != shape) or values.ndim == 0:
         expected = "a list of" if shape is None else "x".join(map(str, shape))

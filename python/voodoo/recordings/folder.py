@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
-from pathlib import Path
+from pathlib import Path, PurePath
 
-from voodoo.errors import RecordingError, reading
+from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.calibration import Calibration, read_calibration
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate
+from voodoo.recordings.stored import read_stored, read_stored_text
 
 _PICTURES = (".png", ".jpg", ".jpeg")
 
@@ -87,13 +88,7 @@ class FolderRecording(Recording):
             while color is not None and upcoming is not None and upcoming[0] <= stamp:
                 measurements.append(_color_image(*upcoming, color))
                 upcoming = next(colors, None)
-            image = decode_depth_png(_read(file), file)
-            size = (image.shape[1], image.shape[0])
-            if size != (depth.camera.width, depth.camera.height):
-                raise RecordingError(
-                    f"{file}: expected {depth.camera.width}x{depth.camera.height} px as calibrated, "
-                    f"found {size[0]}x{size[1]}"
-                )
+            image = decode_depth_png(_read(file), file, (depth.camera.width, depth.camera.height))
             scale = 1.0 / self._calibration.depth_factor
             measurements.append(DepthImage("depth", stamp, image, scale, depth.camera, depth.root_from_sensor))
             yield RecordedFrame(stamp, tuple(measurements))
@@ -123,15 +118,15 @@ def _listing(path: Path, name: str, suffixes: tuple[str, ...]) -> list[tuple[flo
     table = path / f"{name}.txt"
     entries: list[tuple[float, Path]] = []
     if table.is_file():
-        with reading(table, "a list of images"):
-            lines = table.read_text(encoding="utf-8").splitlines()
+        lines = read_stored_text(table, "a list of images").splitlines()
         for number, line in enumerate(lines, start=1):
             words = line.split("#", 1)[0].split()
             if not words:
                 continue
             if len(words) != 2:
                 raise RecordingError(f"{table}, line {number}: expected 'stamp file', found {line!r}")
-            entries.append((_stamp(words[0], f"{table}, line {number}"), path / words[1]))
+            where = f"{table}, line {number}"
+            entries.append((_stamp(words[0], where), path / _inside(words[1], where)))
     elif (path / name).is_dir():
         files = [file for file in (path / name).iterdir() if file.suffix.lower() in suffixes]
         entries = sorted((_stamp(file.stem, str(file)), file) for file in files)
@@ -139,6 +134,17 @@ def _listing(path: Path, name: str, suffixes: tuple[str, ...]) -> list[tuple[flo
         if after <= before:
             raise RecordingError(f"{file}: expected a stamp after {before:.6f}, found {after:.6f}")
     return entries
+
+
+def _inside(name: str, where: str) -> str:
+    """The name of a file in the folder.
+
+    Raises:
+        RecordingError: it leads elsewhere.
+    """
+    if PurePath(name).is_absolute() or ".." in PurePath(name).parts or "\0" in name:
+        raise RecordingError(f"{where}: expected a file inside the folder, found {name!r:.80}")
+    return name
 
 
 def _stamp(text: str, where: str) -> float:
@@ -152,8 +158,7 @@ def _stamp(text: str, where: str) -> float:
 
 
 def _read(file: Path) -> bytes:
-    with reading(file, "a readable picture"):
-        return file.read_bytes()
+    return read_stored(file, "a readable picture")
 
 
 def _color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:

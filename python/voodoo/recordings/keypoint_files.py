@@ -10,6 +10,7 @@ import numpy as np
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
 from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.recordings.stored import read_stored_text
 
 
 def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
@@ -21,7 +22,7 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
     count = layout_of(layout).count
     path = Path(path)
     with reading(path, "an OpenPose JSON file"):
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_stored_text(path, "an OpenPose JSON file"))
     people = content.get("people") if isinstance(content, dict) else None
     if not isinstance(people, list):
         raise RecordingError(f"{path}: expected an object with a list of people, found {content!r:.80}")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import inspect
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from voodoo.errors import RecordingError
+from voodoo.errors import RecordingError, a_path
 
 if TYPE_CHECKING:
     from voodoo.recordings.recording import Recording
@@ -92,9 +91,7 @@ def open_recording(
     Raises:
         RecordingError: nothing there, no loader for it, an unknown loader or option, or damage.
     """
-    if not isinstance(path, str | os.PathLike):
-        raise RecordingError(f"path: expected a file or folder, found {type(path).__name__}")
-    path = Path(path).expanduser()
+    path = a_path(path, error=RecordingError)
     if loader is not None and loader not in LOADERS:
         raise RecordingError(f"loader {loader!r}: expected one of {', '.join(LOADERS)}")
     if not path.exists():

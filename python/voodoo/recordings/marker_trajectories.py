@@ -3,7 +3,9 @@ limb."""
 
 from __future__ import annotations
 
+import io
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +14,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import RecordingError, VoodooError, reading
+from voodoo.errors import RecordingError, reading, shortened
+from voodoo.recordings.stored import read_stored, read_stored_text
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -85,8 +88,7 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     path = Path(path)
     if not path.is_file():
         raise RecordingError(f"{path}: expected a .trc file, found none")
-    with reading(path, "a readable .trc file"):
-        lines = path.read_text(encoding="utf-8").splitlines()
+    lines = read_stored_text(path, "a readable .trc file").splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise RecordingError(f"{path}: expected a .trc file (PathFileType ... in the first line), found another")
     header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
@@ -124,38 +126,39 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
 
 
 def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
-    """Read the points of a .c3d file with the ezc3d library (`pip install voodoo[c3d]`).
+    """Read the points of a .c3d file with the library c3d, which is plain Python: compiled readers have been killed by
+    damaged files.
 
     Args:
         path: the file.
         world_from_file: (3, 3) rotation applied to every position; None keeps the file's axes.
 
     Raises:
-        VoodooError: ezc3d is not installed.
         RecordingError: damage, no points, or an unknown unit.
     """
-    try:
-        import ezc3d  # type: ignore[import-not-found,import-untyped,unused-ignore]
-    except ImportError as error:
-        raise VoodooError(f"{path}: reading .c3d needs the library ezc3d: pip install voodoo[c3d]") from error
+    import c3d
+
     path = Path(path)
-    if not path.is_file():
-        raise RecordingError(f"{path}: expected a .c3d file, found none")
-    with reading(path, "a .c3d file"):
-        content = ezc3d.c3d(str(path))
-        points = np.asarray(content["data"]["points"], dtype=np.float64)
-        parameters = content["parameters"]["POINT"]
-        names = tuple(str(name).strip() for name in parameters["LABELS"]["value"])[: points.shape[1]]
-        unit = str(parameters["UNITS"]["value"][0]).strip() if parameters["UNITS"]["value"] else "mm"
-        rate = float(content["header"]["points"]["frame_rate"])
-        first = int(content["header"]["points"]["first_frame"])
-    if not points.size or unit not in _METRES or not rate > 0.0 or len(set(names)) != points.shape[1]:
+    content = read_stored(path, "a .c3d file")
+    with reading(path, "a .c3d file"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        reader = c3d.Reader(io.BytesIO(content))
+        frames = [points[:, :5].astype(np.float64) for _, points, _ in reader.read_frames(copy=False)]
+        names = tuple(str(name).strip() for name in reader.point_labels)
+        written = reader.get("POINT:UNITS")
+        unit = "mm" if written is None else str(written.string_value).strip() or "mm"
+        rate, first = float(reader.point_rate), int(reader.first_frame)
+    count = len(frames[0]) if frames else 0
+    names = names[:count]
+    if not count or unit not in _METRES or not 0.0 < rate < math.inf or len(set(names)) != count:
         raise RecordingError(
-            f"{path}: expected named points in m, cm or mm at a rate above zero, found {points.shape[1]} points with "
-            f"{len(set(names))} names in {unit!r} at {rate} Hz"
+            f"{path}: expected named points in m, cm or mm at a rate above zero, found {count} points with "
+            f"{len(set(names))} names in {shortened(repr(unit))} at {rate} Hz"
         )
-    stamps = (first + np.arange(points.shape[2])) / rate
-    positions = points[:3].transpose(2, 1, 0) * _METRES[unit]
+    table = np.array(frames)
+    positions = table[:, :, :3] * _METRES[unit]
+    positions[table[:, :, 3] < 0.0] = np.nan  # the format's mark of a point that was not seen
+    stamps = (first + np.arange(len(table))) / rate
     return _trajectories(path, stamps, names, positions, rate, world_from_file)
 
 

@@ -15,6 +15,9 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError
 
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+_JPEG_MAGIC = b"\xff\xd8\xff"
+_JPEG_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
+"""Marks of a JPEG that tell its size."""
 
 
 def check_png(data: bytes, source: object) -> None:
@@ -40,13 +43,57 @@ def check_png(data: bytes, source: object) -> None:
     raise RecordingError(f"{source}: expected a complete PNG, found it cut off after {len(data)} bytes")
 
 
-def decode_depth_png(data: bytes, source: object) -> npt.NDArray[np.uint16]:
-    """Decode a 16-bit single-channel PNG to (H, W) uint16.
+def picture_size(data: bytes, source: object) -> tuple[int, int]:
+    """(width, height) that the header of a PNG or JPEG announces; nothing is decoded.
 
     Raises:
-        RecordingError: damaged, or not 16-bit grey.
+        RecordingError: neither PNG nor JPEG, or one without a size.
+    """
+    if data[:8] == _PNG_MAGIC:
+        if len(data) >= 24 and data[12:16] == b"IHDR":
+            width, height = struct.unpack_from(">II", data, 16)
+            return width, height
+        raise RecordingError(f"{source}: expected a PNG with a header, found {len(data)} bytes without")
+    if data[:3] != _JPEG_MAGIC:
+        raise RecordingError(f"{source}: expected a JPEG or PNG, found bytes starting with {data[:8]!r}")
+    at = 2
+    while at + 9 <= len(data) and data[at] == 0xFF:
+        mark = data[at + 1]
+        if mark == 0xFF:  # filling
+            at += 1
+            continue
+        if mark in _JPEG_FRAMES:
+            height, width = struct.unpack_from(">HH", data, at + 5)
+            return width, height
+        (length,) = struct.unpack_from(">H", data, at + 2)
+        at += 2 + length
+    raise RecordingError(f"{source}: expected a JPEG with a size, found {len(data)} bytes without")
+
+
+def check_size(data: bytes, source: object, size: tuple[int, int]) -> None:
+    """Refuse a picture by the size in its header: a small file of 30,000 x 30,000 pixels would take gigabytes.
+
+    Raises:
+        RecordingError: another size than expected, (width, height).
+    """
+    found = picture_size(data, source)
+    if found != size:
+        raise RecordingError(f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {found[0]}x{found[1]}")
+
+
+def decode_depth_png(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArray[np.uint16]:
+    """Decode a 16-bit single-channel PNG to (H, W) uint16.
+
+    Args:
+        data: the file's bytes.
+        source: what to name in errors.
+        size: expected (width, height).
+
+    Raises:
+        RecordingError: damaged, not 16-bit grey, or of another size.
     """
     check_png(data, source)
+    check_size(data, source, size)
     image = _decode(data, cv2.IMREAD_UNCHANGED, source)
     if image.ndim != 2 or image.dtype != np.uint16:
         raise RecordingError(
@@ -66,13 +113,14 @@ def decode_color(data: bytes, source: object, size: tuple[int, int]) -> npt.NDAr
     Raises:
         RecordingError: damaged, cut off, neither PNG nor JPEG, or of another size.
     """
-    if data[:3] == b"\xff\xd8\xff":
+    if data[:3] == _JPEG_MAGIC:
         if b"\xff\xd9" not in data[-1024:]:  # some cameras pad after the end mark
             raise RecordingError(f"{source}: expected a complete JPEG, found no end mark in {len(data)} bytes")
     elif data[:8] == _PNG_MAGIC:
         check_png(data, source)
     else:
         raise RecordingError(f"{source}: expected a JPEG or PNG, found bytes starting with {data[:8]!r}")
+    check_size(data, source, size)
     image = _decode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, source)
     if (image.shape[1], image.shape[0]) != size:
         raise RecordingError(

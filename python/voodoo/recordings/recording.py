@@ -165,7 +165,7 @@ def number_option(path: Path, name: str, value: object, expected: str, *, most: 
     """
     try:
         number = float(value) if not isinstance(value, str) else math.nan  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (0.0 < number <= most or (zero and number == 0.0)):
         raise RecordingError(f"{path}: {name}: expected {expected}, found {value!r}")

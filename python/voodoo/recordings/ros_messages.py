@@ -109,7 +109,7 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
     if "rvl" in message.format.lower():
         raise RecordingError(f"{source}: expected PNG-compressed depth, found format {message.format!r}")
     header = b"" if data.startswith(b"\x89PNG") else data[:12]
-    image: npt.NDArray[Any] = decode_depth_png(data[len(header) :], source)
+    image: npt.NDArray[Any] = decode_depth_png(data[len(header) :], source, (camera.width, camera.height))
     if "32FC1" in message.format:
         if len(header) != 12:
             raise RecordingError(f"{source}: expected the 12-byte header of compressed depth, found none")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Callable
@@ -14,6 +15,7 @@ import numpy as np
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
 from voodoo.recordings.recording import Reference, Start
+from voodoo.recordings.stored import read_stored_text
 
 TRUTH_FRAME = "base_link"
 """Frame of both files."""
@@ -37,8 +39,8 @@ def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
     Raises:
         RecordingError: another header, a short row, a cell that is no number, stamps that do not rise.
     """
-    with reading(path, "a table of joint positions"), path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
+    with reading(path, "a table of joint positions"):
+        rows = list(csv.reader(io.StringIO(read_stored_text(path, "a table of joint positions"))))
     if len(rows) < 2:
         raise RecordingError(f"{path}: expected a header and at least one row, found {len(rows)} lines")
     header = rows[0]
@@ -71,7 +73,7 @@ def read_start(path: Path, root_from_base: FloatArray) -> Start:
         RecordingError: not JSON, or not of that form.
     """
     with reading(path, "a JSON file"):
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_stored_text(path, "a JSON file"))
     if not isinstance(content, dict) or not isinstance(content.get("joints"), dict) or not content["joints"]:
         raise RecordingError(f"{path}: expected an object with the joints of the first frame, found {content!r:.80}")
     joints = {}

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.io
 
-from voodoo.errors import RecordingError, reading
+from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, RecordedFrame
 from voodoo.model.camera import Camera
+from voodoo.recordings.matlab import read_mat
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
@@ -113,12 +113,11 @@ class UtdMhadRecording(Recording):
 
 
 def _variable(path: Path, name: str) -> npt.NDArray[Any]:
-    with reading(path, f"a MATLAB file with {name}"):
-        content = scipy.io.loadmat(str(path))
-    if not isinstance(content.get(name), np.ndarray):
-        names = ", ".join(key for key in content if not key.startswith("__")) or "no variables"
+    content = read_mat(path)
+    if name not in content:
+        names = ", ".join(content) or "no numeric variables"
         raise RecordingError(f"{path}: expected the variable {name}, found {names}")
-    return np.asarray(content[name])
+    return content[name]
 
 
 def _read_skeleton(path: Path, frames: int) -> Reference:

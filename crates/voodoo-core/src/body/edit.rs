@@ -34,6 +34,7 @@ impl Body {
         for site in &mut body.sites {
             site.position *= factor;
         }
+        body.check()?;
         Ok(body)
     }
 
@@ -44,6 +45,7 @@ impl Body {
         let mut body = self.clone();
         body.limbs[index].shape = shape;
         body.map_landmarks(index, |_, position| position * stretch);
+        body.check()?;
         Ok(body)
     }
 

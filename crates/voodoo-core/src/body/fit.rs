@@ -3,7 +3,7 @@
 use super::{Body, Joint, JointKind};
 use crate::body::kinematics::joint_turn;
 use crate::error::TrackError;
-use crate::math::{Mat3, Moments, Pose, Quat, Vec3};
+use crate::math::{Mat3, Moments, Pose, Quat, Vec3, is_place};
 
 /// A hinge bent by less than this does not tell its axis: sine of the angle between its limbs.
 const BENT: f64 = 0.3;
@@ -45,11 +45,11 @@ impl Body {
     /// were measured. Positions that make it more than ten times larger or smaller are refused.
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         for (site, position) in positions {
-            if !position.is_finite() {
+            if !is_place(*position) {
                 let name = &self.sites()[*site].name;
                 return Err(TrackError::measurement(
                     format!("joints[{name}]"),
-                    "finite metres",
+                    "finite metres, 1e9 at most",
                     format!("{position:?}"),
                 ));
             }

@@ -14,7 +14,7 @@ pub use joint::{Joint, JointKind};
 pub use model::Model;
 
 use crate::error::BodyError;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, is_place, is_rigid};
 use crate::shape::TaperedEllipticCylinder;
 
 /// One rigid part of a body. Its frame has z along the axis of the shape, from the proximal end to the distal one.
@@ -138,6 +138,7 @@ impl Body {
         if self.limbs.is_empty() {
             return Err(BodyError::Empty);
         }
+        check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {
             let key = format!("limbs.{}", limb.name);
             check_name(&key, &limb.name)?;
@@ -146,7 +147,10 @@ impl Body {
             }
             match (&limb.parent, index) {
                 (None, 0) => {}
-                (Some((parent, joint)), 1..) if *parent < index => check_joint(&format!("{key}.joint"), joint)?,
+                (Some((parent, joint)), 1..) if *parent < index => {
+                    check_letters(&format!("{key}.joint.name"), &joint.name)?;
+                    check_joint(&format!("{key}.joint"), joint)?;
+                }
                 (None, _) => {
                     return Err(BodyError::Value {
                         key: format!("{key}.parent"),
@@ -176,10 +180,10 @@ impl Body {
                     found: site.limb.to_string(),
                 });
             }
-            if !site.position.is_finite() {
+            if !is_place(site.position) {
                 return Err(BodyError::Value {
                     key: format!("{key}.position"),
-                    expected: "finite metres",
+                    expected: "finite metres, 1e9 at most",
                     found: format!("{:?}", site.position.to_array()),
                 });
             }
@@ -191,6 +195,15 @@ impl Body {
 fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
     if name.is_empty() {
         return Err(BodyError::Value { key: key.into(), expected: "a name", found: "an empty one".into() });
+    }
+    check_letters(key, name)
+}
+
+/// Tables of results are cut at tabs and line breaks, trees of bones at braces.
+fn check_letters(key: &str, name: &str) -> Result<(), BodyError> {
+    if name.chars().any(|letter| letter.is_control() || matches!(letter, '{' | '}' | '\u{2028}' | '\u{2029}')) {
+        let expected = "a name without tabs, line breaks and braces";
+        return Err(BodyError::Value { key: key.into(), expected, found: format!("{name:?}") });
     }
     Ok(())
 }
@@ -215,7 +228,7 @@ fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
     }
     for (field, pose) in [("parent_from_joint", &joint.parent_from_joint), ("limb_from_joint", &joint.limb_from_joint)]
     {
-        if !pose.translation.is_finite() || !pose.rotation.is_finite() || (pose.rotation.length() - 1.0).abs() > 1e-6 {
+        if !is_rigid(pose) {
             return wrong(field, "a finite position and a unit quaternion", format!("{pose:?}"));
         }
     }

@@ -10,6 +10,20 @@
 pub use parry3d_f64::bounding_volume::Aabb;
 pub use parry3d_f64::glamx::{DMat3 as Mat3, DPose3 as Pose, DQuat as Quat, DVec3 as Vec3};
 
+/// No place lies farther from its origin, metres: three times as far as the Moon. Beyond, squares and products of coordinates
+/// have no digits left for a body, and at last are infinite.
+pub const FARTHEST: f64 = 1e9;
+
+/// Whether a place can be meant: no coordinate is NaN or beyond [`FARTHEST`].
+pub fn is_place(place: Vec3) -> bool {
+    place.abs().cmple(Vec3::splat(FARTHEST)).all()
+}
+
+/// Whether a pose can be meant: a place, and a unit quaternion.
+pub fn is_rigid(pose: &Pose) -> bool {
+    is_place(pose.translation) && pose.rotation.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6
+}
+
 /// Single-precision points as a structure of arrays, the layout the SIMD kernels read. Metres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {

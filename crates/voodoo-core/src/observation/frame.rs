@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::error::TrackError;
-use crate::math::{Aabb, Pose, Vec3};
+use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
 
 /// Three-dimensional points as they lie in memory, in metres.
 #[derive(Clone, Copy, Debug)]
@@ -217,12 +217,14 @@ impl<'a> Frame<'a> {
                 return Err(TrackError::measurement(what("limb"), "the index of a limb", limb.to_string()));
             }
             let bad = match cloud.points {
-                PointSlice::F32(points) => points.iter().position(|p| !p.iter().all(|value| value.is_finite())),
-                PointSlice::F64(points) => points.iter().position(|p| !p.iter().all(|value| value.is_finite())),
+                PointSlice::F32(points) => {
+                    points.iter().position(|p| !p.iter().all(|value| f64::from(*value).abs() <= FARTHEST))
+                }
+                PointSlice::F64(points) => points.iter().position(|p| !p.iter().all(|value| value.abs() <= FARTHEST)),
             };
             if let Some(row) = bad {
                 let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
-                return Err(TrackError::measurement(what("points"), "finite metres", found));
+                return Err(TrackError::measurement(what("points"), "finite metres, 1e9 at most", found));
             }
         }
         for (index, image) in self.images.iter().enumerate() {
@@ -276,7 +278,7 @@ fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
     let wrong = |part: &str, expected, found: String| {
         Err(TrackError::measurement(format!("depth[{index}].{part}"), expected, found))
     };
-    let count = image.width * image.height;
+    let count = image.width.saturating_mul(image.height);
     if image.pixels.len() != count || count == 0 {
         return wrong(
             "image",
@@ -323,17 +325,13 @@ fn check_bias(what: impl FnOnce() -> String, bias: f64) -> Result<(), TrackError
 }
 
 fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), TrackError> {
-    if vector.is_finite() {
+    if is_place(vector) {
         Ok(())
     } else {
-        Err(TrackError::measurement(what(), "finite metres", format!("{:?}", vector.to_array())))
+        Err(TrackError::measurement(what(), "finite metres, 1e9 at most", format!("{:?}", vector.to_array())))
     }
 }
 
 fn check_pose(what: impl FnOnce() -> String, pose: &Pose) -> Result<(), TrackError> {
-    if pose.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6 {
-        Ok(())
-    } else {
-        Err(TrackError::measurement(what(), "a rigid transform", format!("{pose:?}")))
-    }
+    if is_rigid(pose) { Ok(()) } else { Err(TrackError::measurement(what(), "a rigid transform", format!("{pose:?}"))) }
 }

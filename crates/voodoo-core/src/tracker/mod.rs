@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, is_rigid};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
@@ -64,10 +64,10 @@ impl Tracker {
     /// Sets the pose of every limb directly.
     pub fn reset_pose(&mut self, world_from_limb: &[Pose]) -> Result<&Estimate, TrackError> {
         let count = self.model.body.limbs().len();
-        if world_from_limb.len() != count || !world_from_limb.iter().all(Pose::is_finite) {
+        if world_from_limb.len() != count || !world_from_limb.iter().all(is_rigid) {
             return Err(TrackError::measurement(
                 "world_from_limb",
-                "one finite pose a limb",
+                "one rigid pose a limb",
                 format!("{} pose(s) for {count} limbs", world_from_limb.len()),
             ));
         }

@@ -10,11 +10,13 @@ use rayon::prelude::*;
 
 use crate::body::Body;
 use crate::error::TrackError;
-use crate::math::{LANES, Pose, Vec3, widest};
+use crate::math::{LANES, Pose, Vec3, is_rigid, widest};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Mark of a pixel that shows no limb.
 pub const NO_LIMB: u16 = u16::MAX;
+/// Most pixels of a predicted image: those of an 8K picture. More would be a mistyped size, and memory by the gigabyte.
+pub const MOST_PIXELS: usize = 1 << 25;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
 const ROWS_TOGETHER: usize = 16;
 /// Limbs nearer to the camera plane than this have no usable bounds in the image, metres; every ray is tried.
@@ -55,14 +57,15 @@ impl Viewpoint<'_> {
         if !(fx > 0.0 && fy > 0.0 && [fx, fy, cx, cy].iter().all(|value| value.is_finite())) {
             return wrong("camera", "positive focal lengths and a finite centre", format!("{:?}", self.intrinsics));
         }
-        let Some(count) = self.width.checked_mul(self.height).filter(|count| *count > 0) else {
-            return wrong("camera", "at least one pixel", format!("{}x{}", self.width, self.height));
+        let count = self.width.checked_mul(self.height).filter(|count| (1..=MOST_PIXELS).contains(count));
+        let Some(count) = count else {
+            return wrong("camera", "1 to 33554432 pixels", format!("{}x{}", self.width, self.height));
         };
         if self.rays.is_some_and(|rays| rays.len() != count) {
             return wrong("rays", "one ray a pixel", format!("{:?} for {count} pixels", self.rays.map(<[_]>::len)));
         }
         let pose = &self.world_from_sensor;
-        if !pose.is_finite() || (pose.rotation.length() - 1.0).abs() > 1e-6 {
+        if !is_rigid(pose) {
             return wrong("world_from_sensor", "a rigid transform", format!("{pose:?}"));
         }
         Ok(())
@@ -129,9 +132,9 @@ impl Rendering {
     ) -> Result<(), TrackError> {
         view.check()?;
         let limbs = body.limbs();
-        if world_from_limb.len() != limbs.len() || !world_from_limb.iter().all(Pose::is_finite) {
+        if world_from_limb.len() != limbs.len() || !world_from_limb.iter().all(is_rigid) {
             let found = format!("{} poses for {} limbs, or one not finite", world_from_limb.len(), limbs.len());
-            return Err(TrackError::measurement("world_from_limb", "one finite pose a limb", found));
+            return Err(TrackError::measurement("world_from_limb", "one rigid pose a limb", found));
         }
         let Self { width, depth, limb, raycasters } = self;
         *width = view.width;

@@ -51,7 +51,7 @@ def site_pixels(
     check_confidence(min_confidence)
     try:
         rows = np.asarray(keypoints, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise MeasurementError(f"keypoints: expected numbers (u, v, confidence), found {keypoints!r}") from error
     if rows.shape != (table.count, 3):
         raise MeasurementError(f"keypoints: expected shape ({table.count}, 3) for {layout}, found {rows.shape}")

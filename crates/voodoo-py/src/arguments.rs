@@ -1,0 +1,35 @@
+//! Numbers and words that callers pass: what they are not is an error that names the argument.
+//!
+//! PyO3 converts arguments itself, but its TypeError is none of `voodoo.errors`.
+
+use pyo3::prelude::*;
+
+use crate::errors::{exception, wrong_argument};
+
+/// Functions for `from_py_with`, each named like its argument.
+macro_rules! arguments {
+    ($convert:ident, $type:ty: $($name:ident)*) => {
+        $(pub fn $name(value: &Bound<'_, PyAny>) -> PyResult<$type> {
+            $convert(stringify!($name), value)
+        })*
+    };
+}
+
+arguments!(number, f64: stamp weight bias offset metres_per_unit);
+arguments!(dimension, f64: length a0 b0 a1 b1);
+arguments!(word, String: site);
+
+fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    value.extract().map_err(|_| wrong_argument(value.py(), name, "a number", value))
+}
+
+fn dimension(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    value.extract().map_err(|_| {
+        let text = wrong_argument(value.py(), name, "metres", value).value(value.py()).to_string();
+        exception(value.py(), "BodyError", text)
+    })
+}
+
+fn word(name: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
+    value.extract().map_err(|_| wrong_argument(value.py(), name, "a name", value))
+}

@@ -1,0 +1,109 @@
+"""Numeric arrays of MATLAB files (level 5), read without a library.
+
+SciPy's reader is compiled code that trusts a file's lengths: damaged ones have killed the process. What recordings need is
+one array of numbers, and every length here is checked against what is there. See MathWorks, "MAT-File Format".
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError, reading
+from voodoo.recordings.stored import read_stored
+
+_HEADER = 128
+_MATRIX, _COMPRESSED = 14, 15
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+"""How numbers are stored, by the type in their tag."""
+_CLASSES = range(6, 16)
+"""Classes of arrays that hold numbers."""
+_COMPLEX = 0x08
+_MOST = 2**30
+"""Bytes of an array when unpacked."""
+
+
+def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """The numeric arrays of a .mat file by name, in the type they are stored in (whole doubles are stored as integers); other
+    variables (text, cells, structures) are left out.
+
+    Raises:
+        RecordingError: no MATLAB file of level 5, damage, or more than a gigabyte; it names the file.
+    """
+    data = read_stored(path, "a MATLAB file")
+    if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
+        kind = "one of version 7.3, which is HDF5 (save it with -v7)" if b"HDF" in data[:_HEADER] else "another file"
+        raise RecordingError(f"{path}: expected a MATLAB file of level 5, found {kind}")
+    order = "<" if data[126:128] == b"IM" else ">"
+    found: dict[str, npt.NDArray[Any]] = {}
+    with reading(path, "a sound MATLAB file"):
+        for kind, content in _elements(data[_HEADER:], order):
+            if kind == _COMPRESSED:
+                found |= dict(_matrices(_inflated(content), order))
+            elif kind == _MATRIX:
+                found |= dict(_matrices(_tagged(kind, content, order), order))
+    return found
+
+
+def _tagged(kind: int, content: bytes, order: str) -> bytes:
+    return struct.pack(order + "II", kind, len(content)) + content
+
+
+def _inflated(data: bytes) -> bytes:
+    unpacker = zlib.decompressobj()
+    content = unpacker.decompress(data, _MOST)
+    if unpacker.unconsumed_tail:
+        raise ValueError(f"expected {_MOST} bytes at most in an array, found more")
+    if not unpacker.eof:
+        raise ValueError("expected a complete array, found it cut off")
+    return content
+
+
+def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """(type, content) of the elements that follow each other in `data`."""
+    at = 0
+    while at + 8 <= len(data):
+        kind, length = struct.unpack_from(order + "II", data, at)
+        if kind >> 16:  # up to four bytes stand in the tag itself
+            kind, length = kind & 0xFFFF, kind >> 16
+            start, after = at + 4, at + 8
+        else:
+            start = at + 8
+            # Compressed elements are not padded to eight bytes.
+            after = start + (length if kind == _COMPRESSED else -(-length // 8) * 8)
+        if start + length > len(data) or (start == at + 4 and length > 4):
+            raise ValueError(f"expected {length} bytes of an element, found {len(data) - start}")
+        yield kind, data[start : start + length]
+        at = after
+
+
+def _matrices(data: bytes, order: str) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    for kind, content in _elements(data, order):
+        if kind == _MATRIX and content:
+            named = _matrix(content, order)
+            if named is not None:
+                yield named
+
+
+def _matrix(data: bytes, order: str) -> tuple[str, npt.NDArray[Any]] | None:
+    """Name and numbers of an array; None for one that holds no numbers, or complex ones."""
+    parts = _elements(data, order)
+    (_, flags), (_, shape), (_, name) = next(parts), next(parts), next(parts)
+    (word,) = struct.unpack_from(order + "I", flags)
+    if word & 0xFF not in _CLASSES or (word >> 8) & _COMPLEX:
+        return None
+    sizes = [int(size) for size in np.frombuffer(shape, order + "i4")]
+    kind, numbers = next(parts)
+    if kind not in _NUMBERS:
+        raise ValueError(f"expected numbers, found an element of type {kind}")
+    values = np.frombuffer(numbers, np.dtype(order + _NUMBERS[kind]))
+    if len(sizes) < 2 or min(sizes) < 0 or math.prod(sizes) != values.size:
+        raise ValueError(f"expected an array of {sizes}, found {values.size} numbers")
+    return name.decode("ascii"), values.astype(values.dtype.newbyteorder("=")).reshape(sizes, order="F")

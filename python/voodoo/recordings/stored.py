@@ -1,0 +1,44 @@
+"""Reading the files of a recording: regular ones, and none larger than it can be meant."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from voodoo.errors import RecordingError, reading
+
+MOST_BYTES = 2**28
+"""Of a picture, table or list: no camera and no motion laboratory writes a quarter of a gigabyte into one of them."""
+
+
+def check_stored(path: Path, expected: str, *, most: int = MOST_BYTES) -> None:
+    """Refuse what is no regular file (a FIFO waits for ever, a device never ends), and files that are too large.
+
+    Args:
+        path: the file.
+        expected: what it should be, e.g. "a readable picture".
+        most: bytes.
+
+    Raises:
+        RecordingError: it names the file.
+    """
+    with reading(path, expected):
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):
+            raise RecordingError(f"{path}: expected {expected}, found no regular file")
+        if found.st_size > most:
+            raise RecordingError(f"{path}: expected {expected}, {most} bytes at most, found {found.st_size}")
+
+
+def read_stored(path: Path, expected: str) -> bytes:
+    """The bytes of a file, see `check_stored`."""
+    check_stored(path, expected)
+    with reading(path, expected):
+        return path.read_bytes()
+
+
+def read_stored_text(path: Path, expected: str) -> str:
+    """The text (UTF-8) of a file, see `check_stored`."""
+    content = read_stored(path, expected)
+    with reading(path, expected):
+        return content.decode("utf-8")
