@@ -135,6 +135,7 @@ class Tracker:
     found_at = None
     gone_at = None
     refuse_at = None
+    refused = None
     interrupt_at = None
 
     def __init__(self, body, *, config):
@@ -153,7 +154,8 @@ class Tracker:
         return self.estimate
 
     def step(self, frame):
-        if self.refuse_at == len(self.frames):
+        if self.refuse_at == len(self.frames) and self.refused in (None, frame.stamp):
+            self.refused = frame.stamp
             raise VoodooError("points: expected finite numbers, found NaN")
         if self.interrupt_at == len(self.frames):
             raise KeyboardInterrupt

@@ -26,6 +26,7 @@ def run(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
 
     def opened(path, loader=None, **options):
+        call.left_out = options.pop("left_out", None)
         call.options = options
         if call.recording is None:
             raise RecordingError(f"{path}: expected a recording, found\nno such file")
@@ -108,7 +109,7 @@ def test_track_passes_frame_and_init(run):
     run.tracker.reference = None
     result = run("track", "somewhere", "--init", "start.json", "--frame", "odom", "--out", "pose.csv")
     assert result.exit_code == 0, result.stderr
-    assert run.options == {"root_frame": "odom"}
+    assert run.options == {"root_frame": "odom", "bare": True}  # what lies beside it is not asked for
     written = Track.load(Path("pose.csv"))
     assert written.joints[0, written.joint_names.index("l_hip"), 2] == pytest.approx(T_POSE["l_hip"][2] + 0.5)
 
@@ -265,10 +266,19 @@ def test_bad_result_name_is_refused_before_the_work(run):
     assert not Path("look").exists()
 
 
-def test_a_refused_frame_is_named_and_leaves_no_result(run):
+def test_a_refused_frame_is_left_out_and_counted(run):
     run.tracker.refuse_at = 4
-    assert_one_line(run("track", "x", "--out", "pose.csv"), 1, "fake, frame 4", "finite")
-    assert not Path("pose.csv").exists()
+    done = run("track", "x", "--out", "pose.csv", "--out", "pose.npz")
+    assert_one_line(done, 0, "left out 1 that the tracker refuses", "fake, frame 4", "finite", "--strict")
+    stamps = np.delete(run.recording.stamps, 4)
+    assert Track.load("pose.csv").stamps.tolist() == Track.load("pose.npz").stamps.tolist() == stamps.tolist()
+    assert Track.load("pose.npz").left_out == {"that the tracker refuses": 1}
+
+
+def test_strictly_a_refused_frame_is_named_and_leaves_no_result(run):
+    run.tracker.refuse_at = 4
+    assert_one_line(run("track", "x", "--out", "pose.csv", "--strict"), 1, "fake, frame 4", "finite")
+    assert run.left_out is None and not Path("pose.csv").exists()
 
 
 def test_ctrl_c_leaves_the_frames_up_to_there_and_says_so(run):
@@ -364,7 +374,7 @@ def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path
     (tmp_path / "people" / "Calib_x.toml").touch()
     opened = []
 
-    def other(path, **options):
+    def other(path, left_out, **options):
         opened.append((path.name, options))
         return FakeRecording(frames=12)
 

@@ -205,6 +205,7 @@ def with_gaps(track):
         track,
         stamps=track.stamps[0] + np.arange(frames) / 30.0,
         status=tuple(next(status) if there else "searching" for there in found),
+        limb_status={},
         **{name: spread(getattr(track, name)) for name in ("residual", "joints", "world_from_limb", "angles")},
     )
 

@@ -325,7 +325,7 @@ def test_loaders_options_and_paths_that_do_not_exist_are_named(tmp_path):
     with pytest.raises(RecordingError, match=r"ros2: .*ros1: .*utd-mhad: .*folder: "):
         open_recording(tmp_path)
     (tmp_path / "film.mp4").write_bytes(b"")
-    with pytest.raises(RecordingError, match=r"film\.mp4: found no loader.*ros2: "):
+    with pytest.raises(RecordingError, match=r"film\.mp4: expected depth, or keypoints of several.*, found a film"):
         open_recording(tmp_path / "film.mp4")
     with pytest.raises(RecordingError, match="use: expected"):
         open_recording(sample_path(), use=("smell",))

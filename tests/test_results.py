@@ -53,7 +53,8 @@ def test_csv_columns(tmp_path):
         "humanoid_root_y",
         "humanoid_root_z",
     ]
-    assert len(rows[0]) == 3 + 3 * len(T_POSE)
+    assert list(rows[0])[-len(track.limb_names) :] == [f"{limb}_status" for limb in track.limb_names]
+    assert len(rows[0]) == 3 + 3 * len(T_POSE) + len(track.limb_names)
     assert float(rows[1]["l_wrist_y"]) == pytest.approx(
         track.joints[1, track.joint_names.index("l_wrist"), 1], abs=1e-6
     )

@@ -295,7 +295,7 @@ def test_the_found_pose_is_a_start(tmp_path):
     init = Init(stamp_s=float(reference.stamps[3]), joints={name: tuple(place) for name, place in rows.items()})
     tracker = start_tracker(recording, init=init)
     assert not tracker.estimate.joints
-    estimate = first_pose(recording, tracker, starts=starts_of(init))
+    estimate = first_pose(recording, tracker, starts=starts_of(init, recording))
     assert estimate.stamp == pytest.approx(reference.stamps[3])
     written = pose_as_init(estimate, tracker.body)
     (tmp_path / "start.json").write_text(written.to_json())

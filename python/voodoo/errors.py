@@ -29,7 +29,17 @@ class MeasurementError(VoodooError):
 
 
 class RecordingError(VoodooError):
-    """A recording that cannot be read: it names the file, what was expected and what was found."""
+    """A recording that cannot be read: it names the file, what was expected and what was found.
+
+    Attributes:
+        reason: the kind of damage in a few words, to count what is left out.
+        hint: lines that help, e.g. a template of a missing file; "" without.
+    """
+
+    def __init__(self, message: str, *, reason: str = "that cannot be read", hint: str = "") -> None:
+        """Keep the words."""
+        super().__init__(message)
+        self.reason, self.hint = reason, hint
 
 
 @contextmanager

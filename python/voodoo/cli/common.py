@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
@@ -83,17 +84,55 @@ def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
         yield from progress.track(items, total=total, description=words)
 
 
+def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:
+    """The items up to Ctrl-C, and whether it came."""
+    found: list[T] = []
+    try:
+        for item in items:
+            found.append(item)
+    except KeyboardInterrupt:
+        return found, True
+    return found, False
+
+
+def say_interrupted(interrupted: bool, done: str) -> None:
+    """After Ctrl-C say what is there on stderr and end with its exit code.
+
+    Raises:
+        typer.Exit: it came.
+    """
+    if interrupted:
+        typer.echo(f"voodoo: interrupted: {done}", err=True)
+        raise typer.Exit(INTERRUPTED)
+
+
 @contextmanager
 def clear_errors() -> Iterator[None]:
-    """Turn errors that have a clear message into that one line on stderr and exit code 1."""
+    """Turn errors that have a clear message into that one line on stderr and exit code 1.
+
+    What NumPy warns of (a number too large for its type in a damaged file) is told by an error or nothing; -W shows it.
+    """
     try:
-        yield
+        with warnings.catch_warnings():
+            if not sys.warnoptions:
+                warnings.simplefilter("ignore", RuntimeWarning)
+            yield
     except VoodooError as error:
-        _fail(str(error))
+        hint = getattr(error, "hint", "")
+        _fail(str(error), hint)
+    except MemoryError:
+        _fail("expected enough memory for this recording, found too little")
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
 
 
-def _fail(message: str) -> None:
+def say(message: str) -> None:
+    """One line on stderr."""
     typer.echo(f"voodoo: {' '.join(message.split())}", err=True)
+
+
+def _fail(message: str, hint: str = "") -> None:
+    say(message)
+    if hint:
+        typer.echo(hint, err=True)
     raise typer.Exit(1)

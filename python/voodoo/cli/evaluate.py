@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, progressing
+from voodoo.cli.common import clear_errors, progressing, say_interrupted, until_interrupted
 from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, UseOption
 from voodoo.errors import VoodooError
 
@@ -40,7 +40,8 @@ def eval_command(
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
 
     Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
-    summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end.
+    summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end. Ctrl-C keeps
+    the recordings that are done and ends with exit code 130.
 
     With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
     switch turned over, the other solvers, no prediction, no jitter penalty)
@@ -74,21 +75,25 @@ def eval_command(
         if ablation:
             chosen = config_of(config)
             runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
-            ablations = list(progressing(runs, "ablating", len(variants(chosen))))
+            ablations, interrupted = until_interrupted(progressing(runs, "ablating", len(variants(chosen))))
             typer.echo(table(ablations))
             if out is not None:
                 typer.echo("wrote " + ", ".join(str(file) for file in write_tables(out, ablations)))
+            say_interrupted(interrupted, f"{len(ablations)} of {len(variants(chosen))} configurations are done")
             failed = [score for item in ablations for score in item.failures]
             if failed:
                 raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
             return
         done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
-        ordered = sorted(progressing(done, "evaluating", len(paths)), key=lambda item: item[0])
+        finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
+        ordered = sorted(finished, key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
-        typer.echo(markdown(scores))
-        if out is not None:
-            files = write_reports(out, scores, tables)
+        if scores:
+            typer.echo(markdown(scores))
+        if out is not None and scores:
+            files = write_reports(out, scores, tables, picture=not interrupted)
             typer.echo("wrote " + ", ".join(str(file) for file in files))
+        say_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
         failures = [score for score in scores if score.failure]
         if failures:
             raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")

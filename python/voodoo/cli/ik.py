@@ -99,7 +99,7 @@ def ik_command(
             height=height,
             model=model,
         )
-        if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning)) is None:
+        if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
             raise VoodooError(
                 f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
             )

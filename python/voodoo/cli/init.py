@@ -62,12 +62,15 @@ def init_command(
     from voodoo.cli.running import boxes_of, config_of, kinds_of, opened
     from voodoo.model.body import Body
     from voodoo.pipeline.start import AUTO, first_pose, pose_as_init, start_tracker
+    from voodoo.recordings.left_out import LeftOut
     from voodoo.sensors.settings import FrontEndSettings
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         kinds, boxes = kinds_of(use), boxes_of(exclude)
-        source = opened(recording, loader, frame, bare=True, **topics_of(topic), **numbers_of(option))
+        left_out = LeftOut()
+        options = topics_of(topic) | numbers_of(option)
+        source = opened(recording, loader, frame, bare=True, left_out=left_out, **options)
         about = source.info()
         after = about.start_stamp
         if at is not None:
@@ -86,7 +89,7 @@ def init_command(
             use=kinds,
         )
         settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
-        estimate = first_pose(source, tracker, settings=settings, after=after)
+        estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
         if estimate is None:
             raise VoodooError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
         text = pose_as_init(estimate, tracker.body).to_json()

@@ -65,6 +65,12 @@ TopicOption = Annotated[
         help=f"Topic of a bag, where it has several of a kind: {', '.join(TOPICS)}; repeatable, depth cameras add up.",
     ),
 ]
+StrictOption = Annotated[
+    bool,
+    typer.Option(
+        "--strict", help="Refuse a damaged recording; by default what cannot be used is left out and counted."
+    ),
+]
 NUMBERS = ("rate", "metres_per_unit", "tf_max_age")
 """Options of loaders that are numbers."""
 
@@ -73,7 +79,7 @@ LoaderNumberOption = Annotated[
     typer.Option(
         "--option",
         metavar="NAME=NUMBER",
-        help="Of the loader: rate (Pose2Sim, 60 images/s), metres_per_unit (16-bit depth of bags, 0.001), "
+        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), metres_per_unit (16-bit depth of bags, 0.001), "
         "tf_max_age (bags, 0.5 s); repeatable.",
     ),
 ]

@@ -14,8 +14,9 @@ from voodoo.config import Config
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.pipeline.run import track
-from voodoo.pipeline.start import AUTO, Beginning
+from voodoo.pipeline.start import Beginning
 from voodoo.pipeline.starts.chosen import Starts
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
@@ -72,8 +73,9 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
 
 
 def bare_for(init: Beginning | None) -> dict[str, Any]:
-    """The option of `open_recording` with which nothing beside the recording is read where a start is looked for."""
-    return {"bare": True} if init == AUTO else {}
+    """The option of `open_recording` with which nothing beside the recording is read where another start is given, or
+    looked for."""
+    return {} if init is None else {"bare": True}
 
 
 def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
@@ -109,6 +111,7 @@ def run(
     settings: FrontEndSettings | None = None,
     starts: Starts | None = None,
     viewer: Viewer | None = None,
+    left_out: LeftOut | None = None,
 ) -> Run:
     """Track and draw, with `sheet` pictures spread over the recording. Ctrl-C ends it with the frames up to there, if any."""
     estimates, seconds, pictures, interrupted = [], [], [], False
@@ -118,7 +121,8 @@ def run(
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
     with writer or nullcontext():
         try:
-            for step in progressing(track(source, tracker, settings=settings, starts=starts), source.name, len(source)):
+            steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+            for step in progressing(steps, source.name, len(source)):
                 estimates.append(step.estimate)
                 seconds.append(step.seconds)
                 if viewer is not None:
@@ -141,7 +145,12 @@ def run(
             if not estimates:
                 raise
             interrupted = True
-    return Run(Track.of(estimates, body=tracker.body), seconds, pictures, interrupted)
+    if not estimates:
+        raise VoodooError(
+            f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
+        )
+    left = {} if left_out is None else left_out.counts
+    return Run(Track.of(estimates, body=tracker.body, left_out=left), seconds, pictures, interrupted)
 
 
 def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:

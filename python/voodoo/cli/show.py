@@ -26,11 +26,20 @@ def info_command(
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
 ) -> None:
-    """Say what is in a recording: sensors, topics, frames, rates, root frame and reference."""
+    """Say what is in a recording: sensors, topics, frames, rates, root frame, reference and range of depths."""
     from voodoo.cli.running import opened
+    from voodoo.recordings.depth_range import depth_range
+    from voodoo.recordings.left_out import LeftOut
 
     with clear_errors():
-        typer.echo(str(opened(recording, loader, frame, **topics_of(topic), **numbers_of(option)).info()))
+        options = topics_of(topic) | numbers_of(option)
+        source = opened(recording, loader, frame, left_out=LeftOut(), **options)
+        typer.echo(str(source.info()))
+        seen = depth_range(source)
+        if seen is not None:
+            typer.echo(f"  depths     {seen}")
+            if seen.doubt:
+                typer.echo(f"  note       {seen.doubt}")
 
 
 def config_command() -> None:

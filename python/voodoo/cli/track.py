@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both, states, topics_of
+from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both, say, states, topics_of
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -19,10 +19,16 @@ from voodoo.cli.options import (
     LoaderOption,
     ModelOption,
     RecordingArgument,
+    StrictOption,
     TopicOption,
     UseOption,
 )
 from voodoo.recordings.keypoint_layouts import LAYOUTS
+
+if TYPE_CHECKING:
+    from voodoo.export.track import Track
+    from voodoo.recordings.left_out import LeftOut
+    from voodoo.recordings.recording import Recording
 
 
 def track_command(
@@ -70,6 +76,7 @@ def track_command(
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
     exclude: ExcludeOption = None,
+    strict: StrictOption = False,
 ) -> None:
     """Find a person in a recording, follow them, and write one row a frame.
 
@@ -81,9 +88,11 @@ def track_command(
     person is gone, the status is searching and the coordinates are empty.
 
     The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in metres for every joint and site, in the
-    recording's root frame (base_link if it has one), and NAME_rad for every joint angle. The .npz adds the pose of
-    every limb. Ctrl-C writes the frames up to there and ends with exit code 130; a frame that is refused ends without any
-    result.
+    recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, what is known of every
+    limb. The .npz adds the pose of every limb. Ctrl-C writes the frames up to there and ends with exit code 130.
+
+    Frames that cannot be used (a repeated or late stamp, a blank or undecodable image) are left out: they have no row. They are
+    counted by reason on stderr and in the .npz. With --strict the first one ends without any result.
 
     --init FILE gives the pose in the first frame, by any subset of names that fixes it, or with stamp_s that of a later one:
     {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
@@ -106,6 +115,7 @@ def track_command(
     from voodoo.model.body import Body
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
     from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
+    from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.sensors.settings import FrontEndSettings
 
@@ -114,7 +124,7 @@ def track_command(
         refuse_both("--view", view or None, **{"--save": save})
         if offset and not with_:
             raise typer.BadParameter("--offset is for the stamps of --with, give both")
-        kinds = kinds_of(use)
+        kinds, left_out = kinds_of(use), None if strict else LeftOut()
         depth_filter, boxes = depth_filter_of(depth_range), boxes_of(exclude)
         beginning = beginning_of(init)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
@@ -124,15 +134,18 @@ def track_command(
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
-            opened(recording, loader, frame, **options, **bare_for(beginning)),
+            opened(recording, loader, frame, left_out=left_out, **options, **bare_for(beginning)),
             keypoints=keypoint_folders(keypoints or ()),
             layout=layout,
             others=others,
             offset=offset,
             markers=markers,
             numbers=numbers,
+            left_out=left_out,
             **bare_for(beginning),
         )
+        for words in source.assumed:
+            say(words)
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target, inputs=(recording, *(with_ or ())))
@@ -148,15 +161,29 @@ def track_command(
         )
         with viewer_of(view, save, source.name) as viewer:
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
-            starts = starts_of(beginning)
-            result, _, _, interrupted = run(source, tracker, overlay, settings=settings, starts=starts, viewer=viewer)
+            how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
+            result, _, _, interrupted = run(source, tracker, overlay, left_out=left_out, **how)
         for target in targets:
             export(result, target, body=tracker.body, root_frame=source.root_frame)
         written = [str(path) for path in (*targets, overlay, save) if path is not None]
         told = f"{len(result)} frames, {states(result)}; wrote {' and '.join(written)}"
         if interrupted:
-            typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {told}", err=True)
+            say(f"interrupted, the rest of {len(source)} frames is missing: {told}")
             raise typer.Exit(INTERRUPTED)
         typer.echo(told)
-        if not result.found.any():
-            typer.echo(f"voodoo: {source.name}: nobody was found in {len(result)} frames", err=True)
+        _say_doubts(source, result, left_out)
+
+
+def _say_doubts(source: Recording, result: Track, left_out: LeftOut | None) -> None:
+    """Say on stderr what was left out, and what may be wrong where nobody was tracked."""
+    from voodoo.recordings.depth_range import depth_range
+
+    if left_out:
+        first = next(iter(left_out.first.values()))
+        say(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
+    if not result.found.any():
+        say(f"{source.name}: nobody was found in {len(result)} frames")
+    if not {"tracking", "degraded"} & set(result.status):
+        seen = depth_range(source)
+        if seen is not None and seen.doubt:
+            say(f"{source.name}: {seen.doubt}")

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -142,20 +145,43 @@ def evaluate_all(
         for index, task in enumerate(tasks):
             yield index, *_task(*task)
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_one_thread) as pool:
-        futures = {pool.submit(_task, *task): index for index, task in enumerate(tasks)}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], *future.result()
-        except BrokenProcessPool as error:
-            raise VoodooError(f"evaluation: a worker process died ({error}); try fewer --jobs") from error
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(
+        min(jobs, len(tasks)), mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
+    )
+    done = False
+    try:
+        with _deaf_children():
+            futures = {pool.submit(_task, *task): index for index, task in enumerate(tasks)}
+        for future in as_completed(futures):
+            yield futures[future], *future.result()
+        done = True
+    except BrokenProcessPool as error:
+        raise VoodooError(f"evaluation: a worker process died ({error}); try fewer --jobs") from error
+    finally:
+        if not done:
+            # A worker ends its recording before it looks for another task; nobody waits for that after Ctrl-C.
+            for worker in set(multiprocessing.active_children()) - others:
+                worker.kill()
+        pool.shutdown(wait=done, cancel_futures=True)
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes started within do not hear Ctrl-C, which goes to all of a terminal's: this one ends them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, heard)
 
 
 def _one_thread() -> None:
     """In a worker: the processes are the parallelism."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["RAYON_NUM_THREADS"] = "1"
     cv2.setNumThreads(1)
 

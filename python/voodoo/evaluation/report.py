@@ -72,7 +72,7 @@ def markdown(scores: Sequence[Score]) -> str:
     text += ["|---|---|---|---|---|---|---|---|---|"]
     for score in scores:
         if score.failure:
-            text.append(f"| {score.name} | - | - | {score.failure.replace('|', '/')} | | | | | |")
+            text.append(f"| {score.name} | - | - | failed, see below | | | | | |")
             continue
         cells = [
             score.name, str(score.frames), "-" if score.tracking_class is None else str(score.tracking_class),
@@ -83,11 +83,14 @@ def markdown(scores: Sequence[Score]) -> str:
             _word(score.silhouette_iou, lambda value: f"{value:.2f}"), ", ".join(score.lost_joints) or "none",
         ]  # fmt: skip
         text.append("| " + " | ".join(cells) + " |")
+    text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
     return "\n".join(text) + "\n"
 
 
-def write_reports(folder: Path, scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> list[Path]:
-    """Write sequences.csv, summary.csv, summary.md, errors.png and frames/NAME.csv; returns the first four.
+def write_reports(
+    folder: Path, scores: Sequence[Score], tables: Sequence[FrameTable | None], *, picture: bool = True
+) -> list[Path]:
+    """Write sequences.csv, summary.csv, summary.md, errors.png (the `picture`) and frames/NAME.csv; returns the first four.
 
     Raises:
         OSError: a file cannot be written.
@@ -102,6 +105,8 @@ def write_reports(folder: Path, scores: Sequence[Score], tables: Sequence[FrameT
     write_sequences(sequences, scores)
     write_summary(summary, summarize(scores))
     text.write_text(markdown(scores), encoding="utf-8")
+    if not picture:
+        return [sequences, summary, text]
     plot_errors(plot, scores)
     return [sequences, summary, text, plot]
 

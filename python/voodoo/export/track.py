@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.errors import VoodooError, reading
+from voodoo.errors import VoodooError, a_path, reading
 from voodoo.ik.angles import angle_names as angle_names_of
 from voodoo.ik.angles import angles_of
 from voodoo.ik.chain import Chain
@@ -24,6 +24,10 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 SUFFIXES = (".csv", ".npz")
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
+FORMAT_VERSION = 2
+"""Of .npz. It rises when earlier readers would misread a file; further arrays and columns do not raise it."""
+_STATUS = "_status"
+"""Ends the name of a limb's column in .csv."""
 _BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles")
 
 
@@ -42,6 +46,9 @@ class Track:
         world_from_limb: (F, L, 4, 4) poses of the limb frames in the root frame.
         angle_names: A names of joint angles, see voodoo.ik.angles; () when none were asked for.
         angles: (F, A) [rad].
+        limb_status: limb -> F of "measured", "inferred" and so on, see Estimate.limb_status, "" while searching; {} when not
+            known.
+        left_out: what of the recording could not be used: reason -> how many. Not in .csv.
 
     Positions, poses, angles and residual of a searching frame are NaN: there is no body (empty cells in .csv).
     """
@@ -55,6 +62,8 @@ class Track:
     world_from_limb: FloatArray
     angle_names: tuple[str, ...] = ()
     angles: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    limb_status: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check that the arrays belong together, and that what says it has a pose has one."""
@@ -63,6 +72,9 @@ class Track:
             object.__setattr__(self, "angles", np.empty((frames, 0)))
         if len(self.status) != frames:
             raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
+        for limb, words in self.limb_status.items():
+            if len(words) != frames:
+                raise VoodooError(f"limb_status[{limb}]: expected {frames} entries, found {len(words)}")
         expected = {
             "angles": (frames, len(self.angle_names)),
             "stamps": (frames,),
@@ -72,6 +84,9 @@ class Track:
         }
         for name, shape in expected.items():
             array = getattr(self, name)
+            if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
+                found = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
+                raise VoodooError(f"{name}: expected an array of numbers, found {found}")
             if array.shape != shape:
                 raise VoodooError(f"{name}: expected shape {shape}, found {array.shape}")
             self._check_numbers(name, array)
@@ -106,6 +121,7 @@ class Track:
         return replace(
             self,
             status=tuple(self.status[number] for number in numbers),
+            limb_status={limb: tuple(words[number] for number in numbers) for limb, words in self.limb_status.items()},
             **{name: getattr(self, name)[numbers] for name in _BY_FRAME},
         )
 
@@ -118,8 +134,15 @@ class Track:
         return f"Track({len(self)} frames, {len(self.joint_names)} joints and sites, {len(self.limb_names)} limbs)"
 
     @classmethod
-    def of(cls, estimates: Sequence[Estimate], *, body: Body | None = None) -> Track:
+    def of(
+        cls, estimates: Sequence[Estimate], *, body: Body | None = None, left_out: Mapping[str, int] | None = None
+    ) -> Track:
         """Collect estimates of one body; with the body also its joint angles, and its names where nobody was found.
+
+        Args:
+            estimates: one a frame.
+            body: theirs.
+            left_out: see the class.
 
         Raises:
             VoodooError: no estimate, one that is not finite, or one of another body.
@@ -153,6 +176,11 @@ class Track:
             joints=np.array(joints, dtype=np.float64),
             limb_names=limb_names,
             world_from_limb=np.array(poses, dtype=np.float64),
+            limb_status={
+                limb: tuple(str(each.limb_status[limb]) if each.limb_status else "" for each in estimates)
+                for limb in limb_names
+            },
+            left_out=dict(left_out or {}),
         )
 
     def save(self, path: str | Path) -> None:
@@ -178,13 +206,15 @@ class Track:
     def _write_csv(self, path: Path) -> None:
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_header(self.joint_names, self.angle_names))
-            for stamp, status, residual, joints, angles in zip(
-                self.stamps, self.status, self.residual, self.joints, self.angles, strict=True
+            limbs = [f"{limb}{_STATUS}" for limb in self.limb_status]
+            writer.writerow(_header(self.joint_names, self.angle_names) + limbs)
+            words = zip(*self.limb_status.values(), strict=True) if limbs else [()] * len(self)
+            for stamp, status, residual, joints, angles, support in zip(
+                self.stamps, self.status, self.residual, self.joints, self.angles, words, strict=True
             ):
                 # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
                 row = [repr(float(stamp)), status]
-                writer.writerow(row + [_cell(value) for value in (residual, *joints.ravel(), *angles)])
+                writer.writerow([*row, *(_cell(value) for value in (residual, *joints.ravel(), *angles)), *support])
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as file:
@@ -199,6 +229,11 @@ class Track:
                 world_from_limb=self.world_from_limb,
                 angle_names=np.array(self.angle_names, dtype=np.str_),
                 angles=self.angles,
+                format_version=np.array(FORMAT_VERSION),
+                limb_status_names=np.array(list(self.limb_status), dtype=np.str_),
+                limb_status=np.array(list(self.limb_status.values()), dtype=np.str_).reshape(-1, len(self)).T,
+                left_out_reasons=np.array(list(self.left_out), dtype=np.str_),
+                left_out_counts=np.array(list(self.left_out.values()), dtype=np.int64),
             )
 
     @classmethod
@@ -208,7 +243,7 @@ class Track:
         Raises:
             VoodooError: another suffix, damage, or a file of another kind.
         """
-        path = Path(path)
+        path = a_path(path, error=VoodooError)
         check_suffix(path)
         with reading(path, "a result of voodoo track"):
             try:
@@ -220,16 +255,23 @@ class Track:
     def _read_csv(cls, path: Path) -> Track:
         with path.open(newline="", encoding="utf-8") as file:
             header, *rows = list(csv.reader(file)) or [[]]
-        first = next((i for i, cell in enumerate(header) if cell.endswith("_rad")), len(header))
+        first = 3
+        while first + 3 <= len(header) and header[first : first + 3] == [
+            f"{header[first][:-2]}_{axis}" for axis in "xyz"
+        ]:
+            first += 3
+        last = next((i for i in range(first, len(header)) if not header[i].endswith("_rad")), len(header))
         names = tuple(cell.removesuffix("_x") for cell in header[3:first:3])
-        angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:])
-        if header != _header(names, angle_names):
+        angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:last])
+        # Columns that later versions add stand behind these, and are passed over.
+        limbs = {cell.removesuffix(_STATUS): i for i, cell in enumerate(header) if i >= last and cell.endswith(_STATUS)}
+        if header[:last] != _header(names, angle_names) or len(set(header)) != len(header):
             raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {header[:5]}")
         for line, row in enumerate(rows, start=2):
             if len(row) != len(header):
                 raise VoodooError(f"line {line}: expected {len(header)} cells, found {len(row)}")
         joints = np.array([[float(cell or "nan") for cell in row[3:first]] for row in rows], dtype=np.float64)
-        angles = np.array([[float(cell or "nan") for cell in row[first:]] for row in rows], dtype=np.float64)
+        angles = np.array([[float(cell or "nan") for cell in row[first:last]] for row in rows], dtype=np.float64)
         return cls(
             angle_names=angle_names,
             angles=angles.reshape(len(rows), len(angle_names)),
@@ -240,6 +282,7 @@ class Track:
             joints=joints.reshape(len(rows), len(names), 3),
             limb_names=(),
             world_from_limb=np.empty((len(rows), 0, 4, 4)),
+            limb_status={limb: tuple(row[column] for row in rows) for limb, column in limbs.items()},
         )
 
     @classmethod
@@ -248,6 +291,11 @@ class Track:
             missing = [name for name in _ARRAYS if name not in content]
             if missing:
                 raise VoodooError(f"expected the arrays {', '.join(_ARRAYS)}, found no {', '.join(missing)}")
+            version = int(content["format_version"]) if "format_version" in content else 1
+            if version > FORMAT_VERSION:
+                raise VoodooError(
+                    f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
+                )
             return cls(
                 stamps=content["stamps"],
                 status=tuple(str(value) for value in content["status"]),
@@ -259,7 +307,21 @@ class Track:
                 # Files of earlier versions have no angles.
                 angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
                 angles=content["angles"] if "angles" in content else np.empty((0, 0)),
+                **_told(content),
             )
+
+
+def _told(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
+    """Status of the limbs, and what was left out, as far as a file has them: the first version has not."""
+    if "limb_status" not in content or "left_out_counts" not in content:
+        return {}
+    words = content["limb_status"].T.tolist()
+    limbs, reasons = content["limb_status_names"].tolist(), content["left_out_reasons"].tolist()
+    counts = content["left_out_counts"].tolist()
+    return {
+        "limb_status": {str(limb): tuple(map(str, row)) for limb, row in zip(limbs, words, strict=True)},
+        "left_out": {str(reason): int(count) for reason, count in zip(reasons, counts, strict=True)},
+    }
 
 
 def check_suffix(path: Path) -> None:

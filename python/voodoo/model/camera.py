@@ -15,16 +15,25 @@ import numpy.typing as npt
 from voodoo.errors import CameraError
 from voodoo.model.joint import short
 
-CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant"]
+CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant", "inverse_plumb_bob"]
 """Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
-(and optionally thin prism and tilt, in OpenCV's order), and Kannala-Brandt (k1 k2 k3 k4 on the angle)."""
+(and optionally thin prism and tilt, in OpenCV's order), and Kannala-Brandt (k1 k2 k3 k4 on the angle); and Brown-Conrady
+from distorted to undistorted coordinates, as RealSense's colour cameras are calibrated."""
 
 _COEFFICIENTS: dict[str, tuple[int, ...]] = {
     "plumb_bob": (0, 4, 5),
     "rational_polynomial": (0, 8, 12, 14),
     "equidistant": (0, 4),
+    "inverse_plumb_bob": (0, 4, 5),
 }
-_ALIASES = {"": "plumb_bob", "none": "plumb_bob", "fisheye": "equidistant", "kannala_brandt4": "equidistant"}
+_ALIASES = {
+    "": "plumb_bob", "none": "plumb_bob", "fisheye": "equidistant", "kannala_brandt4": "equidistant",
+    # librealsense's; its modified model differs by products of the radial and the tangential part only
+    "None": "plumb_bob", "Brown Conrady": "plumb_bob", "Modified Brown Conrady": "plumb_bob",
+    "Inverse Brown Conrady": "inverse_plumb_bob", "Kannala Brandt4": "equidistant",
+}  # fmt: skip
+_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
+"""The default of five fixed-point iterations leaves whole pixels of error on wide lenses."""
 _ROUND_TRIP_PX = 0.1
 MOST_PIXELS = 2**25
 """Of an image: those of an 8K picture. What is larger was mistyped, and would take gigabytes; the core has the same limit."""
@@ -76,7 +85,7 @@ class Camera:
             if name in ("fx", "fy") and value <= 0.0:
                 raise CameraError(f"camera {name}: expected a focal length > 0 px, found {value!r}")
             object.__setattr__(self, name, value)
-        if self.model not in get_args(CameraModel):
+        if not isinstance(self.model, str) or self.model not in get_args(CameraModel):
             raise CameraError(f"camera model: expected one of {', '.join(get_args(CameraModel))}, found {self.model!r}")
         coefficients = _numbers("camera distortion", self.distortion)
         if len(coefficients) not in _COEFFICIENTS[self.model]:
@@ -109,7 +118,8 @@ class Camera:
             width, height: image size [px].
             k: 3x3 intrinsics, row by row: 9 numbers, or (3, 3).
             d: distortion coefficients.
-            model: `distortion_model`; "" and "none" mean no distortion, "fisheye" means equidistant.
+            model: `distortion_model`; "" and "none" mean no distortion, "fisheye" means equidistant; librealsense's
+                names are known, too.
             p: 3x4 projection matrix of the rectified image, row by row: 12 numbers, or (3, 4).
             rectified: the image is a rectified one: use `p` (when it is set) and no distortion.
 
@@ -184,6 +194,10 @@ class Camera:
             for axis, (focal, centre) in enumerate(((self.fx, self.cx), (self.fy, self.cy))):
                 flat[:, axis] = xy[:, axis] * focal + centre
             return flat
+        if self.model == "inverse_plumb_bob":
+            source = np.ascontiguousarray(xy[:, None, :])
+            distorted = cv2.undistortPoints(source, np.eye(3), self._coefficients(), criteria=_UNTIL).reshape(-1, 2)
+            return np.asarray(distorted * (self.fx, self.fy) + (self.cx, self.cy), dtype=np.float64)
         points = np.column_stack([xy, np.ones(len(xy))])[:, None, :]
         zero = np.zeros(3)
         if self.model == "equidistant":
@@ -199,11 +213,14 @@ class Camera:
         """
         if not self.distorted or not len(pixels):
             return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
-        # The default of five fixed-point iterations leaves whole pixels of error on wide lenses.
-        until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
-        undistort = cv2.fisheye.undistortPoints if self.model == "equidistant" else cv2.undistortPoints
-        source = np.ascontiguousarray(pixels[:, None, :])
-        found = undistort(source, self.matrix, self._coefficients(), criteria=until)
+        if self.model == "inverse_plumb_bob":
+            flat = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
+            points, zero = np.column_stack([flat, np.ones(len(flat))])[:, None, :], np.zeros(3)
+            found, _ = cv2.projectPoints(points, zero, zero, np.eye(3), self._coefficients())
+        else:
+            undistort = cv2.fisheye.undistortPoints if self.model == "equidistant" else cv2.undistortPoints
+            source = np.ascontiguousarray(pixels[:, None, :])
+            found = undistort(source, self.matrix, self._coefficients(), criteria=_UNTIL)
         xy = np.array(found, dtype=np.float64).reshape(-1, 2)
         with np.errstate(all="ignore"):
             error = np.abs(self._distorted(xy) - pixels).max(axis=1)

@@ -10,6 +10,7 @@ from typing import Any
 from voodoo.errors import VoodooError
 from voodoo.recordings.joined import Joined, WithKeypoints
 from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import LOADERS, guess_loader, open_recording, options_of
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
@@ -42,6 +43,7 @@ def join(
     markers: MarkerMap | None = None,
     numbers: Mapping[str, float] | None = None,
     bare: bool = False,
+    left_out: LeftOut | None = None,
 ) -> Recording:
     """The recording with all that is joined to it.
 
@@ -53,7 +55,7 @@ def join(
         offset: [s] added to their stamps.
         markers: what the markers in marker files mean.
         numbers: options of their loaders, for those that have them.
-        bare: see `open_recording`.
+        bare, left_out: see `open_recording`.
 
     Raises:
         VoodooError: what cannot be read or does not belong together.
@@ -62,11 +64,11 @@ def join(
     if not math.isfinite(offset):
         raise VoodooError(f"offset: expected a finite number of seconds, found {offset}")
     if keypoints:
-        recording = WithKeypoints(recording, keypoints, layout=layout)
+        recording = WithKeypoints(recording, keypoints, layout=layout, left_out=left_out)
     if others:
-        recording = Joined(
-            recording, [_open(path, recording, markers, layout, numbers, bare) for path in others], offset=offset
-        )
+        how: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers}
+        opened = [_open(path, recording, bare=bare, left_out=left_out, **how) for path in others]
+        recording = Joined(recording, opened, offset=offset)
     return recording
 
 
@@ -94,14 +96,16 @@ def loader_options(
 def _open(
     path: Path,
     first: Recording,
+    *,
     markers: MarkerMap | None,
     layout: str,
     numbers: Mapping[str, float] | None,
     bare: bool,
+    left_out: LeftOut | None,
 ) -> Recording:
     options = loader_options(path, None, markers=markers, layout=layout, numbers=numbers)
     if path.exists() and guess_loader(path) in ("ros1", "ros2"):
         options["root_frame"] = first.root_frame
     if bare:
         options["bare"] = True
-    return open_recording(path, **options)
+    return open_recording(path, left_out=left_out, **options)

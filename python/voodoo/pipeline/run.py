@@ -8,16 +8,30 @@ from dataclasses import dataclass
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.measurements import RecordedFrame
+from voodoo.measurements import ColorImage, RecordedFrame
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.start import Init, start_tracker
 from voodoo.pipeline.starts.chosen import Starts
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
 __all__ = ["Init", "TrackedFrame", "start_tracker", "track"]
+
+
+def _readable(recorded: RecordedFrame, left_out: LeftOut) -> RecordedFrame:
+    """The frame without the pictures that do not decode; the rest of it is as good as ever."""
+    kept = []
+    for item in recorded.measurements:
+        try:
+            if isinstance(item, ColorImage):
+                _ = item.image
+            kept.append(item)
+        except VoodooError as error:
+            left_out.add_error(error)
+    return RecordedFrame(recorded.stamp, tuple(kept))
 
 
 @dataclass(frozen=True)
@@ -45,6 +59,7 @@ def track(
     *,
     settings: FrontEndSettings | None = None,
     starts: Starts | None = None,
+    left_out: LeftOut | None = None,
 ) -> Iterator[TrackedFrame]:
     """Step the tracker through a recording, by the front end that every command uses.
 
@@ -55,6 +70,8 @@ def track(
         tracker: see start_tracker; one without a pose searches.
         settings: what is used and how; None means all there is, see FrontEndSettings.of.
         starts: where a first pose may come from; None: from whatever the recording offers.
+        left_out: counts pictures that do not decode and frames that the tracker refuses, which are left out then; None: they are
+            errors.
 
     Raises:
         VoodooError: damage in the recording, or a frame that the tracker refuses; names the frame.
@@ -65,5 +82,12 @@ def track(
         try:
             estimate = front_end.step(recorded)
         except VoodooError as error:
-            raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
+            if left_out is None:
+                raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
+            recorded = _readable(recorded, left_out)
+            try:
+                estimate = front_end.step(recorded)
+            except VoodooError as refusal:
+                left_out.add("that the tracker refuses", f"{recording.name}, frame {index}: {refusal}")
+                continue
         yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began, front_end)

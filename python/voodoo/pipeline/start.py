@@ -23,6 +23,7 @@ from voodoo.pipeline.search import knows
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
 from voodoo.pipeline.starts.legs import serves
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.kinds import input_of, inputs
@@ -45,13 +46,17 @@ class Init(BaseModel):
     Args:
         height_m: stature [m], None if unknown.
         stamp_s: the pose is that of the first frame at or after this time [s]; None: of the first frame.
-        joints: site name to (x, y, z) [m] in the recording's root frame.
+        frame: the positions' frame; None: the recording's root frame.
+        format_version: of the file.
+        joints: site name to (x, y, z) [m].
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     height_m: Height | None = None
     stamp_s: FiniteFloat | None = None
+    frame: str | None = None
+    format_version: Annotated[int, Field(ge=1, le=1)] = 1
     joints: Annotated[dict[str, Position], Field(min_length=1)]
 
     @classmethod
@@ -72,11 +77,29 @@ class Init(BaseModel):
 
     def to_json(self) -> str:
         """As `load` reads it, a joint a line."""
-        numbers = {"height_m": self.height_m, "stamp_s": self.stamp_s}
-        lines = [f'  "{name}": {json.dumps(value)}' for name, value in numbers.items() if value is not None]
+        entries = {
+            "format_version": self.format_version,
+            "height_m": self.height_m,
+            "stamp_s": self.stamp_s,
+            "frame": self.frame,
+        }
+        lines = [f'  "{name}": {json.dumps(value)}' for name, value in entries.items() if value is not None]
         joints = [f'    "{name}": {json.dumps(place)}' for name, place in self.joints.items()]
         lines.append('  "joints": {\n' + ",\n".join(joints) + "\n  }")
         return "{\n" + ",\n".join(lines) + "\n}"
+
+    def in_root_frame(self, recording: Recording) -> Init:
+        """The same pose in the recording's root frame.
+
+        Raises:
+            RecordingError: the recording does not know where the frame is.
+        """
+        if self.frame in (None, recording.root_frame):
+            return self
+        about = recording.info()
+        pose = recording.root_from(str(self.frame), about.start_stamp if self.stamp_s is None else self.stamp_s)
+        moved = {name: tuple(pose[:3, :3] @ place + pose[:3, 3]) for name, place in self.joints.items()}
+        return type(self).model_validate({**self.model_dump(), "frame": recording.root_frame, "joints": moved})
 
     @classmethod
     def of(cls, recording: Recording) -> Init | None:
@@ -160,14 +183,18 @@ def start_tracker(
     if init == AUTO:
         _check_findable(recording, body, use)
     if isinstance(init, Init) and init.stamp_s is None:
-        tracker.reset(joints=dict(init.joints), fit_sizes=True)
+        tracker.reset(joints=dict(init.in_root_frame(recording).joints), fit_sizes=True)
     return tracker
 
 
-def starts_of(init: Beginning | None) -> Starts | None:
-    """Where a tracker without a pose takes its first one from, for `track`; None: from whatever the recording offers."""
+def starts_of(init: Beginning | None, recording: Recording) -> Starts | None:
+    """Where a tracker without a pose takes its first one from, for `track`; None: from whatever the recording offers.
+
+    Raises:
+        RecordingError: the frame of the given pose is not known.
+    """
     if isinstance(init, Init) and init.stamp_s is not None:
-        return Starts((GivenStart(init.joints, init.stamp_s),), by_tracker=False)
+        return Starts((GivenStart(init.in_root_frame(recording).joints, init.stamp_s),), by_tracker=False)
     return Starts((EarlierStart(init),), by_tracker=False) if isinstance(init, Track) else None
 
 
@@ -178,6 +205,7 @@ def first_pose(
     settings: FrontEndSettings | None = None,
     starts: Starts | None = None,
     after: float = float("-inf"),
+    left_out: LeftOut | None = None,
 ) -> Estimate | None:
     """Step a tracker until somebody is found; the estimate of that frame, or None.
 
@@ -186,16 +214,24 @@ def first_pose(
         tracker: without a pose; it has one afterwards.
         settings, starts: see `voodoo.pipeline.run.track`.
         after: frames before this time [s] are left out.
+        left_out: counts frames that the tracker refuses, which are left out; None: they are errors.
 
     Raises:
         VoodooError: damage in the recording, or a frame that the tracker refuses.
     """
     front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
     for recorded in paired(recording):
-        if recorded.stamp >= after - _ROUNDED_S:
+        if recorded.stamp < after - _ROUNDED_S:
+            continue
+        try:
             estimate = front_end.step(recorded)
-            if front_end.search.posed:
-                return estimate
+        except VoodooError as error:
+            if left_out is None:
+                raise
+            left_out.add_error(error)
+            continue
+        if front_end.search.posed:
+            return estimate
     return None
 
 

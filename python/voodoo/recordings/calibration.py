@@ -12,6 +12,8 @@ from voodoo.errors import CameraError, RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.recordings.pictures import picture_size
+from voodoo.recordings.stored import check_stored, read_stored
 
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
@@ -38,14 +40,41 @@ class FolderCalibration:
     color: Calibration | None
 
 
-def read_calibration(path: Path) -> FolderCalibration:
+_TEMPLATE = """\
+width = {width}
+height = {height}
+fx = 525.0              # pixels: focal lengths and principal point of this camera, from its maker's tools
+fy = 525.0
+cx = {cx}
+cy = {cy}
+depth_factor = 1000.0   # units per metre: 1000 where images are in millimetres, 5000 in the TUM RGB-D benchmark
+sensor_frame = "camera_depth_optical_frame"
+"""
+
+
+def template(like: Path | None) -> str:
+    """A calibration.toml to fill in, of the size of a picture."""
+    try:
+        width, height = (640, 480) if like is None else picture_size(read_stored(like, "a readable picture"), like)
+    except RecordingError:
+        width, height = 640, 480
+    return _TEMPLATE.format(width=width, height=height, cx=(width - 1) / 2, cy=(height - 1) / 2)
+
+
+def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibration:
     """Read a calibration.toml; its form is described at FolderRecording.
+
+    Args:
+        path: the file.
+        like: one of the pictures, whose size is proposed where there is no such file.
 
     Raises:
         RecordingError: missing, not TOML, or a key is missing, unknown or out of range.
     """
     if not path.is_file():
-        raise RecordingError(f"{path}: expected a calibration file beside the images, found none")
+        hint = f"Write {path} with the numbers of the camera:\n\n{template(like)}"
+        raise RecordingError(f"{path}: expected a calibration file beside the images, found none", hint=hint)
+    check_stored(path, "a calibration file")
     content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
     tables = {"depth", "color"}
     _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))

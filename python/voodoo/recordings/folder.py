@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import pairwise
 from pathlib import Path, PurePath
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.calibration import Calibration, read_calibration
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color, decode_depth_png
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate
+from voodoo.recordings.recording import (
+    Recording,
+    RecordingInfo,
+    SensorInfo,
+    mean_rate,
+    number_option,
+    refuse_blank,
+)
 from voodoo.recordings.stored import read_stored, read_stored_text
 
+_RATE = 30.0
+"""Images per second of numbered images, as most depth cameras give by default."""
+_MOST_NUMBERED = 1_000_000
+"""Larger whole numbers are times in seconds, not numbers of images: nine hours of them."""
+_CLOCKS = {13: 1e-3, 16: 1e-6, 19: 1e-9}
+"""Seconds of a unit of the times since 1970 that have so many digits."""
 _PICTURES = (".png", ".jpg", ".jpeg")
 
 
 class FolderRecording(Recording):
     """A folder of images::
 
-        depth/1305031102.160407.png   16-bit PNGs named by their stamp in seconds
+        depth/1305031102.160407.png   16-bit PNGs named by their stamp in seconds, or numbered (00000.png)
         depth.txt                     optional: lines "stamp depth/name.png", # starts a comment; then names are free
         rgb/, rgb.txt                 optional: the same for colour (PNG or JPEG)
         calibration.toml              the camera
@@ -46,33 +59,48 @@ class FolderRecording(Recording):
         width = 640
         ...
 
+    Images that are numbered come at `rate`; names of 13, 16 or 19 digits are stamps in milli-, micro- or nanoseconds.
+
     Args:
         path: the folder.
         calibration: another calibration file.
+        rate: images per second where they are numbered; None: 30 is assumed, and said so.
+        left_out: counts what cannot be used, which is then left out; None: it is refused.
 
     Raises:
         RecordingError: no images, no calibration, names that are no stamps, or stamps that do not rise.
     """
 
-    def __init__(self, path: Path, *, calibration: str | Path | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        calibration: str | Path | None = None,
+        rate: float | None = None,
+        left_out: LeftOut | None = None,
+    ) -> None:
         """List the images; see the class."""
         if not path.is_dir():
             raise RecordingError(f"{path}: expected a folder with depth/ and calibration.toml, found no folder")
         self.path = path
         self.name = path.resolve().name
-        self._calibration = read_calibration(path / "calibration.toml" if calibration is None else Path(calibration))
-        self.root_frame = self._calibration.root_frame
-        self.start, self.reference = None, None
-        self._depth = _listing(path, "depth", (".png",))
-        self._color: list[tuple[float, Path]] = []
-        self._unused: tuple[tuple[str, str], ...] = ()
+        self._left_out = left_out
+        clock = Clock(None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4))
+        self._depth = _listing(path, "depth", (".png",), clock, left_out)
         if not self._depth:
             raise RecordingError(f"{path}: expected depth images in depth/ or listed in depth.txt, found none")
+        file = path / "calibration.toml" if calibration is None else Path(calibration)
+        self._calibration = read_calibration(file, like=self._depth[0][1])
+        self.root_frame = self._calibration.root_frame
+        self.start, self.reference = None, None
+        self._color: list[tuple[float, Path]] = []
+        self._unused: tuple[tuple[str, str], ...] = ()
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
             if self._calibration.color is None:
                 self._unused = (("rgb", "no [color] table in the calibration file"),)
             else:
-                self._color = _listing(path, "rgb", _PICTURES)
+                self._color = _listing(path, "rgb", _PICTURES, clock, left_out)
+        self.assumed = tuple(clock.notes)
 
     def __len__(self) -> int:
         """Number of depth images."""
@@ -80,18 +108,34 @@ class FolderRecording(Recording):
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the images; see Recording."""
-        depth, color = self._calibration.depth, self._calibration.color
+        color = self._calibration.color
         colors = iter(self._color)
         upcoming = next(colors, None)
-        for stamp, file in self._depth:
-            measurements: list[Measurement] = []
+        measurements: list[Measurement] = []
+        for number, (stamp, file) in enumerate(self._depth):
             while color is not None and upcoming is not None and upcoming[0] <= stamp:
                 measurements.append(_color_image(*upcoming, color))
                 upcoming = next(colors, None)
-            image = decode_depth_png(_read(file), file, (depth.camera.width, depth.camera.height))
-            scale = 1.0 / self._calibration.depth_factor
-            measurements.append(DepthImage("depth", stamp, image, scale, depth.camera, depth.root_from_sensor))
+            try:
+                measurements.append(self._depth_image(stamp, file))
+            except RecordingError as error:
+                if self._left_out is None:
+                    raise
+                self._left_out.add_error(error)
+                continue
+            if self._left_out is not None:
+                self._left_out.numbers["depth", stamp] = number
             yield RecordedFrame(stamp, tuple(measurements))
+            measurements.clear()
+
+    def _depth_image(self, stamp: float, file: Path) -> DepthImage:
+        place = self._calibration.depth
+        image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
+        scale = 1.0 / self._calibration.depth_factor
+        item = DepthImage("depth", stamp, image, scale, place.camera, place.root_from_sensor)
+        if self._left_out is not None:
+            refuse_blank(item, file)
+        return item
 
     def info(self) -> RecordingInfo:
         """Summarize from names and calibration."""
@@ -110,10 +154,48 @@ class FolderRecording(Recording):
             root_frame=self.root_frame,
             sensors=tuple(sensors),
             unused=self._unused,
+            notes=self.assumed,
         )
 
 
-def _listing(path: Path, name: str, suffixes: tuple[str, ...]) -> list[tuple[float, Path]]:
+class Clock:
+    """Stamps from the names of files.
+
+    Args:
+        rate: images per second where they are numbered; None: 30.
+
+    Attributes:
+        notes: what was assumed.
+    """
+
+    def __init__(self, rate: float | None) -> None:
+        """Nothing assumed yet."""
+        self._rate = rate
+        self.notes: list[str] = []
+
+    def of(self, files: Sequence[Path]) -> list[float]:
+        """Stamps [s] of the names of a folder's files.
+
+        Raises:
+            RecordingError: a name that is no number.
+        """
+        numbers = [_stamp(file.stem, str(file)) for file in files]
+        stems = [file.stem for file in files]
+        digits = {len(stem) for stem in stems} if all(stem.isdigit() for stem in stems) else set()
+        scale = next((scale for count, scale in _CLOCKS.items() if digits == {count}), None)
+        if scale is not None:
+            return [number * scale for number in numbers]
+        if not digits or max(numbers) > _MOST_NUMBERED:
+            return numbers
+        rate = self._rate or _RATE
+        told = f"{files[0].parent.name}/ is numbered, and taken for {rate:g} images/s"
+        self.notes += [told if self._rate else f"{told}; --option rate=N says another rate"]
+        return [number / rate for number in numbers]
+
+
+def _listing(
+    path: Path, name: str, suffixes: tuple[str, ...], clock: Clock, left_out: LeftOut | None
+) -> list[tuple[float, Path]]:
     """(stamp, file) of NAME.txt, else of the files in NAME/."""
     table = path / f"{name}.txt"
     entries: list[tuple[float, Path]] = []
@@ -129,11 +211,20 @@ def _listing(path: Path, name: str, suffixes: tuple[str, ...]) -> list[tuple[flo
             entries.append((_stamp(words[0], where), path / _inside(words[1], where)))
     elif (path / name).is_dir():
         files = [file for file in (path / name).iterdir() if file.suffix.lower() in suffixes]
-        entries = sorted((_stamp(file.stem, str(file)), file) for file in files)
-    for (before, _), (after, file) in pairwise(entries):
-        if after <= before:
-            raise RecordingError(f"{file}: expected a stamp after {before:.6f}, found {after:.6f}")
-    return entries
+        entries = sorted(zip(clock.of(files), files, strict=True))
+    rising = entries[:1]
+    for number, (stamp, file) in enumerate(entries):
+        if number and stamp <= rising[-1][0]:
+            reason = "with a repeated stamp" if stamp == rising[-1][0] else "with a stamp before the last one"
+            error = RecordingError(
+                f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}", reason=reason
+            )
+            if left_out is None:
+                raise error
+            left_out.add_error(error)
+        elif number:
+            rising.append((stamp, file))
+    return rising
 
 
 def _inside(name: str, where: str) -> str:

@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ColorImage, DepthImage, KeypointImage, Measurement, RecordedFrame
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
 from voodoo.recordings.keypoint_files import read_openpose_json
 from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording, RecordingInfo
 
 
@@ -31,7 +32,7 @@ class Joined(Recording):
     def __init__(self, first: Recording, others: Sequence[Recording], *, offset: float = 0.0) -> None:
         """Check that they overlap in time."""
         self.path, self.name, self.root_frame = first.path, first.name, first.root_frame
-        self.start, self.reference = first.start, first.reference
+        self.start, self.reference, self.assumed = first.start, first.reference, first.assumed
         self._first, self._others, self._offset = first, tuple(others), offset
         about = first.info()
         low, high = about.start_stamp, about.start_stamp + about.duration
@@ -55,6 +56,10 @@ class Joined(Recording):
             added = tuple(item for stream in streams for item in stream.until(recorded.stamp))
             # The frame's own measurement stays the last one.
             yield RecordedFrame(recorded.stamp, (*recorded.measurements[:-1], *added, *recorded.measurements[-1:]))
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """See Recording."""
+        return self._first.root_from(frame, stamp)
 
     def info(self) -> RecordingInfo:
         """That of the first, with the sensors of all."""
@@ -93,17 +98,21 @@ class WithKeypoints(Recording):
         recording: with colour or depth images.
         folders: sensor -> folder of OpenPose JSON files, one for each of its images, sorted by name.
         layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
+        left_out: of the recording, see open_recording.
 
     Raises:
         RecordingError: an unknown sensor, or another number of files than images.
         MeasurementError: an unknown layout.
     """
 
-    def __init__(self, recording: Recording, folders: Mapping[str, Path], *, layout: str) -> None:
+    def __init__(
+        self, recording: Recording, folders: Mapping[str, Path], *, layout: str, left_out: LeftOut | None = None
+    ) -> None:
         """List the files."""
         layout_of(layout)
+        self._left_out = left_out
         self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
-        self.start, self.reference = recording.start, recording.reference
+        self.start, self.reference, self.assumed = recording.start, recording.reference, recording.assumed
         self._recording, self._layout = recording, layout
         self._files: dict[str, list[Path]] = {}
         sensors = {item.name: item for item in recording.info().sensors if item.kind in ("color", "depth")}
@@ -129,21 +138,37 @@ class WithKeypoints(Recording):
             items: list[Measurement] = []
             for item in recorded.measurements:
                 if isinstance(item, (ColorImage, DepthImage)) and count.get(item.sensor, -1) >= 0:
-                    file = self._files[item.sensor][count[item.sensor]]
-                    count[item.sensor] += 1
-                    items.append(self._keypoints(item, file))
+                    number = count[item.sensor]
+                    if self._left_out is not None:
+                        # Where images were left out the others keep their numbers.
+                        number = self._left_out.numbers.get((item.sensor, item.stamp), number)
+                    count[item.sensor] = number + 1
+                    items += self._keypoints(item, self._files[item.sensor][number])
                 items.append(item)
             yield RecordedFrame(recorded.stamp, tuple(items))
 
-    def _keypoints(self, item: ColorImage | DepthImage, file: Path) -> KeypointImage:
-        return KeypointImage(
-            sensor=f"{item.sensor}/keypoints",
-            stamp=item.stamp,
-            people=tuple(read_openpose_json(file, layout=self._layout)),
-            layout=self._layout,
-            camera=item.camera,
-            root_from_sensor=item.root_from_sensor,
-        )
+    def _keypoints(self, item: ColorImage | DepthImage, file: Path) -> list[KeypointImage]:
+        try:
+            people = tuple(read_openpose_json(file, layout=self._layout))
+        except RecordingError as error:
+            if self._left_out is None:
+                raise
+            self._left_out.add_error(error)
+            return []
+        return [
+            KeypointImage(
+                sensor=f"{item.sensor}/keypoints",
+                stamp=item.stamp,
+                people=people,
+                layout=self._layout,
+                camera=item.camera,
+                root_from_sensor=item.root_from_sensor,
+            )
+        ]
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """See Recording."""
+        return self._recording.root_from(frame, stamp)
 
     def info(self) -> RecordingInfo:
         """That of the recording, with the keypoints."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from voodoo.errors import RecordingError, a_path
 
 if TYPE_CHECKING:
+    from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.recording import Recording
 
 
@@ -72,11 +73,22 @@ LOADERS: dict[str, Loader] = {
 }
 
 
+_FILM = ("a film", "depth, or keypoints of several calibrated cameras (a folder of Pose2Sim)")
+_ADVICE = {
+    ".mkv": ("a recording of an Azure Kinect, or a film", "its depth images as PNG files in a folder"),
+    ".oni": ("a recording of OpenNI", "its depth images as PNG files in a folder"),
+    ".svo": ("a recording of a ZED", "its depth images as PNG files in a folder, or a ROS bag"),
+    ".svo2": ("a recording of a ZED", "its depth images as PNG files in a folder, or a ROS bag"),
+} | dict.fromkeys((".mp4", ".avi", ".mov", ".webm", ".m4v"), _FILM)
+"""By suffix: what is not read, and what is needed instead."""
+
+
 def open_recording(
     path: str | Path,
     *,
     loader: str | None = None,
     bare: bool = False,
+    left_out: LeftOut | None = None,
     **options: Any,  # noqa: ANN401
 ) -> Recording:
     """Open a recording.
@@ -85,6 +97,7 @@ def open_recording(
         path: file or folder.
         loader: name in LOADERS; guessed from the path when None.
         bare: leave out first pose, truth and reference, and read none of the files beside the recording that hold them.
+        left_out: what cannot be used (a repeated, late or undecodable image) is left out and counted here; None: it is refused.
         **options: of the loader, e.g. `use=("depth", "scan")`, `root_frame="odom"` for bags; see RosRecording,
             UtdMhadRecording and FolderRecording.
 
@@ -100,11 +113,12 @@ def open_recording(
     known = options_of(name)
     if bare and "bare" in known:
         options["bare"] = True
+    if left_out is not None and "left_out" in known:
+        options["left_out"] = left_out
     unknown = sorted(set(options) - set(known))
     if unknown:
-        raise RecordingError(
-            f"loader {name!r} has no option {', '.join(unknown)}; its options: {', '.join(known) or 'none'}"
-        )
+        told = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
+        raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {told}")
     recording = LOADERS[name].open(path, **options)
     found = getattr(recording, "loader", name)  # a bag tells itself which of the two it is
     if found != name:
@@ -140,10 +154,18 @@ def guess_loader(path: Path) -> str:
             return "pose2sim"
         if (path / "depth").is_dir() or (path / "depth.txt").is_file():
             return "folder"
+        if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
+            raise RecordingError(
+                f"{path}: expected depth images in depth/, found colour alone; depth of the same camera is needed, or "
+                "keypoints of several calibrated cameras (a folder of Pose2Sim); docs/how-to/cameras.md says how"
+            )
         try:
             return "ros1" if find_bag(path).suffix == ".bag" else "ros2"
         except RecordingError as error:
             raise RecordingError(f"{error}; {_listing()}") from error
+    advice = _ADVICE.get(path.suffix.lower())
+    if advice is not None:
+        raise RecordingError(f"{path}: expected {advice[1]}, found {advice[0]}; docs/how-to/cameras.md says how")
     raise RecordingError(f"{path}: found no loader for it; {_listing()}")
 
 

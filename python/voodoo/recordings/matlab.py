@@ -39,8 +39,8 @@ def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
     """
     data = read_stored(path, "a MATLAB file")
     if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
-        kind = "one of version 7.3, which is HDF5 (save it with -v7)" if b"HDF" in data[:_HEADER] else "another file"
-        raise RecordingError(f"{path}: expected a MATLAB file of level 5, found {kind}")
+        other = "one of version 7.3, which is HDF5 (save it with -v7)" if b"HDF" in data[:_HEADER] else "another file"
+        raise RecordingError(f"{path}: expected a MATLAB file of level 5, found {other}")
     order = "<" if data[126:128] == b"IM" else ">"
     found: dict[str, npt.NDArray[Any]] = {}
     with reading(path, "a sound MATLAB file"):

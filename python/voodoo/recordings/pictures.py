@@ -78,7 +78,10 @@ def check_size(data: bytes, source: object, size: tuple[int, int]) -> None:
     """
     found = picture_size(data, source)
     if found != size:
-        raise RecordingError(f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {found[0]}x{found[1]}")
+        raise RecordingError(
+            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {found[0]}x{found[1]}",
+            reason="of another size than calibrated",
+        )
 
 
 def decode_depth_png(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArray[np.uint16]:

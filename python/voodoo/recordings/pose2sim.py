@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from voodoo.errors import MeasurementError, RecordingError
-from voodoo.measurements import KeypointImage, RecordedFrame
+from voodoo.measurements import FloatArray, KeypointImage, RecordedFrame
 from voodoo.recordings.camera_files import read_camera_toml
 from voodoo.recordings.keypoint_files import read_openpose_json
 from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.recording import (
     Recording,
@@ -54,6 +55,7 @@ class Pose2SimRecording(Recording):
         rate: images per second; nothing in the folder tells it (`voodoo track --option rate=30`).
         cameras: names to use, as in the calibration file; None means all.
         bare: no .trc is read.
+        left_out: counts files that cannot be read: their camera sees nobody then; None: they are refused.
 
     Raises:
         RecordingError: a part is missing or not of that form.
@@ -67,11 +69,13 @@ class Pose2SimRecording(Recording):
         cameras: tuple[str, ...] | None = None,
         *,
         bare: bool = False,
+        left_out: LeftOut | None = None,
     ) -> None:
         """Read calibration, the names of the keypoint files and the reference; see the class."""
         self.path = path
         self.name = path.name
         self.root_frame = FRAME
+        self._left_out = left_out
         try:
             layout_of(layout)
         except MeasurementError as error:
@@ -123,7 +127,7 @@ class Pose2SimRecording(Recording):
                     KeypointImage(
                         sensor=placed.name,
                         stamp=stamp,
-                        people=tuple(read_openpose_json(files[index], layout=self.layout)),
+                        people=self._people(files[index]),
                         layout=self.layout,
                         camera=placed.camera,
                         root_from_sensor=placed.world_from_sensor,
@@ -131,6 +135,15 @@ class Pose2SimRecording(Recording):
                     for placed, files in zip(self.cameras, self._files, strict=True)
                 ),
             )
+
+    def _people(self, file: Path) -> tuple[FloatArray, ...]:
+        try:
+            return tuple(read_openpose_json(file, layout=self.layout))
+        except RecordingError as error:
+            if self._left_out is None:
+                raise
+            self._left_out.add_error(error)
+            return ()
 
     def info(self) -> RecordingInfo:
         """Summarize."""

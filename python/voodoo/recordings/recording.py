@@ -12,7 +12,7 @@ from typing import TypedDict
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import FloatArray, RecordedFrame
+from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 
 
 class _Joints(TypedDict):
@@ -120,8 +120,10 @@ class Recording(ABC):
         root_frame: frame all poses and the reference are in.
         start: where the body is in the first frame, or None.
         reference: joint positions to compare with, or None.
+        assumed: what nothing in the recording tells and was assumed, or is not used, in words.
     """
 
+    assumed: tuple[str, ...] = ()
     path: Path
     name: str
     root_frame: str
@@ -144,6 +146,16 @@ class Recording(ABC):
     def info(self) -> RecordingInfo:
         """Summarize without decoding the images."""
 
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """root_from_frame (4, 4) of a frame that the recording knows, at a time [s].
+
+        Raises:
+            RecordingError: it does not know the frame.
+        """
+        if frame != self.root_frame:
+            raise RecordingError(f"{self.path}: expected the frame {self.root_frame!r}, found {frame!r}")
+        return np.eye(4)
+
     def __repr__(self) -> str:
         """Class, name and length."""
         return f"{type(self).__name__}({self.name!r}, {len(self)} frames, root frame {self.root_frame!r})"
@@ -155,6 +167,20 @@ def reference_words(reference: Reference | None) -> str:
         return "none"
     kind = "exact" if reference.exact else "estimated by another tracker"
     return f"{len(reference.names)} joints, {len(reference.stamps)} stamps, {kind}"
+
+
+def refuse_blank(item: DepthImage, where: object) -> None:
+    """Refuse a depth image in which nothing returned.
+
+    Raises:
+        RecordingError: it is blank.
+    """
+    image = item.image
+    seen = image.any() if image.dtype.kind == "u" else (np.isfinite(image) & (image > 0.0)).any()
+    if not seen:
+        raise RecordingError(
+            f"{where}, stamp {item.stamp:.6f}: expected depths, found a blank image", reason="that are blank"
+        )
 
 
 def number_option(path: Path, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,17 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, reference_words
+from voodoo.recordings import realsense
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.recording import (
+    Recording,
+    RecordingInfo,
+    SensorInfo,
+    mean_rate,
+    number_option,
+    reference_words,
+    refuse_blank,
+)
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
     Message,
@@ -22,14 +33,14 @@ from voodoo.recordings.ros_messages import (
     compressed_color_image,
     compressed_depth_image,
     depth_image,
-    frame_of,
     scan_fields,
     stamp_of,
 )
 from voodoo.recordings.ros_topics import COMPRESSED, Source, TopicChoice, TopicFinder
-from voodoo.recordings.transforms import TransformTree
-from voodoo.recordings.truth import TRUTH_FRAME, find_beside, read_start, read_truth
+from voodoo.recordings.transforms import TransformTree, matrix
+from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
 
+_MILLIMETRE = 0.001
 _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -42,7 +53,10 @@ class RosRecording(Recording):
     and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover` repair
     it), as is one whose index announces other messages than it holds.
 
-    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`, unless `bare`.
+    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`, unless `bare`. Their positions
+    are in the recording's own root frame, or in the one that init.json's key `frame` names.
+
+    A .bag of librealsense's recorder has no ROS frames: its streams are frames of their own ("Depth_0").
 
     Args:
         path: see voodoo.recordings.ros_bag.Bag.
@@ -50,10 +64,11 @@ class RosRecording(Recording):
         depth_topic, points_topic, scan_topic, color_topic: a topic or several, instead of the one found by type and
             name. The first one of the first kind makes the frames.
         camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
-        root_frame: by default base_link if the bag's transforms know it, else the frame of the first sensor.
-        metres_per_unit: of 16-bit depth images.
+        root_frame: by default base_link, or else world, if the bag's transforms know it, else the frame of the first sensor.
+        metres_per_unit: of 16-bit depth images; None: what a bag of librealsense's recorder tells, else 0.001.
         tf_max_age: how old a changing transform may be [s].
         bare: read nothing that lies beside the bag.
+        left_out: counts what cannot be used, which is then left out; None: it is refused.
 
     Raises:
         RecordingError: the bag is damaged, or calibration, transforms or usable topics are missing.
@@ -70,17 +85,20 @@ class RosRecording(Recording):
         color_topic: TopicChoice = None,
         camera_info_topic: str | None = None,
         root_frame: str | None = None,
-        metres_per_unit: float = 0.001,
+        metres_per_unit: float | None = None,
         tf_max_age: float = 0.5,
         bare: bool = False,
+        left_out: LeftOut | None = None,
     ) -> None:
         """Survey topics and transforms; see the class."""
         if isinstance(use, str) or not use or not set(use) <= set(TOPIC_KINDS):
             raise RecordingError(f"use: expected a tuple of some of {', '.join(TOPIC_KINDS)}, found {use!r}")
         self.path = path
-        self._metres_per_unit = number_option(path, "metres_per_unit", metres_per_unit, "a length > 0", most=1e3)
+        scale = _MILLIMETRE if metres_per_unit is None else metres_per_unit
+        scale = number_option(path, "metres_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
-        self._bag = Bag(path)
+        self._left_out = left_out
+        self._bag = Bag(path, left_out=left_out)
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices: dict[TopicKind, TopicChoice] = {
             "depth": depth_topic,
@@ -91,6 +109,7 @@ class RosRecording(Recording):
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
         sources = finder.find(use)
         self._unused = finder.unused
+        self._units = {s.topic: self._unit(s.topic, scale, told=metres_per_unit is not None) for s in sources}
         self._tree = TransformTree(path, max_age=max_age)
         self.root_frame = self._read_transforms(root_frame, sources)
         self._driver = sources[0]
@@ -98,9 +117,7 @@ class RosRecording(Recording):
 
         place = path if path.suffix == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
-        truth, start = (None if bare else find_beside(place, name) for name in ("truth.csv", "init.json"))
-        self.reference = None if truth is None else read_truth(truth, self._root_from_truth)
-        self.start = None if start is None else read_start(start, self._root_from_truth(self._driver.first_stamp))
+        self._read_beside(place, bare=bare)
 
     def __len__(self) -> int:
         """Number of messages on the topic that makes the frames."""
@@ -110,21 +127,46 @@ class RosRecording(Recording):
         """Read the bag; see Recording."""
         infos = {source.info_topic for source in self._sources.values() if source.info_topic is not None}
         last: dict[str, float] = {}
+        numbers = dict.fromkeys(self._sources, -1)
         pending: list[Measurement] = []
         for topic, message in self._bag.read([*self._sources, *infos]):
             if topic in infos:
-                self._check_calibration(topic, message)
+                if message is not None:
+                    self._check_calibration(topic, message)
                 continue
-            where = f"{self.path}, topic {topic}"
-            with reading(where, "a readable message"):
-                stamp = stamp_of(message, where)
-                if stamp < last.get(topic, stamp):
-                    raise RecordingError(f"{where}: expected rising stamps, found {stamp:.6f} after {last[topic]:.6f}")
-                last[topic] = stamp
-                pending.append(self._measurement(self._sources[topic], message, stamp, f"{where}, stamp {stamp:.6f}"))
+            numbers[topic] += 1
+            try:
+                measured = None if message is None else self._measured(topic, message, last)
+            except RecordingError as error:
+                if self._left_out is None:
+                    raise
+                self._left_out.add_error(error)
+                measured = None
+            if measured is None:
+                continue
+            if self._left_out is not None:
+                self._left_out.numbers[topic, measured.stamp] = numbers[topic]
+            pending.append(measured)
             if topic == self._driver.topic:
-                yield RecordedFrame(stamp, tuple(pending))
+                yield RecordedFrame(measured.stamp, tuple(pending))
                 pending.clear()
+
+    def _measured(self, topic: str, message: Message, last: dict[str, float]) -> Measurement:
+        """The measurement of a message that is not older than the `last` of its topic."""
+        where = f"{self.path}, topic {topic}"
+        with reading(where, "a readable message"):
+            stamp = stamp_of(message, where)
+            before = last.get(topic, -math.inf)
+            if stamp < before or (stamp == before and self._left_out is not None):
+                raise RecordingError(
+                    f"{where}: expected rising stamps, found {stamp:.6f} after {before:.6f}",
+                    reason="with a repeated stamp" if stamp == before else "with a stamp before the last one",
+                )
+            measured = self._measurement(self._sources[topic], message, stamp, f"{where}, stamp {stamp:.6f}")
+            if self._left_out is not None and isinstance(measured, DepthImage):
+                refuse_blank(measured, where)
+        last[topic] = stamp
+        return measured
 
     def info(self) -> RecordingInfo:
         """Summarize; reads the first and last message of every topic in use."""
@@ -151,24 +193,72 @@ class RosRecording(Recording):
             sensors=tuple(sensors),
             unused=tuple(self._unused),
             reference=reference_words(self.reference),
+            notes=self.assumed,
         )
+
+    def _unit(self, topic: str, otherwise: float, *, told: bool) -> float:
+        """Metres of a unit of 16-bit depth: what librealsense's recorder wrote, unless somebody tells."""
+        units = realsense.units_topic(topic)
+        if told or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
+            return otherwise
+        with reading(f"{self.path}, topic {units}", "a readable message"):
+            return number_option(
+                self.path, str(units), float(f"{self._bag.first(str(units)).data:.7g}"), "a length > 0", most=1e3
+            )
+
+    def _read_beside(self, place: Path, *, bare: bool) -> None:
+        """Reference and start from the files beside the bag; where damage is left out, ones that do not fit are only noted."""
+        self.reference, self.start = None, None
+        truth, start = (None if bare else find_beside(place, name) for name in ("truth.csv", "init.json"))
+        for file in (truth, start):
+            try:
+                if file is not None and file is truth:
+                    self.reference = read_truth(file, self._root_from_own)
+                elif file is not None:
+                    self.start = read_start(file, self._root_from_start)
+            except RecordingError as error:
+                if self._left_out is None:
+                    raise
+                self.assumed = (*self.assumed, f"{file} is not used: {error}")
 
     def _read_transforms(self, asked: str | None, sources: Sequence[Source]) -> str:
         """Fill the tree and choose the root frame; the big topic tf is only read when tf_static does not suffice."""
+        self._read_recorders_transforms()
         names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
         static = [name for name in names if name.endswith("tf_static")]
         dynamic = [name for name in names if name not in static]
         for topics, is_static in ((static, True), (dynamic, False)):
             for _, message in self._bag.read(topics):
-                with reading(self.path, "a readable transform"):
-                    self._tree.add(message, static=is_static)
+                self._add_transforms(message, static=is_static)
             known = {*self._tree.frames, *(source.frame for source in sources)}
-            root = asked if asked is not None else TRUTH_FRAME
-            if root in known and all(self._reaches(root, source.frame) for source in sources):
+            self._own_root = next((name for name in OWN_ROOTS if name in known), sources[0].frame)
+            root = asked if asked is not None else self._own_root
+            # base_link may still come, on tf.
+            told = asked is not None or root == OWN_ROOTS[0]
+            if told and root in known and all(self._reaches(root, source.frame) for source in sources):
                 return root
-        if asked is not None or TRUTH_FRAME in known:
-            return root
-        return sources[0].frame
+        return root
+
+    def _add_transforms(self, message: Message | None, *, static: bool) -> None:
+        try:
+            with reading(self.path, "a readable transform"):
+                if message is not None:
+                    self._tree.add(message, static=static)
+        except RecordingError as error:
+            if self._left_out is None:
+                raise
+            self._left_out.add("transforms that cannot be read", error)
+
+    def _read_recorders_transforms(self) -> None:
+        """Those of librealsense's recorder: where each stream is seen from what all are relative to."""
+        for topic in self._bag.topics if self._bag.realsense else ():
+            frames = realsense.transform_of(topic.name)
+            if frames is not None and topic.messages:
+                pose = self._bag.first(topic.name)
+                where = f"{self.path}, topic {topic.name}"
+                with reading(where, "a readable transform"):
+                    stream_from_reference = matrix(pose.translation, pose.rotation, where)
+                self._tree.add_edge(*frames, 0.0, stream_from_reference, static=True)
 
     def _reaches(self, root: str, frame: str) -> bool:
         try:
@@ -185,20 +275,38 @@ class RosRecording(Recording):
         self._tree.path(self.root_frame, source.frame)
         return True
 
-    def _root_from_truth(self, stamp: float) -> FloatArray:
-        return self._tree.lookup(self.root_frame, TRUTH_FRAME, stamp)
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """See Recording."""
+        return self._tree.lookup(self.root_frame, frame, stamp)
+
+    def _root_from_own(self, stamp: float) -> FloatArray:
+        """root_from_FRAME, the frame that is the root unless another one is asked for."""
+        return self._tree.lookup(self.root_frame, self._own_root, stamp)
+
+    def _root_from_start(self, frame: str | None) -> FloatArray:
+        return self._tree.lookup(self.root_frame, frame or self._own_root, self._driver.first_stamp)
 
     def _check_calibration(self, topic: str, message: Message) -> None:
         for source in self._sources.values():
             if source.info_topic == topic:
-                camera = camera_of(message, source.topic, f"{self.path}, topic {topic}")
-                if camera != source.camera:
+                try:
+                    camera = camera_of(message, source.topic, f"{self.path}, topic {topic}")
+                except RecordingError as error:
+                    if self._left_out is None:
+                        raise
+                    self._left_out.add("calibrations that cannot be used", error)
+                    continue
+                if source.camera is not None and source.camera.model == "inverse_plumb_bob":
+                    camera = replace(camera, model="inverse_plumb_bob")
+                if camera != source.camera and self._left_out is not None:
+                    self._left_out.add("calibrations unlike the first", f"{self.path}, topic {topic}: {camera}")
+                elif camera != source.camera:
                     raise RecordingError(
                         f"{self.path}, topic {topic}: expected one calibration, found {camera} after {source.camera}"
                     )
 
     def _measurement(self, source: Source, message: Message, stamp: float, where: str) -> Measurement:
-        root_from_sensor = self._tree.lookup(self.root_frame, frame_of(message), stamp)
+        root_from_sensor = self._tree.lookup(self.root_frame, self._bag.frame_of(source.topic, message), stamp)
         camera, compressed = source.camera, source.type == COMPRESSED
         if source.kind == "scan":
             return LaserScan(source.topic, stamp, **scan_fields(message, where), root_from_sensor=root_from_sensor)
@@ -208,7 +316,7 @@ class RosRecording(Recording):
             raise RecordingError(f"{where}: expected a calibrated camera, found none")
         if source.kind == "depth":
             image = (compressed_depth_image if compressed else depth_image)(message, camera, where)
-            scale = self._metres_per_unit if image.dtype.kind == "u" else 1.0
+            scale = self._units[source.topic] if image.dtype.kind == "u" else 1.0
             return DepthImage(source.topic, stamp, image, scale, camera, root_from_sensor)
 
         def decode() -> npt.NDArray[np.uint8]:

@@ -8,7 +8,7 @@ import tempfile
 import weakref
 import zipfile
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -18,9 +18,17 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from voodoo.errors import RecordingError, reading
-from voodoo.recordings.ros_messages import Message
+from voodoo.recordings import realsense
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.ros_messages import Message, frame_of
+from voodoo.recordings.stored import check_stored
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+_MOST_UNPACKED = 2**40
+"""Bytes of a bag: a terabyte."""
+_LITTLE, _MOST_GAIN = 2**28, 200
+"""An archive unpacks to a quarter of a gigabyte, and 200 times its own size on top: bags shrink to a tenth at best, still
+scenes to a fiftieth, what was made to fill disks to a thousandth."""
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
 _MCAP_FOOTER = 0x02
 
@@ -41,58 +49,96 @@ class Bag:
         path: a .bag, .mcap or .db3 file, a ROS 2 bag directory, a directory holding one of these (also as `bag/`),
             or a .zip holding one, which is unpacked into a temporary directory for the life of this object.
 
+        left_out: counts what cannot be used, which is then left out; None: it is refused.
+
     Raises:
         RecordingError: no bag there, or its index is damaged.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
         """Unpack if need be, and read the index."""
         self.path = path
+        self._left_out = left_out
         folder = path
         if path.suffix == ".zip":
             folder = Path(tempfile.mkdtemp(prefix="voodoo-"))
             weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
             _unpack(path, folder)
-        self.file = find_bag(folder) if folder.is_dir() else folder
+        self._folder = folder
+        with self._naming():
+            self._survey()
+
+    def _survey(self) -> None:
+        """Find the bag and read its index."""
+        self.file = find_bag(self._folder) if self._folder.is_dir() else self._folder
         for part in [self.file] if self.file.is_file() else sorted(self.file.iterdir()):
+            if part.suffix in _BAG_SUFFIXES:
+                check_stored(part, "a complete ROS bag", most=_MOST_UNPACKED)
             if part.suffix == ".mcap":
                 check_mcap(part)
         with self._open() as reader:
             with reading(self.path, "the index of a ROS bag"):
                 self.is_ros2: bool = reader.is2
                 self.topics = _topics(reader)
+                self.realsense: bool = not self.is_ros2 and realsense.is_recorders(item.name for item in self.topics)
                 self.start_time: int = reader.start_time
                 self.end_time: int = reader.end_time
         if self.file.is_dir():
             self._check_metadata()
 
-    def read(self, topics: Collection[str]) -> Iterator[tuple[str, Message]]:
-        """Messages of `topics` in the order they were recorded, as (topic, message).
+    @contextmanager
+    def _naming(self) -> Iterator[None]:
+        """Errors within name the archive that was given, not the folder it was unpacked to."""
+        try:
+            yield
+        except RecordingError as error:
+            if self._folder == self.path:
+                raise
+            raise RecordingError(str(error).replace(str(self._folder), str(self.path))) from error
+
+    def read(self, topics: Collection[str]) -> Iterator[tuple[str, Message | None]]:
+        """Messages of `topics` in the order they were recorded, as (topic, message); None for one that was left out.
 
         Raises:
             RecordingError: damage, or fewer messages than the bag's index announces.
         """
         counts = dict.fromkeys(topics, 0)
         with self._open() as reader:
-            for topic, message in self._messages(reader, topics, None):
+            for topic, message in self._messages(reader, topics, None, self._left_out):
                 counts[topic] += 1
                 yield topic, message
         announced = {topic.name: topic.messages for topic in self.topics}
         for name, count in counts.items():
             if count != announced[name]:
-                raise RecordingError(
-                    f"{self.path}: expected {announced[name]} messages on {name} as the bag's index says, found {count}"
-                )
+                found = f"expected {announced[name]} messages on {name} as the bag's index says, found {count}"
+                if self._left_out is None:
+                    raise RecordingError(f"{self.path}: {found}")
+                self._left_out.add("that are not in the file", f"{self.path}: {found}", abs(announced[name] - count))
 
-    def first(self, topic: str) -> Message:
-        """The first message of `topic`.
+    def first(self, topic: str, *, good: Callable[[Message], object] | None = None) -> Message:
+        """The first message of `topic`; where damage is left out, the first one that is `good`.
+
+        Args:
+            topic: its name.
+            good: raises a RecordingError for a message that cannot be used.
 
         Raises:
             RecordingError: damage, or no message although the index announces some.
         """
+        problem: RecordingError | None = None
         with self._open() as reader:
-            for _, message in self._messages(reader, [topic], None):
+            for _, message in self._messages(reader, [topic], None, None if self._left_out is None else LeftOut()):
+                if message is None:
+                    continue
+                try:
+                    if good is not None and self._left_out is not None:
+                        good(message)
+                except RecordingError as error:
+                    problem = problem or error
+                    continue
                 return message
+        if problem is not None:
+            raise problem
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
 
     def last(self, topic: str) -> Message:
@@ -101,11 +147,15 @@ class Bag:
         with self._open() as reader:
             for seconds in (1, 10, None):
                 start = None if seconds is None else self.end_time - seconds * 1_000_000_000
-                for _, message in self._messages(reader, [topic], start):
-                    found = message
+                for _, message in self._messages(reader, [topic], start, None if self._left_out is None else LeftOut()):
+                    found = message if message is not None else found
                 if found is not None:
                     return found
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
+
+    def frame_of(self, topic: str, message: Message) -> str:
+        """The frame of a message: its header's, but for librealsense's bags, whose frame ids number the images."""
+        return realsense.frame_name(topic) if self.realsense else frame_of(message)
 
     def _check_metadata(self) -> None:
         """Compare metadata.yaml with the storage files: what only one of them knows would be left out in silence."""
@@ -127,27 +177,44 @@ class Bag:
 
     @contextmanager
     def _open(self) -> Iterator[AnyReader]:
-        with reading(self.path, "a complete ROS bag"):
-            reader = AnyReader([self.file], default_typestore=_typestore())
-            reader.open()
-        try:
-            yield reader
-        finally:
-            reader.close()
+        with self._naming():
+            with reading(self.path, "a complete ROS bag"):
+                reader = AnyReader([self.file], default_typestore=_typestore())
+                reader.open()
+            try:
+                yield reader
+            finally:
+                reader.close()
 
-    def _messages(self, reader: AnyReader, topics: Collection[str], start: int | None) -> Iterator[tuple[str, Message]]:
+    def _messages(
+        self, reader: AnyReader, topics: Collection[str], start: int | None, left_out: LeftOut | None
+    ) -> Iterator[tuple[str, Message | None]]:
         connections = [connection for connection in reader.connections if connection.topic in topics]
         if not connections:
             return
         stream = reader.messages(connections, start=start)
         while True:
-            with reading(self.path, "a complete ROS bag"):
-                item = next(stream, None)
+            try:
+                with reading(self.path, "a complete ROS bag"):
+                    item = next(stream, None)
+            except RecordingError as error:
+                if left_out is None:
+                    raise
+                left_out.add("rest of the file that cannot be read", error)
+                return
             if item is None:
                 return
             connection, _, raw = item
-            with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
-                message = reader.deserialize(raw, connection.msgtype)
+            try:
+                with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
+                    if self.realsense and connection.topic.endswith("/image/data"):
+                        raw = raw[: -realsense.EXTRA_BYTES]
+                    message = reader.deserialize(raw, connection.msgtype)
+            except RecordingError as error:
+                if left_out is None:
+                    raise
+                left_out.add_error(error)
+                message = None
             yield connection.topic, message
 
 
@@ -180,6 +247,10 @@ def find_bag(folder: Path) -> Path:
     raise RecordingError(f"{folder}: expected a ROS bag (metadata.yaml, .mcap, .db3 or .bag), found none")
 
 
+def _is_of_bag(name: str) -> bool:
+    return name == "metadata.yaml" or name.endswith(_BAG_SUFFIXES)
+
+
 def zip_members(path: Path) -> list[str]:
     """Names in a .zip.
 
@@ -192,13 +263,21 @@ def zip_members(path: Path) -> list[str]:
 
 def _unpack(path: Path, folder: Path) -> None:
     with reading(path, "a complete .zip file"), zipfile.ZipFile(path) as archive:
-        for member in archive.infolist():
+        members = [member for member in archive.infolist() if not member.is_dir()]
+        wanted = [member for member in members if _is_of_bag(PurePosixPath(member.filename).name)]
+        unpacked, packed = sum(member.file_size for member in wanted), path.stat().st_size
+        room = min(_MOST_UNPACKED, shutil.disk_usage(folder).free)
+        if unpacked > room or unpacked > _LITTLE + _MOST_GAIN * packed:
+            raise RecordingError(
+                f"{path}: expected an archive that unpacks to at most {min(room, _LITTLE + _MOST_GAIN * packed)} bytes, "
+                f"found {unpacked}"
+            )
+        for member in wanted:
             name = PurePosixPath(member.filename).name
-            if not member.is_dir() and (name == "metadata.yaml" or name.endswith(_BAG_SUFFIXES)):
-                if (folder / name).exists():
-                    raise RecordingError(f"{path}: expected one bag, found several files named {name}")
-                with archive.open(member) as source, (folder / name).open("wb") as target:
-                    shutil.copyfileobj(source, target)
+            if (folder / name).exists():
+                raise RecordingError(f"{path}: expected one bag, found several files named {name}")
+            with archive.open(member) as source, (folder / name).open("wb") as target:
+                shutil.copyfileobj(source, target)
 
 
 def check_mcap(path: Path) -> None:

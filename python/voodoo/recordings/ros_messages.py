@@ -12,6 +12,7 @@ from voodoo.errors import CameraError, RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.recordings.pictures import decode_color, decode_depth_png
+from voodoo.recordings.rvl import decode_rvl
 
 Message: TypeAlias = Any
 """A message as rosbags gives it; its class is generated from the definition in the bag."""
@@ -36,9 +37,10 @@ def stamp_of(message: Message, source: str) -> float:
     """
     stamp = message.header.stamp
     if stamp.sec <= 0 and stamp.nanosec == 0:
-        raise RecordingError(f"{source}: expected a header stamp, found zero")
+        raise RecordingError(f"{source}: expected a header stamp, found zero", reason="without a stamp")
     if not (0 <= stamp.nanosec < 1_000_000_000 and stamp.sec >= 0):
-        raise RecordingError(f"{source}: expected a header stamp, found {stamp.sec} s {stamp.nanosec} ns")
+        found = f"{stamp.sec} s {stamp.nanosec} ns"
+        raise RecordingError(f"{source}: expected a header stamp, found {found}", reason="without a stamp")
     return float(stamp.sec) + float(stamp.nanosec) * 1e-9
 
 
@@ -99,17 +101,16 @@ def depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[An
 def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[Any]:
     """(H, W) uint16 or float32 of a sensor_msgs/CompressedImage written by compressed_depth_image_transport.
 
-    The PNG follows a header of 12 bytes (a format number and two floats A, B); 32FC1 images are stored as
-    quantized inverse depth q with depth = A / (q - B), q = 0 meaning none.
+    The PNG, or columns, rows and RVL data, follow a header of 12 bytes (a format number and two floats A, B); 32FC1
+    images are stored as quantized inverse depth q with depth = A / (q - B), q = 0 meaning none.
 
     Raises:
-        RecordingError: damaged, RVL-compressed or of another size than the camera's.
+        RecordingError: damaged, or of another size than the camera's.
     """
     data = message.data.tobytes()
-    if "rvl" in message.format.lower():
-        raise RecordingError(f"{source}: expected PNG-compressed depth, found format {message.format!r}")
     header = b"" if data.startswith(b"\x89PNG") else data[:12]
-    image: npt.NDArray[Any] = decode_depth_png(data[len(header) :], source, (camera.width, camera.height))
+    decode = decode_rvl if "rvl" in message.format.lower() else decode_depth_png
+    image: npt.NDArray[Any] = decode(data[len(header) :], source, (camera.width, camera.height))
     if "32FC1" in message.format:
         if len(header) != 12:
             raise RecordingError(f"{source}: expected the 12-byte header of compressed depth, found none")
@@ -217,5 +218,6 @@ def _rows(message: Message, pixel_bytes: int, source: str) -> npt.NDArray[np.uin
 def _check_size(width: int, height: int, camera: Camera, source: str) -> None:
     if (width, height) != (camera.width, camera.height):
         raise RecordingError(
-            f"{source}: expected {camera.width}x{camera.height} px as calibrated, found {width}x{height}"
+            f"{source}: expected {camera.width}x{camera.height} px as calibrated, found {width}x{height}",
+            reason="of another size than calibrated",
         )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from voodoo.errors import RecordingError, reading
 from voodoo.model.camera import Camera
 from voodoo.names import TOPIC_KINDS, TopicKind
+from voodoo.recordings import realsense
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
     COLOR_CHANNELS,
@@ -16,14 +17,13 @@ from voodoo.recordings.ros_messages import (
     Message,
     base_topic,
     camera_of,
-    frame_of,
     stamp_of,
 )
 
 TopicChoice: TypeAlias = str | Sequence[str] | None
 
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
-CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+CAMERA_INFO, STRING = "sensor_msgs/msg/CameraInfo", "std_msgs/msg/String"
 _TYPES: dict[TopicKind, tuple[str, ...]] = {
     "depth": (IMAGE, COMPRESSED),
     "points": ("sensor_msgs/msg/PointCloud2",),
@@ -168,7 +168,7 @@ class TopicFinder:
         camera, info_topic = None, None
         with reading(f"{self.bag.path}, topic {name}", f"a {topic.type} message"):
             if kind in ("depth", "color"):
-                info_topic, camera = self._calibration(name, kind, frame_of(message))
+                info_topic, camera = self._calibration(name, kind, self.bag.frame_of(name, message))
                 words = message.format if topic.type == COMPRESSED else message.encoding
                 detail = f"{camera.width}x{camera.height} {words}"
             elif kind == "points":
@@ -176,12 +176,14 @@ class TopicFinder:
                 detail = f"cloud of {message.height * message.width} points ({fields})"
             else:
                 detail = f"scan of {len(message.ranges)} rays"
-            stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), frame_of(message)
+            stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), self.bag.frame_of(name, message)
         return Source(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
 
     def _calibration(self, name: str, kind: TopicKind, frame: str) -> tuple[str, Camera]:
         """CameraInfo beside the image (its name with the last part replaced), or as chosen for depth."""
         expected = f"{base_topic(name).rsplit('/', 1)[0]}/camera_info"
+        if self.bag.realsense:
+            expected = realsense.info_topic(name)
         if kind == "depth" and self._camera_info_topic is not None:
             expected = self._camera_info_topic
         topic = self._topics.get(expected)
@@ -192,9 +194,18 @@ class TopicFinder:
                 f"found CameraInfo topics: {infos}"
                 + (" (choose with camera_info_topic=, --topic camera_info=NAME)" if kind == "depth" else "")
             )
-        return expected, camera_of(self._message(expected), name, f"{self.bag.path}, topic {expected}")
+        source = f"{self.bag.path}, topic {expected}"
+        camera = camera_of(self._message(expected, lambda info: camera_of(info, name, source)), name, source)
+        lens = realsense.lens_topic(name)
+        if lens in self._topics and self._topics[lens].type == STRING and self._topics[lens].messages:
+            camera = realsense.with_lens(camera, self._message(lens))
+        return expected, camera
 
-    def _message(self, name: str) -> Message:
+    def _message(self, name: str, good: Callable[[Message], object] | None = None) -> Message:
         if name not in self._first:
-            self._first[name] = self.bag.first(name)
+            source = f"{self.bag.path}, topic {name}"
+            stamped = self._topics[name].type not in (CAMERA_INFO, STRING)
+            self._first[name] = self.bag.first(
+                name, good=good or ((lambda message: stamp_of(message, source)) if stamped else None)
+            )
         return self._first[name]

@@ -96,11 +96,15 @@ class TransformTree:
                 raise RecordingError(f"{where}: expected two different frame names")
             stamp = float(item.header.stamp.sec) + float(item.header.stamp.nanosec) * 1e-9
             transform = matrix(item.transform.translation, item.transform.rotation, where)
-            if (parent, child) not in self._edges:
-                self._edges[parent, child] = _Edge()
-                self._neighbours.setdefault(parent, []).append(child)
-                self._neighbours.setdefault(child, []).append(parent)
-            self._edges[parent, child].add(stamp, transform, static=static)
+            self.add_edge(parent, child, stamp, transform, static=static)
+
+    def add_edge(self, parent: str, child: str, stamp: float, transform: FloatArray, *, static: bool) -> None:
+        """Take up parent_from_child (4, 4) at a stamp [s]."""
+        if (parent, child) not in self._edges:
+            self._edges[parent, child] = _Edge()
+            self._neighbours.setdefault(parent, []).append(child)
+            self._neighbours.setdefault(child, []).append(parent)
+        self._edges[parent, child].add(stamp, transform, static=static)
 
     def path(self, root: str, frame: str) -> list[str]:
         """Frames from `root` to `frame`, both included.
@@ -159,6 +163,7 @@ class TransformTree:
             raise RecordingError(
                 f"{self.source}: expected a transform between {a!r} and {b!r} within {self.max_age} s of stamp "
                 f"{stamp:.6f}, found the nearest usable one {abs(age):.3f} s {'before' if age > 0 else 'after'} it "
-                "(loader's option tf_max_age, --option tf_max_age=SECONDS)"
+                "(loader's option tf_max_age, --option tf_max_age=SECONDS)",
+                reason="without a transform near its stamp",
             )
         return edge.transforms[index]

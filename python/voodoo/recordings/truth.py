@@ -17,11 +17,13 @@ from voodoo.measurements import FloatArray
 from voodoo.recordings.recording import Reference, Start
 from voodoo.recordings.stored import read_stored_text
 
-TRUTH_FRAME = "base_link"
-"""Frame of both files."""
+OWN_ROOTS = ("base_link", "world")
+"""A recording's own root frame is the first of these that its transforms know; both files are in it."""
 
 RootFromTruth: TypeAlias = Callable[[float], FloatArray]
-"""(4, 4) root_from_base_link at a stamp [s]."""
+"""(4, 4) from the frame of truth.csv to the root frame at a stamp [s]."""
+RootFromStart: TypeAlias = Callable[[str | None], FloatArray]
+"""(4, 4) from the frame that init.json names, or the one of truth.csv, to the root frame."""
 
 
 def find_beside(bag: Path, name: str) -> Path | None:
@@ -34,7 +36,7 @@ def find_beside(bag: Path, name: str) -> Path | None:
 
 
 def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
-    """Read a truth.csv: stamp_s, then NAME_x,NAME_y,NAME_z [m] in base_link; empty cells are missing joints.
+    """Read a truth.csv: stamp_s, then NAME_x,NAME_y,NAME_z [m] in the recording's own root frame; empty cells are missing joints.
 
     Raises:
         RecordingError: another header, a short row, a cell that is no number, stamps that do not rise.
@@ -66,16 +68,20 @@ def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
     return Reference(stamps, names, positions, exact=True)
 
 
-def read_start(path: Path, root_from_base: FloatArray) -> Start:
-    """Read an init.json: {"height_m": stature, "joints": {name: [x, y, z] in base_link}}.
+def read_start(path: Path, root_from: RootFromStart) -> Start:
+    """Read an init.json: {"height_m": stature, "frame": name, "joints": {name: [x, y, z]}}; height and frame may lack.
 
     Raises:
-        RecordingError: not JSON, or not of that form.
+        RecordingError: not JSON, not of that form, or a frame without a transform.
     """
     with reading(path, "a JSON file"):
         content = json.loads(read_stored_text(path, "a JSON file"))
     if not isinstance(content, dict) or not isinstance(content.get("joints"), dict) or not content["joints"]:
         raise RecordingError(f"{path}: expected an object with the joints of the first frame, found {content!r:.80}")
+    frame = content.get("frame")
+    if frame is not None and not isinstance(frame, str):
+        raise RecordingError(f"{path}: frame: expected a name, found {frame!r:.80}")
+    root_from_base = root_from(frame)
     joints = {}
     for name, value in content["joints"].items():
         numbers = isinstance(value, list) and len(value) == 3 and all(isinstance(v, (int, float)) for v in value)

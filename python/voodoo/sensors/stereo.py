@@ -70,8 +70,11 @@ class StereoPair:
                 f"stereo: expected cameras of one size, found {left.width}x{left.height} px and "
                 f"{right.width}x{right.height} px"
             )
-        if "equidistant" in (left.model, right.model):
-            raise MeasurementError("stereo: expected pinhole cameras with polynomial distortion, found a fish-eye lens")
+        others = {left.model, right.model} & {"equidistant", "inverse_plumb_bob"}
+        if others:
+            raise MeasurementError(
+                f"stereo: expected lenses that OpenCV's polynomials describe, found {', '.join(others)}"
+            )
         if not (pose[0, 3] > 0.0 and abs(pose[0, 3]) > abs(pose[1, 3]) + abs(pose[2, 3])):
             raise MeasurementError(
                 f"stereo: expected the right camera to the right, found it at {pose[:3, 3].tolist()} m"

@@ -1,0 +1,56 @@
+"""How far away a recording's depth images see: a wrong unit shows here before it shows as a lost body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from voodoo.errors import VoodooError
+from voodoo.measurements import DepthImage
+from voodoo.recordings.recording import Recording
+
+_LOOK = 5
+"""Images at the start that are looked at until one shows something."""
+_NEAR_M, _FAR_M = 1.2, 8.0
+"""A camera that sees a person sees farther than the first, and sees the nearest half of what it sees before the second."""
+
+
+@dataclass(frozen=True)
+class DepthRange:
+    """Depths [m] of an image: the nearest 5 %, the middle, the farthest 5 %."""
+
+    near: float
+    middle: float
+    far: float
+
+    def __str__(self) -> str:
+        """A line for people."""
+        return f"{self.near:.2f} to {self.far:.2f} m (90 % of the first image, half of it before {self.middle:.2f} m)"
+
+    @property
+    def doubt(self) -> str:
+        """What is wrong with it where no person is that near or that far; "" otherwise."""
+        if self.near < self.far < _NEAR_M or self.middle > _FAR_M:
+            return (
+                f"depths of {self.near:.2f} to {self.far:.2f} m leave no room for a person: is the unit right? "
+                "(depth_factor of calibration.toml: 1000 for millimetres; --option metres_per_unit=0.001 of a bag)"
+            )
+        return ""
+
+
+def depth_range(recording: Recording) -> DepthRange | None:
+    """That of the first depth image in which something is seen; None without one, or where it cannot be read."""
+    try:
+        for recorded in islice(recording, _LOOK):
+            for item in recorded.measurements:
+                if isinstance(item, DepthImage):
+                    metres = item.image.astype(np.float64).ravel() * item.metres_per_unit
+                    metres = metres[np.isfinite(metres) & (metres > 0.0)]
+                    if metres.size:
+                        near, middle, far = (float(value) for value in np.percentile(metres, (5.0, 50.0, 95.0)))
+                        return DepthRange(near, middle, far)
+    except VoodooError:
+        return None  # whoever reads on is told
+    return None

@@ -1,0 +1,46 @@
+"""What of a damaged recording is left out, so that the rest can be tracked."""
+
+from __future__ import annotations
+
+from voodoo.errors import VoodooError
+
+
+class LeftOut:
+    """Measurements that cannot be used, counted by reason.
+
+    A loader that gets one leaves such measurements out and goes on; without one it raises at the first.
+
+    Attributes:
+        counts: reason -> how many.
+        first: reason -> the first of them, in words.
+        numbers: (sensor, stamp) -> number of that message among the sensor's, for what is paired with them by number.
+    """
+
+    def __init__(self) -> None:
+        """Nothing yet."""
+        self.counts: dict[str, int] = {}
+        self.first: dict[str, str] = {}
+        self.numbers: dict[tuple[str, float], int] = {}
+
+    def add(self, reason: str, words: object, count: int = 1) -> None:
+        """Count what was left out.
+
+        Args:
+            reason: the same words for the same kind of damage.
+            words: which it was, and what was wrong.
+            count: how many.
+        """
+        self.counts[reason] = self.counts.get(reason, 0) + count
+        self.first.setdefault(reason, str(words))
+
+    def add_error(self, error: VoodooError) -> None:
+        """Count what raised an error."""
+        self.add(getattr(error, "reason", "refused"), error)
+
+    def __len__(self) -> int:
+        """How many were left out."""
+        return sum(self.counts.values())
+
+    def __str__(self) -> str:
+        """Counts and reasons in one line."""
+        return ", ".join(f"{count} {reason}" for reason, count in sorted(self.counts.items()))

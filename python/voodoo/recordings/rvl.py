@@ -1,0 +1,75 @@
+"""Depth images compressed by RVL, as compressed_depth_image_transport writes them.
+
+A. Wilson, "Fast Lossless Depth Image Compression", ISS 2017: runs of zeros and of pixels in turn; pixels are differences to
+the one before. Numbers are groups of three bits, the lowest first, each in four bits of which the highest says that more
+follow; eight of these make a word of 32 bits, the first in the highest bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError
+
+_MOST_GROUPS = 6
+"""Groups of a number: a difference of 16-bit pixels takes 17 bits; a run may take 25 bits, of which images use 24."""
+_HEAD = 8
+
+
+def decode_rvl(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArray[np.uint16]:
+    """Decode columns, rows (uint32 each) and RVL data to (H, W) uint16.
+
+    Args:
+        data: what follows the 12-byte header of compressed depth.
+        source: what to name in errors.
+        size: expected (width, height).
+
+    Raises:
+        RecordingError: damage, or another size.
+    """
+    found = tuple(int(number) for number in np.frombuffer(data[:_HEAD], "<u4")) if len(data) >= _HEAD else ()
+    if found != size:
+        raise RecordingError(
+            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {'x'.join(map(str, found)) or 'nothing'}",
+            reason="of another size than calibrated",
+        )
+    numbers = _numbers(data[_HEAD:])
+    image = np.zeros(size[0] * size[1], dtype=np.int64)
+    at, pixel, taken = 0, 0, []
+    places = []
+    while pixel < image.size:
+        if at + 2 > len(numbers):
+            raise RecordingError(f"{source}: expected RVL data for {image.size} pixels, found {pixel}")
+        zeros, count = int(numbers[at]), int(numbers[at + 1])
+        at, pixel = at + 2, pixel + zeros
+        if pixel + count > image.size or at + count > len(numbers) or zeros + count == 0:
+            raise RecordingError(f"{source}: expected RVL data for {image.size} pixels, found damage at pixel {pixel}")
+        taken.append(numbers[at : at + count])
+        places.append((pixel, count))
+        at, pixel = at + count, pixel + count
+    folded = np.concatenate(taken) if taken else np.empty(0, dtype=np.int64)
+    values = np.cumsum((folded >> 1) ^ -(folded & 1))
+    if values.size and not (0 <= values.min() and values.max() <= 0xFFFF):
+        raise RecordingError(f"{source}: expected depths of 16 bits, found {values.min()} to {values.max()}")
+    start = 0
+    for pixel, count in places:
+        image[pixel : pixel + count] = values[start : start + count]
+        start += count
+    return image.astype(np.uint16).reshape(size[1], size[0])
+
+
+def _numbers(data: bytes) -> npt.NDArray[np.int64]:
+    """The numbers in RVL data; what is left of the last word after them may give zeros more."""
+    words = np.frombuffer(data[: len(data) // 4 * 4], "<u4")
+    nibbles = (words[:, None] >> np.arange(28, -4, -4, dtype=np.uint32)) & 0xF
+    groups = nibbles.ravel().astype(np.int64)
+    ends = np.flatnonzero(groups < 8)
+    if not ends.size:
+        return np.empty(0, dtype=np.int64)
+    groups = groups[: ends[-1] + 1]
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    order = np.arange(groups.size) - np.repeat(starts, ends - starts + 1)
+    # What no number has so many groups of is damage; its value is refused as too large a run.
+    values = (groups & 7) << (3 * np.minimum(order, 2 * _MOST_GROUPS))
+    return np.asarray(np.add.reduceat(values, starts), dtype=np.int64)
