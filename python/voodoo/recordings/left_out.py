@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from voodoo.errors import VoodooError
 
 
@@ -41,6 +43,11 @@ class LeftOut:
         """How many were left out."""
         return sum(self.counts.values())
 
+    @staticmethod
+    def words(counts: Mapping[str, int]) -> str:
+        """Counts and reasons in one line."""
+        return ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items()))
+
     def __str__(self) -> str:
         """Counts and reasons in one line."""
-        return ", ".join(f"{count} {reason}" for reason, count in sorted(self.counts.items()))
+        return self.words(self.counts)
