@@ -1,5 +1,6 @@
 """BVH, TRC and ROS 2 bags, read back by readers that share no code with the writers."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +11,16 @@ from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 import voodoo
-from voodoo.errors import VoodooError
+from voodoo.errors import BodyError, VoodooError
 from voodoo.export import write_bag, write_bvh, write_trc
-from voodoo.export.files import check_target
+from voodoo.export.files import check_target, save
 from voodoo.export.joint_angles import joint_angles
+from voodoo.export.ros2 import frame_poses
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
+from voodoo.pipeline.run import start_tracker
+from voodoo.pipeline.run import track as run_track
+from voodoo.recordings import sample_path
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 
 REST = {
@@ -87,6 +92,8 @@ def read_bvh(path: Path):
         world = []
         for number, (name, parent, offset, _) in enumerate(joints):
             turn, shift = np.eye(3), offset.copy()
+            if parent is not None and any(channel.endswith("position") for channel in joints[number][3]):
+                shift[:] = 0.0  # positions stand for the offset, as animation programs read them
             for value, (owner, channel) in zip(row, channels, strict=True):
                 if owner == number and channel.endswith("rotation"):
                     turn = turn @ Rotation.from_euler(channel[0].lower(), value, degrees=True).as_matrix()
@@ -279,3 +286,76 @@ def test_a_place_where_nothing_can_be_written_is_told_before_the_work(tmp_path):
             check_target(tmp_path / name)
     with pytest.raises(VoodooError, match=r"pose\.csv: expected a file, found a folder"):
         check_target(tmp_path / "pose.csv")
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    """The bundled recording, tracked: its lengths are refined on the way."""
+    recording = voodoo.open_recording(sample_path(), use=("depth", "scan"))
+    tracker = start_tracker(recording)
+    estimates = [step.estimate for step in run_track(recording, tracker)]
+    return Track.of(estimates, body=tracker.body), tracker.body
+
+
+def test_all_formats_tell_the_same_joints(tmp_path, recorded):
+    track, body = recorded
+    for suffix in ("csv", "npz", "bvh", "trc"):
+        save(track, tmp_path / f"pose.{suffix}", body=body, root_frame="base_link")
+    places, _ = read_bvh(tmp_path / "pose.bvh")
+    csv, npz, trc = (
+        Track.load(tmp_path / "pose.csv"),
+        Track.load(tmp_path / "pose.npz"),
+        read_trc(tmp_path / "pose.trc"),
+    )
+    bones = {bone.name: bone.joint for bone in skeleton(track, body).bones if bone.joint in track.joint_names}
+    assert len(bones) >= 12 and bones["l_foot"] == "l_ankle"
+    for bone, joint in bones.items():
+        here = track.joints[:, track.joint_names.index(joint)]
+        told = {
+            "csv": csv.joints[:, csv.joint_names.index(joint)],
+            "npz": npz.joints[:, npz.joint_names.index(joint)],
+            "trc": trc.positions[:, trc.names.index(joint)] @ Z_UP_FROM_Y_UP.T,
+            "bvh": places[bone][:, [2, 0, 1]] / 100.0,
+        }
+        for name, found in told.items():
+            assert np.abs(found - here).max() < 2e-6, (name, joint)
+    write_bag(tmp_path / "bag", track, body, root_frame="base_link")
+    names = {
+        "l_wrist": "l_wrist",
+        "r_elbow": "r_elbow",
+        "l_knee": "l_knee",
+        "r_ankle": "r_ankle",
+        "l_shoulder": "l_shoulder",
+    }
+    frames = [frame_poses(track, skeleton(track, body), index, "voodoo") for index in (0, 45, 89)]
+    for row, found in zip((0, 45, 89), frames, strict=True):
+        for frame, joint in names.items():
+            place = found[f"{frame}_voodoo"][1][:3, 3]
+            assert np.abs(place - track.joints[row, track.joint_names.index(joint)]).max() < 1e-9, frame
+
+
+def test_a_bvh_of_a_steady_body_has_one_set_of_offsets(tmp_path, recorded):
+    track, body = recorded
+    write_bvh(tmp_path / "changing.bvh", track, body)
+    assert (tmp_path / "changing.bvh").read_text().count("CHANNELS 6") > 5
+    write_bvh(tmp_path / "still.bvh", track.of_frames(np.array([40])), body)
+    assert (tmp_path / "still.bvh").read_text().count("CHANNELS 6") == 1
+
+
+@pytest.mark.parametrize("name", ["a\tb", "a\nb", "a{b", "a}b", "a\u2028b", "\x00"])
+def test_names_that_break_files_are_refused(name):
+    text = voodoo.Body.human().to_toml()
+    for word in ("pelvis", "l_shoulder"):
+        with pytest.raises(BodyError, match="a name without tabs, line breaks and braces"):
+            voodoo.Body.from_toml(text.replace(f'"{word}"', json.dumps(name)))
+
+
+def test_names_with_spaces_are_one_word_in_bvh(tmp_path, recorded):
+    track, body = recorded
+    names = {"l_forearm": "left fore arm \u00e4"}
+    text = body.to_toml()
+    for old, new in names.items():
+        text = text.replace(f'"{old}"', f'"{new}"')
+    renamed = replace(track, limb_names=tuple(names.get(limb, limb) for limb in track.limb_names), limb_status={})
+    write_bvh(tmp_path / "pose.bvh", renamed, voodoo.Body.from_toml(text))
+    assert "left_fore_arm__" in read_bvh(tmp_path / "pose.bvh")[0]

@@ -54,7 +54,7 @@ def test_damaged_trc_is_refused(tmp_path, change, message):
 
 
 def test_c3d_round_trip_with_the_library_that_defines_it(tmp_path):
-    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed (pip install voodoo[c3d])")
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed")
     content = ezc3d.c3d()
     content["parameters"]["POINT"]["RATE"]["value"] = [50.0]
     content["parameters"]["POINT"]["LABELS"]["value"] = ["LWRA", "RWRA"]

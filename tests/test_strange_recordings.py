@@ -204,7 +204,7 @@ def test_millimetres_under_the_default_factor_get_a_hint(tmp_path):
     image = np.linspace(1500, 4000, 12).reshape(3, 4).astype(np.uint16)
     path = folder(tmp_path / "f", ["0.0", "0.1"], image=image)
     said = run("info", path).stdout
-    assert  "leave no room for a person: is the unit right?" in said
+    assert "leave no room for a person: is the unit right?" in said
     joints = {"l_hip": [0, 0, 2], "r_hip": [0.2, 0, 2], "l_shoulder": [0, -0.5, 2], "r_shoulder": [0.2, -0.5, 2]}
     (tmp_path / "start.json").write_text(json.dumps({"joints": joints}))
     done = run("track", path, "--init", tmp_path / "start.json", "--out", tmp_path / "pose.csv")
@@ -224,7 +224,9 @@ def test_damaged_images_of_a_folder_are_left_out(tmp_path):
     cv2.imwrite(str(path / "depth" / "3.0.png"), np.zeros((3, 4), np.uint16))
     cv2.imwrite(str(path / "depth" / "4.0.png"), np.ones((6, 8), np.uint16))
     (path / "depth.txt").write_text(
-        "".join(f"{stamp} depth/{name}.png\n" for stamp, name in enumerate(("1.0", "2.0", "3.0", "4.0", "5.0", "gone"), 1))
+        "".join(
+            f"{stamp} depth/{name}.png\n" for stamp, name in enumerate(("1.0", "2.0", "3.0", "4.0", "5.0", "gone"), 1)
+        )
         + "6.0 depth/1.0.png\n3.5 depth/1.0.png\n7.0 depth/1.0.png\n"
     )
     left_out = LeftOut()

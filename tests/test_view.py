@@ -34,7 +34,7 @@ def steps():
 def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
     """Also the silhouette of images with more pixels than are shown as points."""
     monkeypatch.setattr(view, "_MOST_POINTS", most)
-    pytest.importorskip("rerun", reason="Rerun is not installed (pip install voodoo[view])")
+    pytest.importorskip("rerun", reason="Rerun is not installed")
     tracker, front_end, frames = steps
     path = tmp_path / "track.rrd"
     with Viewer(save=path) as viewer:
@@ -56,7 +56,7 @@ def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
 
 
 def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):
-    pytest.importorskip("rerun", reason="Rerun is not installed (pip install voodoo[view])")
+    pytest.importorskip("rerun", reason="Rerun is not installed")
     tracker, front_end, frames = steps
     path = tmp_path / "track.rrd"
     with Viewer(save=path) as viewer:
@@ -83,7 +83,7 @@ def test_without_rerun_the_message_says_what_to_install(monkeypatch, tmp_path):
         return find(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(VoodooError, match=r"pip install voodoo\[view\]"):
+    with pytest.raises(VoodooError, match=r"pip install 'voodoo-tracker\[view\]'"):
         Viewer(save=tmp_path / "x.rrd")
 
 

@@ -35,7 +35,7 @@ def _show_version(wanted: bool) -> None:
         from importlib.metadata import PackageNotFoundError, version
 
         try:
-            typer.echo(f"voodoo {version('voodoo')}")
+            typer.echo(f"voodoo {version('voodoo-tracker')}")
         except PackageNotFoundError:
             typer.echo("voodoo (not installed)")
         raise typer.Exit

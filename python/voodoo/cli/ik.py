@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from voodoo.cli.common import clear_errors, numbers_of, refuse_both, states, topics_of
+from voodoo.cli.common import (
+    clear_errors,
+    numbers_of,
+    progressing,
+    refuse_both,
+    say_interrupted,
+    states,
+    topics_of,
+)
 from voodoo.cli.options import (
     BodyOption,
     FrameOption,
@@ -66,7 +75,8 @@ def ik_command(
     """Find postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
     The .csv has the columns of voodoo track, its NAME_rad led by the six of the root; the other formats are those of voodoo
-    track, too. Sites that are not among the known ones are compared with the reference, if it has them.
+    track, too. Sites that are not among the known ones are compared with the reference, if it has them. Ctrl-C writes the
+    frames up to there and ends with exit code 130.
 
     Examples
 
@@ -105,10 +115,13 @@ def ik_command(
             )
         known = None if sites is None else tuple(name.strip() for name in sites.split(","))
         how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
+        how["watched"] = partial(progressing, words=source.name, total=len(source))
         result, errors = follow(source, tracker, positions, **how)
         for file in written:
             export(result, file, body=tracker.body, root_frame=source.root_frame)
         for name, values in errors.items():
             if np.isfinite(values).any():
                 typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
-        typer.echo(f"{len(result)} frames, {states(result)}; wrote {' and '.join(map(str, written))}")
+        told = f"{len(result)} frames, {states(result)}; wrote {' and '.join(map(str, written))}"
+        say_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {told}")
+        typer.echo(told)

@@ -48,7 +48,9 @@ def track_command(
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
     ] = None,
-    view: Annotated[bool, typer.Option("--view", help="Show every step in Rerun (pip install voodoo[view]).")] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
+    ] = False,
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
     ] = None,

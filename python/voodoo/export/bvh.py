@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, skeleton
@@ -15,12 +16,16 @@ _Y_UP = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """(x, y, z) of BVH = (y, z, x) of the standing frame: X to the left, Y up, Z forward."""
 
 
+_MOVES_M = 1e-4
+
+
 def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.0) -> None:
     """Write a track as BVH.
 
     Axes are X left, Y up, Z forward at rest; with zero rotations the body stands at rest. Rotations are in the order
-    Z, X, Y in degrees. All joints are closed: where the solver left a gap (`Estimate.joint_gaps`), a limb is moved to
-    its parent. The format has one constant frame time, the median of the track's, and no gaps: a searching frame repeats
+    Z, X, Y in degrees. Joints are where the track has them: one whose place on its parent changes by more than 0.1 mm (lengths
+    are refined while tracking) has channels for its position, too, which stand for its OFFSET; that is the median then. End
+    sites are those of `body`. The format has one constant frame time, the median of the track's, and no gaps: a searching frame repeats
     the pose before it, those before the first pose show that one, and a track of nobody the body at rest.
 
     Args:
@@ -37,37 +42,53 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     parts = posed.bones
     lines = ["HIERARCHY"]
     order: list[int] = []
-    _describe(parts, 0, "", scale, lines, order)
+    offsets = posed.offsets()
+    # Of what is known of the offsets only found frames count; where there are none the body stands at rest.
+    known = offsets[track.found] if track.found.any() else offsets
+    still = np.median(known, axis=0)
+    moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
+    _describe(parts, 0, "", (scale, still, moving), lines, order)
     lines += ["MOTION", f"Frames: {len(track)}", f"Frame Time: {mean_interval(track.stamps):.9f}"]
     local = _Y_UP @ posed.local() @ _Y_UP.T
     angles = np.empty((len(track), len(parts), 3))
     for index in range(len(parts)):
         angles[:, index] = Rotation.from_matrix(local[:, index]).as_euler("ZXY", degrees=True)
-    roots = posed.heads[:, 0] @ _Y_UP.T * scale
-    for root, turns in zip(roots, angles[:, order], strict=True):
-        lines.append(" ".join(f"{value:.6f}" for value in (*root, *turns.ravel())))
+    offsets[:, 0] = posed.heads[:, 0]
+    moving[0] = True
+    places = offsets @ _Y_UP.T * scale
+    for shifts, turns in zip(places, angles, strict=True):
+        row = [value for bone in order for value in (*(shifts[bone] if moving[bone] else ()), *turns[bone])]
+        lines.append(" ".join(f"{value:.6f}" for value in row))
     Path(path).write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
 def _describe(
-    parts: tuple[Bone, ...], index: int, indent: str, scale: float, lines: list[str], order: list[int]
+    parts: tuple[Bone, ...],
+    index: int,
+    indent: str,
+    sizes: tuple[float, FloatArray, npt.NDArray[np.bool_]],
+    lines: list[str],
+    order: list[int],
 ) -> None:
-    """Append the joint of a bone and, depth first, those of its children; `order` is that of the channels."""
-    bone = parts[index]
+    """Append the joint of a bone and, depth first, those of its children; `order` is that of the channels.
+
+    `sizes`: BVH units per metre, offset (L, 3) of every joint, and which of them (L,) move.
+    """
+    bone, (scale, offsets, moving) = parts[index], sizes
     order.append(index)
     root = bone.parent is None
-    start = np.zeros(3) if root else bone.head - parts[bone.parent or 0].head
+    start = np.zeros(3) if root else offsets[index]
     turns = "Zrotation Xrotation Yrotation"
-    channels = f"6 Xposition Yposition Zposition {turns}" if root else f"3 {turns}"
+    channels = f"6 Xposition Yposition Zposition {turns}" if root or moving[index] else f"3 {turns}"
     lines += [
-        f"{indent}{'ROOT' if root else 'JOINT'} {bone.name}",
+        f"{indent}{'ROOT' if root else 'JOINT'} {_word(bone.name)}",
         f"{indent}{{",
         f"{indent}\tOFFSET {_numbers(start, scale)}",
         f"{indent}\tCHANNELS {channels}",
     ]
     children = [child for child, other in enumerate(parts) if other.parent == index]
     for child in children:
-        _describe(parts, child, indent + "\t", scale, lines, order)
+        _describe(parts, child, indent + "\t", sizes, lines, order)
     if not children:
         lines += [
             f"{indent}\tEnd Site",
@@ -76,6 +97,11 @@ def _describe(
             f"{indent}\t}}",
         ]
     lines.append(f"{indent}}}")
+
+
+def _word(name: str) -> str:
+    """A name in ASCII and without spaces, at which readers cut."""
+    return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in name).replace(" ", "_")
 
 
 def _numbers(vector: FloatArray, scale: float) -> str:

@@ -77,7 +77,8 @@ class Skeleton:
         bones: the body at rest.
         stamps: (F,) [s].
         rotations: (F, L, 3, 3) world_from_bone: the identity when the body stands at rest and looks along x.
-        heads: (F, L, 3) where each bone is joined to its parent, on the bone's side [m].
+        heads: (F, L, 3) where each bone is joined to its parent [m]: the track's own joint of that name, else the place on the
+            bone's side.
 
     Rotations and heads of searching frames are NaN.
     """
@@ -91,6 +92,15 @@ class Skeleton:
         """The skeleton of some frames: a mask (F,), or their numbers."""
         return Skeleton(self.bones, self.stamps[chosen], self.rotations[chosen], self.heads[chosen])
 
+    def offsets(self) -> FloatArray:
+        """(F, L, 3) where each bone is joined to its parent, in the parent bone's frame [m]; zero for the root."""
+        result: FloatArray = np.zeros_like(self.heads)
+        for index, bone in enumerate(self.bones):
+            if bone.parent is not None:
+                across = self.heads[:, index] - self.heads[:, bone.parent]
+                result[:, index] = np.einsum("fij,fi->fj", self.rotations[:, bone.parent], across)
+        return result
+
     def local(self) -> FloatArray:
         """(F, L, 3, 3) rotations relative to the parent; those of the root are relative to the world."""
         result: FloatArray = self.rotations.copy()
@@ -101,7 +111,7 @@ class Skeleton:
 
 
 def skeleton(track: Track, body: Body) -> Skeleton:
-    """The track on the bones of `body`.
+    """The track on the bones of `body`; its joints are those of the track, whatever sizes the body has had since.
 
     Raises:
         VoodooError: the track has no limb poses (it was read from a .csv), or is of another body.
@@ -114,6 +124,9 @@ def skeleton(track: Track, body: Body) -> Skeleton:
     rest = np.array([bone.rest for bone in parts])
     places = np.array([bone.head_in_limb for bone in parts])
     heads = np.einsum("flij,lj->fli", turn, places) + track.world_from_limb[:, :, :3, 3]
+    for index, bone in enumerate(parts):
+        if bone.parent is not None and bone.joint in track.joint_names:
+            heads[:, index] = track.joints[:, track.joint_names.index(bone.joint)]
     return Skeleton(parts, track.stamps, turn @ rest.transpose(0, 2, 1), heads)
 
 

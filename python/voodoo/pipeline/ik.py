@@ -3,7 +3,7 @@ pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -87,6 +87,7 @@ def follow(
     options: Options | None = None,
     warm: bool = True,
     rest: bool = True,
+    watched: Callable[[Iterable[RecordedFrame]], Iterable[RecordedFrame]] = iter,
 ) -> tuple[Track, dict[str, FloatArray]]:
     """Postures of all frames from the known sites and the silhouettes.
 
@@ -94,22 +95,23 @@ def follow(
         recording: read while solving.
         tracker: at the first pose, see voodoo.pipeline.run.start_tracker; gives body and start.
         positions: of the known sites.
-        sites: which ones are taken for known; those that `positions` lack are left out. None: head, trunk, hands and ankles;
-            wrists and skullbase where hands and head are lacking.
+        sites: which ones are taken for known. None: those of head, trunk, hands and ankles that `positions` has; wrists and
+            skullbase where hands and head are lacking.
         pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known sites and the
             last posture, or stands before the still scene; "color" by the difference from the still background; "none":
             plain inverse kinematics.
         options: see voodoo.ik.Options.
         warm: start each frame from the posture before; else solve it by itself, from the first pose.
+        watched: hands the frames on, and may show how far it is.
         rest: with `warm`: what neither sites nor silhouettes tell goes back to the mean of the postures so far, see ik.Follower.
 
     Returns:
         The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
         else "tracking"; residual is the root mean square of the targets'. And the error (F,) [m] of every other site
-        of `positions`, NaN where unknown.
+        of `positions`, NaN where unknown. Ctrl-C leaves the frames up to there, if any.
 
     Raises:
-        VoodooError: no known site at all, unknown words, damage in the recording.
+        VoodooError: an unknown site, or one without positions, no known site at all, unknown words, damage in the recording.
     """
     if pictures not in ("depth", "color", "none"):
         raise VoodooError(f'pictures: expected "depth", "color" or "none", found {pictures!r}')
@@ -117,6 +119,8 @@ def follow(
     there = [name for name in positions.names if name in chain.site_names]
     if sites is None:
         sites = [name if name in there else _STAND_INS.get(name, name) for name in KNOWN]
+    elif unknown := [name for name in sites if name not in there]:
+        raise VoodooError(f"sites: expected some of {', '.join(there)}, found {', '.join(unknown)}")
     known = [name for name in sites if name in there]
     if not known:
         raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
@@ -130,23 +134,25 @@ def follow(
     stamps, rows = [], []
     last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}
     level = recording.root_frame in LEVEL_FRAMES
-    for recorded in recording:
-        targets = positions.at(recorded.stamp, known)
-        images = (
-            _silhouettes(recorded, {**last, **targets} if warm else targets, scenes, level=level) if targets else []
-        )
-        posture = (
-            follower.step(targets, images=images)
-            if warm
-            else solve(chain, targets, images=images, start=start, options=options)
-        )
-        last = posture.joints
-        truth = positions.at(recorded.stamp, others)
-        rows.append(
-            [float(np.linalg.norm(posture.joints[n] - truth[n])) if n in truth else float("nan") for n in others]
-        )
-        postures.append(posture)
-        stamps.append(recorded.stamp)
+    try:
+        for recorded in watched(recording):
+            targets = positions.at(recorded.stamp, known)
+            seen = {**last, **targets} if warm else targets
+            images = _silhouettes(recorded, seen, scenes, level=level) if targets else []
+            if warm:
+                posture = follower.step(targets, images=images)
+            else:
+                posture = solve(chain, targets, images=images, start=start, options=options)
+            last = posture.joints
+            truth = positions.at(recorded.stamp, others)
+            off = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
+            rows.append([off.get(name, float("nan")) for name in others])
+            stamps.append(recorded.stamp)
+            postures.append(posture)
+    except KeyboardInterrupt:
+        if not postures:
+            raise
+        rows, stamps = rows[: len(postures)], stamps[: len(postures)]
     if not postures:
         raise VoodooError(f"{recording.name}: expected at least one frame, found none")
     table = np.array(rows, dtype=np.float64).reshape(len(postures), len(others))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -15,6 +17,8 @@ from voodoo.model.projection import CameraView, limb_outline
 from voodoo.sensors.adapters.drawing import Pictured
 from voodoo.visualization.body_geometry import limb_colours, nearest_limb
 
+_BODY_POINTS = 800
+"""Points of a depth image that are shown on the body: enough to see on which limbs they lie."""
 _BACKGROUND = (90, 90, 90)
 
 
@@ -76,12 +80,32 @@ class StepLog:
                 colours.append(limb_colours(self.body)[limb.name])
         self.send(f"{path}/picture/model", self.rr.LineStrips2D(outlines, radii=0.5, colors=colours))
 
-    def body_points(self, path: str, points: npt.NDArray[Any], pose: FloatArray) -> npt.NDArray[np.intp]:
+    def depth(self, path: str, image: npt.NDArray[Any], metres_per_unit: float) -> None:
+        """See Log."""
+        rr = self.rr
+        if image.dtype != np.uint16:
+            seen = np.isfinite(image) & (image > 0.0)
+            metres = np.where(seen, image, 0.0).astype(np.float64) * metres_per_unit
+            image, metres_per_unit = np.minimum(np.round(metres * 1000.0), 65535.0).astype(np.uint16), 0.001
+        done, blob = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 6])
+        if not done or not hasattr(rr, "EncodedDepthImage"):  # Rerun before 0.29
+            self.send(path, rr.DepthImage(image, meter=1.0 / metres_per_unit))
+            return
+        units = 1.0 / metres_per_unit
+        self.send(path, rr.EncodedDepthImage(blob.tobytes(), media_type="image/png", meter=units))
+
+    def body_points(
+        self, path: str, points: npt.NDArray[Any], pose: FloatArray, *, background: bool = True
+    ) -> npt.NDArray[np.intp]:
         """See Log."""
         world = np.asarray(points, dtype=np.float64) @ pose[:3, :3].T + pose[:3, 3]
         colours = np.array([*limb_colours(self.body).values(), _BACKGROUND], dtype=np.uint8)
         limbs = nearest_limb(world, self.estimate, self.body)
-        self.send(path, self.rr.Points3D(world, radii=0.006, colors=colours[limbs]))
+        shown = np.arange(len(limbs)) if background else np.flatnonzero(limbs < self.limbs)
+        if not background:
+            shown = shown[:: max(math.ceil(len(shown) / _BODY_POINTS), 1)]
+        positions = world[shown].astype(np.float32)
+        self.send(path, self.rr.Points3D(positions, radii=0.006, colors=colours[limbs[shown]]))
         return limbs
 
 

@@ -1,12 +1,13 @@
 """See what the tracker sees: measurements, limbs, rays, pictures and curves on one timeline, in Rerun.
 
-Rerun is an optional extra: `pip install voodoo[view]`.
+Rerun is an optional extra: `pip install 'voodoo-tracker[view]'`.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from datetime import timedelta
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any
@@ -24,6 +25,8 @@ from voodoo.visualization.rerun_log import StepLog, entity
 
 _MOST_POINTS = 40_000
 _EPOCH_S = 1e9
+_CHUNK_BYTES = 8_000_000
+_SEEN_M = 0.002
 
 
 class Viewer:
@@ -48,7 +51,8 @@ class Viewer:
         self._rr = _rerun()
         if save is not None and Path(save).suffix != ".rrd":
             raise VoodooError(f"{save}: expected a name that ends in .rrd, found {Path(save).suffix!r}")
-        self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None)
+        how = {} if save is None else _large_chunks(self._rr)
+        self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, **how)
         self._stream.send_recording_name(name)
         if save is None:
             self._open()
@@ -131,7 +135,7 @@ class Viewer:
             return
         for limb in body.limbs:
             path = f"world/body/limbs/{limb.name}"
-            if self._shapes.get(limb.name) != limb.shape:
+            if not _alike(self._shapes.get(limb.name), limb.shape):
                 self._shapes[limb.name] = limb.shape
                 vertices, triangles, normals = limb_mesh(limb.shape)
                 self._stream.log(
@@ -176,9 +180,26 @@ class Viewer:
         self._stream.log("plots/status", self._rr.TextLog(estimate.status))
 
 
+def _alike(one: TaperedEllipticCylinder | None, other: TaperedEllipticCylinder) -> bool:
+    """Whether nobody sees a difference: sizes are refined in every frame, and a mesh takes kilobytes."""
+    sizes = ("length", "a0", "b0", "a1", "b1")
+    return one is not None and all(abs(getattr(one, name) - getattr(other, name)) < _SEEN_M for name in sizes)
+
+
+def _large_chunks(rr: ModuleType) -> dict[str, Any]:
+    """How a file is written: every chunk costs about two kilobytes, and nobody waits for it."""
+    if not hasattr(rr, "ChunkBatcherConfig"):
+        return {}
+    config = rr.ChunkBatcherConfig.DEFAULT()
+    config.flush_tick, config.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
+    return {"batcher_config": config}
+
+
 def _rerun() -> ModuleType:
     try:
         import rerun
     except ImportError as error:
-        raise VoodooError("the viewer needs Rerun, which is not installed: pip install voodoo[view]") from error
+        raise VoodooError(
+            "the viewer needs Rerun, which is not installed: pip install 'voodoo-tracker[view]'"
+        ) from error
     return rerun

@@ -48,13 +48,15 @@ class DepthAdapter(Adapter[DepthImage]):
     def log(self, item: DepthImage, log: Log, memory: Memory) -> None:
         """The image, its points coloured by limb, and the person's silhouette."""
         rr, path = log.rr, log.camera(item)
-        log.send(f"{path}/picture", rr.DepthImage(item.image, meter=1.0 / item.metres_per_unit))
+        log.depth(f"{path}/picture", item.image, item.metres_per_unit)
         # Of a large image every n-th row and column.
         step = math.ceil(math.sqrt(item.image.size / log.most_points))
         z = item.image[::step, ::step].astype(np.float32) * np.float32(item.metres_per_unit)
         valid = np.isfinite(z) & (z > 0.0)
         points = np.column_stack([item.camera.rays()[::step, ::step][valid] * z[valid, None], z[valid]])
-        limbs = log.body_points(f"world/points/{log.entity(item.sensor)}", points, item.root_from_sensor)
+        # What is behind the person stands in the image, which is shown in space as well.
+        cloud = f"world/points/{log.entity(item.sensor)}"
+        limbs = log.body_points(cloud, points, item.root_from_sensor, background=False)
         log.outlines(path, item)
         silhouette = np.zeros(z.shape, dtype=np.uint8)
         silhouette[valid] = np.where(limbs == log.limbs, 0, limbs + 1)

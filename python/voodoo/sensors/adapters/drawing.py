@@ -64,5 +64,11 @@ class Log(Protocol):
     def outlines(self, path: str, item: Pictured) -> None:
         """Log the outlines of the limbs as the camera sees them, into the picture at a path."""
 
-    def body_points(self, path: str, points: npt.NDArray[Any], pose: FloatArray) -> npt.NDArray[np.intp]:
-        """Log points (N, 3) of a sensor at `pose` (4, 4), coloured by limb; the limb of each (N,), `limbs`: none."""
+    def depth(self, path: str, image: npt.NDArray[Any], metres_per_unit: float) -> None:
+        """Log a depth image (H, W), compressed: uint16 as it is, float32 to a millimetre."""
+
+    def body_points(
+        self, path: str, points: npt.NDArray[Any], pose: FloatArray, *, background: bool = True
+    ) -> npt.NDArray[np.intp]:
+        """Log points (N, 3) of a sensor at `pose` (4, 4), coloured by limb, those on none only with `background`; the limb of
+        each (N,), `limbs`: none."""

@@ -18,9 +18,10 @@ mod limb_history;
 
 use super::estimate::{Estimate, LimbStatus, Status};
 use crate::association::correspondence::SitePair;
-use crate::body::Model;
 use crate::body::two_bone::TwoBone;
+use crate::body::{Body, Model};
 use crate::fit::{Context, Matched};
+use crate::math::Pose;
 use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
@@ -42,6 +43,8 @@ const HALF: f64 = 0.5;
 const SOME: f64 = 0.25;
 /// A site this far from its measurement does not support its limb, metres.
 const SITE_REACH: f64 = 0.10;
+/// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
+const AT_JOINT: f64 = 0.03;
 
 /// Assesses every frame, and remembers what past ones said.
 #[derive(Debug, Default)]
@@ -187,10 +190,13 @@ impl Assessor {
             } else {
                 [SUPPORT * exclusive / FEW, 0.0, 0.0]
             };
-            let site =
-                |pair: &SitePair| pair.limb == limb && pair.weight > 0.0 && (pair.x - pair.p).length() < SITE_REACH;
+            let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < SITE_REACH;
+            let site = |pair: &SitePair| pair.limb == limb && near(pair);
+            // The hips tell where the pelvis is, the shoulders the clavicles: where no depth image looks, that is measured.
+            let unseen = seen.front_facing == 0.0;
+            let joined = |pair: &SitePair| unseen && near(pair) && limb_joined_at(body, poses, pair) == Some(limb);
             let mut support = self.supports[limb];
-            if matched.correspondences.sites.iter().any(site) {
+            if matched.correspondences.sites.iter().any(|pair| site(pair) || joined(pair)) {
                 now = [1.0, 0.0, 1.0];
                 support.known = false;
             }
@@ -200,6 +206,13 @@ impl Assessor {
             history.update(now.map(|value| value.min(1.0)));
         }
     }
+}
+
+/// The limb that a site at a joint tells of besides its own: the one that its own hangs on.
+fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize> {
+    let (parent, joint) = body.limbs()[pair.limb].parent.as_ref()?;
+    let centre = poses[pair.limb].transform_point(joint.limb_from_joint.translation);
+    ((pair.x - centre).length() < AT_JOINT).then_some(*parent)
 }
 
 /// Hands and feet show too few patches to tell on their own: they have the status of what they hang on.
@@ -231,7 +244,7 @@ mod tests {
     use super::*;
     use crate::association::correspondence::Correspondences;
     use crate::fit::Fit;
-    use crate::math::{Pose, Vec3};
+    use crate::math::Vec3;
     use crate::observation::candidates::Candidates;
     use crate::observation::frame::Frame;
     use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};
