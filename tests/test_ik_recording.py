@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import voodoo
 from voodoo import cli, ik
+from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.pipeline.ik import KNOWN, Positions, follow
 from voodoo.pipeline.start import start_tracker
@@ -84,7 +85,9 @@ def test_wrists_stand_in_for_hands_that_nobody_measured(some):
     _, errors = follow(some, start_tracker(some), positions, pictures="none")
     assert not {"l_wrist", "r_wrist", "skullbase"} & set(errors) and {"l_elbow", "r_elbow"} <= set(errors)
     # What is asked for is what is known.
-    _, errors = follow(some, start_tracker(some), positions, pictures="none", sites=KNOWN)
+    _, errors = follow(
+        some, start_tracker(some), positions, pictures="none", sites=[name for name in KNOWN if name in positions.names]
+    )
     assert {"l_wrist", "r_wrist", "skullbase"} <= set(errors)
 
 
@@ -218,3 +221,32 @@ def test_command_line_refuses_bad_input(tmp_path):
     init.write_text(json.dumps({"joints": {"l_shoulder": [0, 0]}}))
     refused(run(sample_path(), "--init", init), "l_shoulder")
     assert {path.name for path in tmp_path.iterdir()} == {"other.csv", "empty.csv", "init.json"}
+
+
+def test_sites_that_nobody_knows_are_refused_by_name(some):
+    how = {"positions": Positions.of(some), "pictures": "none"}
+    with pytest.raises(VoodooError, match=r"sites: expected some of .*l_wrist.*, found nose, l_wirst$"):
+        follow(some, start_tracker(some), sites=("l_wrist", "nose", "l_wirst"), **how)
+
+
+def test_ctrl_c_keeps_the_frames_up_to_there(tmp_path, monkeypatch):
+    steps = ik.Follower.step
+    count = iter(range(1000))
+
+    def interrupted(self, *args, **kwargs):
+        if next(count) == 5:
+            raise KeyboardInterrupt
+        return steps(self, *args, **kwargs)
+
+    monkeypatch.setattr(ik.Follower, "step", interrupted)
+    done = run(sample_path(), "--pictures", "none", "--out", tmp_path / "pose.csv")
+    assert done.exit_code == 130, done.output
+    assert "interrupted: the rest of 90 frames is missing: 5 frames" in done.stderr
+    assert len(Track.load(tmp_path / "pose.csv")) == 5
+
+
+def test_progress_is_shown_for_every_frame(some):
+    seen = []
+    watched = lambda frames: (seen.append(frame.stamp) or frame for frame in frames)  # noqa: E731
+    follow(some, start_tracker(some), Positions.of(some), pictures="none", watched=watched)
+    assert len(seen) == len(some)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import voodoo
+from scene import standing_joints
 from voodoo.evaluation import metrics
 from voodoo.ik import Chain
 from voodoo.synthetic.render import render_depth
@@ -123,3 +124,26 @@ def test_a_cupboard_of_a_persons_size_is_no_body(body, width):
     status = [str(estimate.status) for estimate in estimates(tracker, np.where(cupboard, 2.3, WALL_M), 40)]
     assert status[20:] == ["lost"] * 20
     assert set(tracker.estimate.limb_status.values()) == {"lost"}
+
+
+def test_keypoints_alone_track_a_person_who_is_seen():
+    """Hips tell of the pelvis, shoulders of the clavicles: no depth image is needed to call that tracked."""
+    body = voodoo.Body.human(1.75)
+    tracker = voodoo.Tracker(body)
+    standing = standing_joints(body)
+    sites = [f"{side}_{name}" for side in "lr" for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]
+    tracker.reset(joints={name: standing[name] for name in sites}, fit_sizes=False)
+    for number in range(5):
+        frame = voodoo.Frame(stamp=number / 30.0)
+        for name in sites:
+            frame.add_position(name, standing[name], weight=20.0)
+        estimate = tracker.step(frame)
+        assert estimate.status == "tracking"
+    assert {limb for limb, word in estimate.limb_status.items() if word != "measured"} <= {"thorax", "neck", "head"}
+    # A leg that nobody sees is not measured, whatever its hip tells of the pelvis.
+    for later in range(4):
+        frame = voodoo.Frame(stamp=1.0 + later / 30.0)
+        for name in ("l_shoulder", "r_shoulder", "l_hip", "r_hip"):
+            frame.add_position(name, standing[name], weight=20.0)
+        estimate = tracker.step(frame)
+    assert estimate.limb_status["r_calf"] != "measured" and estimate.status != "tracking"

@@ -230,7 +230,9 @@ fn refuses_what_it_cannot_use_and_keeps_the_last_image() {
     for (poses, view, word) in [
         (&poses[1..], view, "one rigid pose a limb"),
         (&lame[..], view, "one rigid pose a limb"),
-        (&poses[..], Viewpoint { width: 0, ..view }, "at least one pixel"),
+        (&poses[..], Viewpoint { width: 0, ..view }, "1 to 33554432 pixels"),
+        (&poses[..], Viewpoint { width: 100_000, height: 100_000, ..view }, "1 to 33554432 pixels"),
+        (&poses[..], Viewpoint { width: usize::MAX, ..view }, "1 to 33554432 pixels"),
         (&poses[..], Viewpoint { intrinsics: [0.0, 1.0, 1.0, 1.0], ..view }, "positive focal lengths"),
         (&poses[..], Viewpoint { intrinsics: [1.0, 1.0, f64::NAN, 1.0], ..view }, "finite centre"),
         (&poses[..], Viewpoint { rays: Some(&rays), ..view }, "one ray a pixel"),

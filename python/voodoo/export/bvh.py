@@ -23,10 +23,11 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     """Write a track as BVH.
 
     Axes are X left, Y up, Z forward at rest; with zero rotations the body stands at rest. Rotations are in the order
-    Z, X, Y in degrees. Joints are where the track has them: one whose place on its parent changes by more than 0.1 mm (lengths
-    are refined while tracking) has channels for its position, too, which stand for its OFFSET; that is the median then. End
-    sites are those of `body`. The format has one constant frame time, the median of the track's, and no gaps: a searching frame repeats
-    the pose before it, those before the first pose show that one, and a track of nobody the body at rest.
+    Z, X, Y in degrees. Joints are where the track has them: one whose place on its parent changes by more than 0.1 mm
+    (lengths are refined while tracking) has channels for its position, too, which stand for its OFFSET; that is the
+    median then. End sites are those of `body`. The format has one constant frame time, the median of the track's, and no
+    gaps: a searching frame repeats the pose before it, those before the first pose show that one, and a track of nobody
+    the body at rest.
 
     Args:
         path: .bvh file.

@@ -12,8 +12,9 @@ import voodoo._core as _core
 from voodoo.errors import BodyError, MeasurementError
 from voodoo.ik.image import Silhouette, seen_views
 from voodoo.ik.options import Options
-from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, vector
+from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, numbers, vector
 from voodoo.model.body import Body
+from voodoo.model.joint import short
 
 
 class Chain:
@@ -36,10 +37,10 @@ class Chain:
             raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
         listed = not isinstance(limbs, str) and isinstance(limbs, Iterable)
         if not listed or not all(isinstance(name, str) for name in limbs):
-            raise MeasurementError(f"limbs: expected a list of names, found {limbs!r}")
-        root = root if root is not None else ("fixed" if limbs else "free")
-        if root not in ("free", "fixed"):
-            raise MeasurementError(f'root: expected "free" or "fixed", found {root!r}')
+            raise MeasurementError(f"limbs: expected a list of names, found {short(limbs)}")
+        root = root if root is not None else ("fixed" if len(limbs) else "free")
+        if not isinstance(root, str) or root not in ("free", "fixed"):
+            raise MeasurementError(f'root: expected "free" or "fixed", found {short(root)}')
         self.body = body
         self._core = _core.Chain(body.core, list(limbs), root == "free")
         self.angle_names: tuple[str, ...] = tuple(self._core.angle_names)
@@ -94,10 +95,14 @@ class Chain:
         Raises:
             MeasurementError: a limb is missing, or a matrix is not rigid.
         """
+        if not isinstance(world_from_limb, Mapping):
+            raise MeasurementError(
+                f"world_from_limb: expected limb name -> pose (4, 4), found {short(world_from_limb)}"
+            )
         missing = [name for name in self.body.limb_names if name not in world_from_limb]
         if missing:
             raise MeasurementError(f"world_from_limb: expected every limb of the body, found no {', '.join(missing)}")
-        poses = [np.asarray(world_from_limb[name], dtype=np.float64) for name in self.body.limb_names]
+        poses = [numbers(f"world_from_limb[{name}]", world_from_limb[name]) for name in self.body.limb_names]
         return np.array(self._core.project(base_pose(world_from_base), poses, closest), dtype=np.float64)
 
     def criterion(

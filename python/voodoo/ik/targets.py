@@ -11,6 +11,7 @@ import numpy as np
 
 from voodoo.errors import MeasurementError
 from voodoo.ik.values import Vector, three
+from voodoo.model.joint import short
 
 Parts: TypeAlias = tuple[str, str, tuple[float, float, float, float, float, float], float, int]
 """Site, kind, values, weight and priority of a target."""
@@ -91,14 +92,16 @@ def target_parts(targets: Targets) -> list[Parts]:
     """
     if not isinstance(targets, Mapping):
         if not isinstance(targets, Sequence) or not all(isinstance(target, Target) for target in targets):
-            raise MeasurementError(f"targets: expected site -> position (3,), or a list of Target, found {targets!r}")
+            raise MeasurementError(
+                f"targets: expected site -> position (3,), or a list of Target, found {short(targets)}"
+            )
         return [target.parts() for target in targets]
     parts: list[Parts] = []
     for site, position in targets.items():
         if not isinstance(site, str):
-            raise MeasurementError(f"targets: expected names of sites, found {site!r}")
+            raise MeasurementError(f"targets: expected names of sites, found {short(site)}")
         x, y, z = three(f"target {site}: position", position)
         if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-            raise MeasurementError(f"target {site}: expected finite metres, found {position!r}")
+            raise MeasurementError(f"target {site}: expected finite metres, found {short(position)}")
         parts.append((site, "position", (x, y, z, 0.0, 0.0, 0.0), 1.0, 0))
     return parts

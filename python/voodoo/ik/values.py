@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.model.joint import as_numbers, short
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Vector: TypeAlias = Sequence[float] | FloatArray
@@ -29,14 +30,14 @@ def listed_bones(bones: Sequence[Bone] | None) -> list[Bone] | None:
     if bones is None:
         return None
     if isinstance(bones, str) or not isinstance(bones, Iterable):
-        raise MeasurementError(f"bones: expected a list of (site, site, radius), found {bones!r}")
+        raise MeasurementError(f"bones: expected a list of (site, site, radius), found {short(bones)}")
     found: list[Bone] = []
     for bone in bones:
         try:
             first, second, radius = bone
             found.append((str(first), str(second), float(radius)))
         except (TypeError, ValueError, OverflowError):
-            raise MeasurementError(f"bones: expected (site, site, radius), found {bone!r}") from None
+            raise MeasurementError(f"bones: expected (site, site, radius), found {short(bone)}") from None
         if not 0.0 <= found[-1][2] < math.inf:
             raise MeasurementError(f"bones: expected a radius of at least 0 m, found {radius!r}")
     return found
@@ -56,7 +57,7 @@ def listed_poses(poses: Mapping[str, npt.ArrayLike] | None) -> list[tuple[str, F
     if poses is None:
         return []
     if not isinstance(poses, Mapping):
-        raise MeasurementError(f"others: expected limb name -> pose (4, 4), found {poses!r}")
+        raise MeasurementError(f"others: expected limb name -> pose (4, 4), found {short(poses)}")
     return [(name, numbers("others", pose)) for name, pose in poses.items()]
 
 
@@ -85,9 +86,9 @@ def numbers(what: str, values: npt.ArrayLike) -> FloatArray:
         MeasurementError: not numbers; it names `what`.
     """
     try:
-        return np.asarray(values, dtype=np.float64)
+        return as_numbers(values)
     except (TypeError, ValueError, OverflowError):
-        raise MeasurementError(f"{what}: expected numbers, found {values!r}") from None
+        raise MeasurementError(f"{what}: expected numbers, found {short(values)}") from None
 
 
 def three(what: str, values: Vector) -> tuple[float, float, float]:
@@ -97,7 +98,7 @@ def three(what: str, values: Vector) -> tuple[float, float, float]:
         MeasurementError: it names `what`.
     """
     try:
-        x, y, z = np.asarray(values, dtype=np.float64).reshape(-1).tolist()
+        x, y, z = as_numbers(values).reshape(-1).tolist()
     except (TypeError, ValueError, OverflowError):
-        raise MeasurementError(f"{what}: expected three numbers, found {values!r}") from None
+        raise MeasurementError(f"{what}: expected three numbers, found {short(values)}") from None
     return x, y, z

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, MeasurementError
 from voodoo.model.body_toml import body_text, core_body
-from voodoo.model.joint import Joint, Place, number_of, short
+from voodoo.model.joint import Joint, Place, as_numbers, number_of, short
 from voodoo.model.toml_io import read_text
 from voodoo.names import HumanModel
 
@@ -73,11 +74,13 @@ class Body:
             BodyError: the stature is out of range, or the model unknown.
         """
         height = number_of("height", height, "a stature in metres")
+        if not isinstance(model, str):
+            raise BodyError(f"model: expected one of {', '.join(get_args(HumanModel))}, found {short(model)}")
         if model == "measured":
             # Heights are checked where the other models are made.
             _core.Body.human(height, "full")
             return cls.load(_MEASURED).scaled(height / _MEASURED_M)
-        return cls(_core.Body.human(height, str(model)))
+        return cls(_core.Body.human(height, model))
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = "body") -> Body:
@@ -137,11 +140,11 @@ def checked_joints(
     checked = {}
     for name, position in joints.items():
         try:
-            x, y, z = (float(value) for value in np.asarray(position, dtype=np.float64).reshape(-1))
+            x, y, z = (float(value) for value in as_numbers(position).reshape(-1))
         except (TypeError, ValueError, OverflowError):
-            raise BodyError(f"{what}[{name}]: expected three numbers in metres, found {position!r}") from None
+            raise BodyError(f"{what}[{name}]: expected three numbers in metres, found {short(position)}") from None
         if not all(map(math.isfinite, (x, y, z))):
-            raise BodyError(f"{what}[{name}]: expected finite metres, found {position!r}")
+            raise BodyError(f"{what}[{name}]: expected finite metres, found {short(position)}")
         checked[name] = (x, y, z)
     return checked
 
@@ -165,7 +168,7 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
     poses = []
     for name in names:
         try:
-            poses.append(np.asarray(world_from_limb[name], dtype=np.float64))
+            poses.append(as_numbers(world_from_limb[name]))
         except (TypeError, ValueError, OverflowError):
             found = short(world_from_limb[name])
             raise MeasurementError(f"world_from_limb[{name}]: expected a rigid 4x4 transform, found {found}") from None

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import CameraError
-from voodoo.model.joint import short
+from voodoo.model.joint import as_numbers, short
 
 CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant", "inverse_plumb_bob"]
 """Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
@@ -158,7 +158,10 @@ class Camera:
         Raises:
             CameraError: the shape is not (N, 3).
         """
-        points = np.asarray(points_cam, dtype=np.float64)
+        try:
+            points = as_numbers(points_cam)
+        except (TypeError, ValueError, OverflowError):
+            raise CameraError(f"points: expected shape (N, 3), found {short(points_cam)}") from None
         if points.ndim != 2 or points.shape[1] != 3:
             raise CameraError(f"points: expected shape (N, 3), found {points.shape}")
         if np.isfinite(points).all() and (points[:, 2] > 0.0).all():
@@ -257,7 +260,7 @@ def _number(name: str, value: object) -> float:
 def _numbers(name: str, values: Any, *, count: int | None = None) -> tuple[float, ...]:  # noqa: ANN401 - checked here
     """The numbers of an iterable, or of an array of any shape row by row."""
     try:
-        rows = np.asarray(values if hasattr(values, "__len__") else list(values), dtype=np.float64)
+        rows = as_numbers(values if hasattr(values, "__len__") else list(values))
     except (TypeError, ValueError, OverflowError):
         raise CameraError(f"{name}: expected numbers, found {short(values)}") from None
     if count is not None and rows.size != count:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from voodoo.errors import BodyError
@@ -113,7 +115,22 @@ def number_of(name: str, value: object, expected: str = "a number") -> float:
         raise BodyError(f"{name}: expected {expected}, found {short(value)}") from None
 
 
+def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """An array of real numbers.
+
+    Raises:
+        TypeError, ValueError, OverflowError: they are none; NumPy would take dates and cut complex numbers.
+    """
+    found = np.asarray(values)
+    if found.dtype.kind not in "biufO":
+        raise TypeError(f"{found.dtype} is no real number")
+    return found.astype(np.float64, copy=False)
+
+
 def short(value: object) -> str:
     """A value as it is shown in a message."""
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception:  # what nests too deeply, or is no good object
+        text = f"a {type(value).__name__} that cannot be shown"
     return text if len(text) < 80 else text[:77] + "..."

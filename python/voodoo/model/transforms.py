@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.model.joint import as_numbers
 
 _OFF = 1e-4
 """How far the products of a rotation's rows may be from those of unit vectors at right angles, as in the core."""
@@ -18,7 +19,7 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
         MeasurementError: numbers of another shape, not finite, or no rotation and shift; it names `name`.
     """
     try:
-        pose = np.asarray(value, dtype=np.float64)
+        pose = as_numbers(value)
     except (TypeError, ValueError, OverflowError):
         pose = np.empty(0)
     if pose.shape != (4, 4) or not np.isfinite(pose).all() or not _turns_and_shifts(pose.tolist()):

@@ -15,6 +15,7 @@ from voodoo.errors import VoodooError
 from voodoo.export.skeleton import bones
 from voodoo.export.track import SUFFIXES, Track
 from voodoo.model.body import Body
+from voodoo.model.joint import short
 from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
 from voodoo.pipeline.front_end import FrontEnd
@@ -177,7 +178,7 @@ def start_tracker(
     for marker, site in () if markers is None else markers.sites.items():
         if site not in body.site_names:
             raise VoodooError(
-                f"marker {marker}: expected one of the sites {', '.join(body.site_names)}, found {site!r}"
+                f"marker {marker}: expected one of the sites {', '.join(body.site_names)}, found {short(site)}"
             )
     tracker = Tracker(body, config=config if config is not None else Config())
     if init == AUTO:
@@ -294,5 +295,5 @@ def _first_problem(error: ValidationError) -> str:
     """The first complaint of pydantic as "key: what was expected, found what"."""
     problem = error.errors(include_url=False)[0]
     key = ".".join(str(part) for part in problem["loc"])
-    found = "" if problem["type"] in ("missing", "json_invalid") else f", found {problem['input']!r:.80}"
+    found = "" if problem["type"] in ("missing", "json_invalid") else f", found {short(problem['input'])}"
     return f"{key}: {problem['msg']}{found}" if key else f"{problem['msg']}{found}"

@@ -11,6 +11,7 @@ import numpy as np
 from voodoo.errors import CameraError, RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
+from voodoo.model.joint import short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.pictures import picture_size
 from voodoo.recordings.stored import check_stored, read_stored
@@ -81,17 +82,17 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
     depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))
     factor = content.get("depth_factor", 5000.0)
     if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0.0 < factor < 1e9:
-        raise RecordingError(f"{path}: depth_factor: expected units per metre > 0, found {factor!r}")
+        raise RecordingError(f"{path}: depth_factor: expected units per metre > 0, found {short(factor)}")
     color = None
     if "color" in content:
         table = content["color"]
         if not isinstance(table, dict):
-            raise RecordingError(f"{path}: color: expected a table, found {table!r}")
+            raise RecordingError(f"{path}: color: expected a table, found {short(table)}")
         _check_keys(table, {*_CAMERA_KEYS, *_OPTIONAL_KEYS}, f"{path}, [color]")
         color = _camera(table, "color", f"{path}, [color]")
     root_frame = content.get("root_frame", depth.sensor_frame)
     if not isinstance(root_frame, str):
-        raise RecordingError(f"{path}: root_frame: expected a name, found {root_frame!r}")
+        raise RecordingError(f"{path}: root_frame: expected a name, found {short(root_frame)}")
     return FolderCalibration(root_frame, float(factor), depth, color)
 
 
@@ -108,7 +109,7 @@ def _check_keys(table: dict[str, Any], known: set[str], where: str) -> None:
 def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
     distortion = table.get("distortion", [])
     if not isinstance(distortion, list):
-        raise RecordingError(f"{where}: distortion: expected a list of numbers, found {distortion!r}")
+        raise RecordingError(f"{where}: distortion: expected a list of numbers, found {short(distortion)}")
     try:
         camera = Camera(
             **{key: table[key] for key in _CAMERA_KEYS},
@@ -119,7 +120,7 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
         raise RecordingError(f"{where}: {error}") from error
     frame = table.get("sensor_frame", f"camera_{kind}_optical_frame")
     if not isinstance(frame, str):
-        raise RecordingError(f"{where}: sensor_frame: expected a name, found {frame!r}")
+        raise RecordingError(f"{where}: sensor_frame: expected a name, found {short(frame)}")
     return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where))
 
 
@@ -138,7 +139,9 @@ def _pose(rows: object, where: str) -> FloatArray:
         and np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0))
     )
     if not rigid:
-        raise RecordingError(f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {rows!r}")
+        raise RecordingError(
+            f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {short(rows)}"
+        )
     # Typed with three or four digits it is near a rotation, not one; the tracker wants one.
     if not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), rtol=0.0, atol=_ROUNDING):
         u, _, v = np.linalg.svd(pose[:3, :3])

@@ -12,6 +12,7 @@ import numpy as np
 from voodoo.errors import CameraError, RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
+from voodoo.model.joint import short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.stored import check_stored
 
@@ -85,5 +86,5 @@ def _numbers(where: str, table: dict[str, Any], key: str, shape: tuple[int, ...]
         values = np.array([np.nan])
     if not np.isfinite(values).all() or (shape is not None and values.shape != shape) or values.ndim == 0:
         expected = "a list of" if shape is None else "x".join(map(str, shape))
-        raise RecordingError(f"{where}, {key}: expected {expected} finite numbers, found {table[key]!r:.80}")
+        raise RecordingError(f"{where}, {key}: expected {expected} finite numbers, found {short(table[key])}")
     return values

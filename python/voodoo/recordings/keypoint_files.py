@@ -9,6 +9,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
+from voodoo.model.joint import short
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.stored import read_stored_text
 
@@ -25,7 +26,7 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
         content = json.loads(read_stored_text(path, "an OpenPose JSON file"))
     people = content.get("people") if isinstance(content, dict) else None
     if not isinstance(people, list):
-        raise RecordingError(f"{path}: expected an object with a list of people, found {content!r:.80}")
+        raise RecordingError(f"{path}: expected an object with a list of people, found {short(content)}")
     found = []
     for index, person in enumerate(people):
         flat = person.get("pose_keypoints_2d") if isinstance(person, dict) else None
@@ -37,7 +38,8 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
             raise RecordingError(
                 f"{path}, person {index}: expected {count} keypoints for {layout}, found {len(flat) / 3:g}"
             )
-        rows = np.array(flat, dtype=np.float64).reshape(count, 3)
+        with reading(f"{path}, person {index}", "numbers pose_keypoints_2d"):
+            rows = np.array(flat, dtype=np.float64).reshape(count, 3)
         if not np.isfinite(rows).all():
             raise RecordingError(f"{path}, person {index}: expected finite keypoints, found others")
         found.append(rows)

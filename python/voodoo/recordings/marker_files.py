@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
+from voodoo.model.joint import short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_markers
 from voodoo.recordings.pose2sim import SITES
@@ -65,7 +66,7 @@ class MarkerMap(BaseModel):
         except ValidationError as error:
             problem = error.errors(include_url=False)[0]
             key = ".".join(str(part) for part in problem["loc"])
-            raise RecordingError(f"{path}: {key}: {problem['msg']}, found {problem['input']!r:.80}") from error
+            raise RecordingError(f"{path}: {key}: {problem['msg']}, found {short(problem['input'])}") from error
 
     def worn(self) -> dict[str, tuple[str, tuple[float, float, float]]]:
         """The markers on limbs as voodoo.sensors.markers.body_with_markers takes them."""

@@ -170,11 +170,10 @@ def _trajectories(
     rate: float,
     world_from_file: npt.ArrayLike | None,
 ) -> MarkerTrajectories:
-    missing = ~np.isfinite(positions).all(axis=2)
+    positions[~np.isfinite(positions).all(axis=2)] = np.nan
     if world_from_file is not None:
         turn = np.asarray(world_from_file, dtype=np.float64)
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
             raise RecordingError(f"{path}: world_from_file: expected a (3, 3) rotation, found {turn.tolist()}")
         positions = positions @ turn.T
-    positions[missing] = np.nan
     return MarkerTrajectories(stamps, names, positions, rate)

@@ -13,6 +13,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
+from voodoo.model.joint import short
 
 
 class _Joints(TypedDict):
@@ -153,7 +154,7 @@ class Recording(ABC):
             RecordingError: it does not know the frame.
         """
         if frame != self.root_frame:
-            raise RecordingError(f"{self.path}: expected the frame {self.root_frame!r}, found {frame!r}")
+            raise RecordingError(f"{self.path}: expected the frame {self.root_frame!r}, found {short(frame)}")
         return np.eye(4)
 
     def __repr__(self) -> str:
@@ -194,7 +195,7 @@ def number_option(path: Path, name: str, value: object, expected: str, *, most: 
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (0.0 < number <= most or (zero and number == 0.0)):
-        raise RecordingError(f"{path}: {name}: expected {expected}, found {value!r}")
+        raise RecordingError(f"{path}: {name}: expected {expected}, found {short(value)}")
     return number
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
+from voodoo.model.joint import short
 from voodoo.recordings.recording import Reference, Start
 from voodoo.recordings.stored import read_stored_text
 
@@ -77,22 +78,22 @@ def read_start(path: Path, root_from: RootFromStart) -> Start:
     with reading(path, "a JSON file"):
         content = json.loads(read_stored_text(path, "a JSON file"))
     if not isinstance(content, dict) or not isinstance(content.get("joints"), dict) or not content["joints"]:
-        raise RecordingError(f"{path}: expected an object with the joints of the first frame, found {content!r:.80}")
+        raise RecordingError(f"{path}: expected an object with the joints of the first frame, found {short(content)}")
     frame = content.get("frame")
     if frame is not None and not isinstance(frame, str):
-        raise RecordingError(f"{path}: frame: expected a name, found {frame!r:.80}")
+        raise RecordingError(f"{path}: frame: expected a name, found {short(frame)}")
     root_from_base = root_from(frame)
     joints = {}
     for name, value in content["joints"].items():
         numbers = isinstance(value, list) and len(value) == 3 and all(isinstance(v, (int, float)) for v in value)
         if not numbers or not all(math.isfinite(v) for v in value):
-            raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in metres, found {value!r}")
+            raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in metres, found {short(value)}")
         x, y, z = (float(v) for v in root_from_base[:3, :3] @ np.array(value) + root_from_base[:3, 3])
         joints[str(name)] = (x, y, z)
     start = Start(joints=joints)
     height = content.get("height_m")
     if height is not None:
         if not isinstance(height, (int, float)) or not 0.3 < height < 3.0:
-            raise RecordingError(f"{path}: height_m: expected a stature in metres, found {height!r}")
+            raise RecordingError(f"{path}: height_m: expected a stature in metres, found {short(height)}")
         start["height_m"] = float(height)
     return start

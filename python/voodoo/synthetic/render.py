@@ -11,6 +11,7 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.model.body import Body, ordered_poses
 from voodoo.model.camera import Camera
+from voodoo.model.transforms import rigid
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,6 +61,6 @@ def render_depth(
         height=camera.height,
         intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
         rays=camera.rays() if camera.distorted else None,
-        world_from_sensor=None if world_from_sensor is None else np.asarray(world_from_sensor, dtype=np.float64),
+        world_from_sensor=None if world_from_sensor is None else rigid(world_from_sensor),
     )
     return RenderedDepth(depth, limb, body.limb_names)

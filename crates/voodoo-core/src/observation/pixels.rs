@@ -20,6 +20,9 @@ impl PointGate {
     }
 }
 
+/// Rows or columns from one that is used to the next at most: no image has more.
+const MOST_APART: f64 = 65536.0;
+
 /// Which pixels of an image are used: every so manyth row, and in it every so manyth column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grid {
@@ -30,8 +33,9 @@ pub(super) struct Grid {
 impl Grid {
     /// About one pixel in `share`, as evenly as whole numbers allow.
     pub fn new(share: f64) -> Self {
-        let rows = share.sqrt().floor().max(1.0);
-        let columns = (share / rows).round().max(1.0);
+        let within = |apart: f64| if apart >= 1.0 { apart.min(MOST_APART) } else { 1.0 };
+        let rows = within(share.sqrt().floor());
+        let columns = within((share / rows).round());
         Self { rows: rows as usize, columns: columns as usize }
     }
 
