@@ -320,7 +320,19 @@ def test_ctrl_c_ends_an_evaluation_at_once_and_keeps_what_is_done(tmp_path):
     (tmp_path / "all").mkdir()
     for number in range(300):
         (tmp_path / "all" / f"r{number:03d}").symlink_to(sample_path())
-    command = [sys.executable, "-m", "voodoo", "eval", "all", "--use", "depth", "--jobs", "2", "--out", "report"]
+    command = [
+        sys.executable,
+        "-c",
+        "from voodoo.cli import main; main()",
+        "eval",
+        "all",
+        "--use",
+        "depth",
+        "--jobs",
+        "2",
+        "--out",
+        "report",
+    ]
     pipe = subprocess.PIPE
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True, start_new_session=True, env={**os.environ}

@@ -1,4 +1,5 @@
 import csv
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -6,8 +7,10 @@ import pytest
 
 import voodoo
 from core_fakes import T_POSE, pose, searching
+from scene import standing_joints
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
+from voodoo.pipeline.start import Init
 
 
 def estimates(frames=5):
@@ -151,3 +154,63 @@ def test_nobody_has_the_names_of_the_body(tmp_path):
     read = Track.load(tmp_path / "pose.csv")
     assert read.joint_names == body.site_names and "l_knee_flexion" in read.angle_names
     assert np.isnan(read.joints).all() and read.joints.shape == (2, 21, 3)
+
+
+@pytest.fixture
+def supported():
+    body = voodoo.Body.human(1.7, model="papers")
+    tracker = voodoo.Tracker(body)
+    standing = standing_joints(body)
+    tracker.reset(joints=standing)
+    found = [searching(0.0)]
+    for number in range(1, 4):
+        frame = voodoo.Frame(stamp=number / 30)
+        frame.add_position("l_wrist", standing["l_wrist"], weight=20.0)
+        found.append(tracker.step(frame))
+    return Track.of(found, body=body, left_out={"that are blank": 3, "without a stamp": 1})
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_the_status_of_every_limb_is_kept(tmp_path, supported, suffix):
+    assert supported.limb_status["l_forearm"][0] == ""
+    assert "measured" in {word for words in supported.limb_status.values() for word in words}
+    supported.save(tmp_path / f"pose{suffix}")
+    again = Track.load(tmp_path / f"pose{suffix}")
+    assert again.limb_status == supported.limb_status
+    assert again.left_out == ({} if suffix == ".csv" else supported.left_out)
+    assert supported.of_frames(supported.found).limb_status["l_forearm"] == supported.limb_status["l_forearm"][1:]
+
+
+def test_limb_columns_stand_behind_the_angles(tmp_path, supported):
+    supported.save(tmp_path / "pose.csv")
+    header = (tmp_path / "pose.csv").read_text().splitlines()[0].split(",")
+    last = max(index for index, name in enumerate(header) if name.endswith("_rad"))
+    assert header[last + 1 :] == [f"{limb}_status" for limb in supported.limb_names]
+
+
+def test_readers_pass_over_columns_and_arrays_of_later_versions(tmp_path, supported):
+    supported.save(tmp_path / "pose.csv")
+    lines = (tmp_path / "pose.csv").read_text().splitlines()
+    more = [lines[0] + ",l_wrist_sx,l_wrist_sy,l_wrist_sz,mood"] + [line + ",0.01,0.02,,fine" for line in lines[1:]]
+    (tmp_path / "later.csv").write_text("\n".join(more) + "\n")
+    later, now = Track.load(tmp_path / "later.csv"), Track.load(tmp_path / "pose.csv")
+    assert np.array_equal(later.joints, now.joints, equal_nan=True) and later.limb_status == now.limb_status
+    assert np.array_equal(later.angles, now.angles, equal_nan=True) and later.angle_names == now.angle_names
+    supported.save(tmp_path / "pose.npz")
+    content = dict(np.load(tmp_path / "pose.npz"))
+    assert content["format_version"] == 2
+    np.savez(tmp_path / "more.npz", **content, mood=np.ones(3))
+    assert len(Track.load(tmp_path / "more.npz")) == 4
+    np.savez(tmp_path / "late.npz", **{**content, "format_version": np.array(99)})
+    with pytest.raises(VoodooError, match="format_version: expected 2 at most, found 99"):
+        Track.load(tmp_path / "late.npz")
+    old = {name: content[name] for name in content if not name.startswith(("format", "limb_status", "left_out"))}
+    np.savez(tmp_path / "old.npz", **old)
+    assert Track.load(tmp_path / "old.npz").limb_status == {}
+
+
+def test_a_first_pose_carries_a_format_version():
+    init = Init.model_validate({"joints": {"l_hip": (0.0, 0.0, 1.0)}})
+    assert json.loads(init.to_json())["format_version"] == 1
+    with pytest.raises(ValueError, match="less than or equal to 1"):
+        Init.model_validate({"format_version": 2, "joints": {"l_hip": (0.0, 0.0, 1.0)}})

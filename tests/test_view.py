@@ -55,6 +55,19 @@ def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
         assert entity in shown, entity
 
 
+def test_a_file_takes_less_than_a_hundred_kilobytes_a_frame(tmp_path):
+    """Depth and pictures are compressed, meshes are sent where they changed, and chunks are large."""
+    pytest.importorskip("rerun", reason="Rerun is not installed")
+    recording = open_recording(sample_path())
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"], fit_sizes=True)
+    front_end = FrontEnd(tracker)
+    with Viewer(save=tmp_path / "track.rrd") as viewer:
+        for recorded, _ in zip(paired(recording), range(30), strict=False):
+            viewer.log(front_end.step(recorded), tracker.body, recorded=recorded, front_end=front_end)
+    assert (tmp_path / "track.rrd").stat().st_size < 30 * 100_000
+
+
 def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):
     pytest.importorskip("rerun", reason="Rerun is not installed")
     tracker, front_end, frames = steps

@@ -16,7 +16,7 @@ use crate::shape::TaperedEllipticCylinder;
 /// Mark of a pixel that shows no limb.
 pub const NO_LIMB: u16 = u16::MAX;
 /// Most pixels of a predicted image: those of an 8K picture. More would be a mistyped size, and memory by the gigabyte.
-pub const MOST_PIXELS: usize = 1 << 25;
+pub const MOST_RENDERED: usize = 1 << 25;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
 const ROWS_TOGETHER: usize = 16;
 /// Limbs nearer to the camera plane than this have no usable bounds in the image, metres; every ray is tried.
@@ -57,7 +57,7 @@ impl Viewpoint<'_> {
         if !(fx > 0.0 && fy > 0.0 && [fx, fy, cx, cy].iter().all(|value| value.is_finite())) {
             return wrong("camera", "positive focal lengths and a finite centre", format!("{:?}", self.intrinsics));
         }
-        let count = self.width.checked_mul(self.height).filter(|count| (1..=MOST_PIXELS).contains(count));
+        let count = self.width.checked_mul(self.height).filter(|count| (1..=MOST_RENDERED).contains(count));
         let Some(count) = count else {
             return wrong("camera", "1 to 33554432 pixels", format!("{}x{}", self.width, self.height));
         };
