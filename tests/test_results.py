@@ -165,7 +165,8 @@ def supported():
     found = [searching(0.0)]
     for number in range(1, 4):
         frame = voodoo.Frame(stamp=number / 30)
-        frame.add_position("l_wrist", standing["l_wrist"], weight=20.0)
+        for name, place in standing.items():
+            frame.add_position(name, place, weight=20.0)
         found.append(tracker.step(frame))
     return Track.of(found, body=body, left_out={"that are blank": 3, "without a stamp": 1})
 
