@@ -92,6 +92,7 @@ impl Tracker {
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
         if self.is_started() {
+            self.verify_start(frame);
             self.follow(frame)
         } else {
             self.search(frame)
@@ -99,12 +100,43 @@ impl Tracker {
         Ok(&self.estimate)
     }
 
+    /// In the first frame after a reset: where a detector sees the person elsewhere or the other way round, and the frame agrees,
+    /// the start was given wrongly.
+    fn verify_start(&mut self, frame: &Frame) {
+        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
+            return;
+        }
+        relocalizer.look(frame, motion.poses[0].translation, false, false);
+        if relocalizer.elsewhere(&model.body, &motion.poses, false) {
+            observer.face(frame);
+            let seen = observer.seen(frame, motion.origin);
+            let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
+            if relocalizer.detected(setting.of(model), fit, &motion.poses, false).is_some() {
+                self.restart_at_detection();
+            }
+        }
+    }
+
+    /// Starts anew where a detector sees the body, in the sizes it was set in; whether it could.
+    fn restart_at_detection(&mut self) -> bool {
+        let body = self.sizes.as_set().unwrap_or(&self.model.body).clone();
+        let Some(poses) = self.relocalizer.posed(&body) else { return false };
+        let (known, itself) = (self.sizes.known(), self.relocalizer.found_itself());
+        self.restart(body, poses, !known);
+        self.relocalizer.take_note_of_start(itself);
+        if !known {
+            self.sizes.restart(&self.model, Start::Detected, &self.config);
+        }
+        true
+    }
+
     /// Looks for a person, and follows the one that is found.
     fn search(&mut self, frame: &Frame) {
         if let Some((body, poses)) = self.relocalizer.first(frame, &self.model) {
             self.restart(body, poses, true);
             self.assessor.doubt_pose();
-            self.relocalizer.found_itself();
+            self.relocalizer.take_note_of_start(true);
             self.sizes.restart(&self.model, Start::Detected, &self.config);
             self.follow(frame);
             if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
@@ -135,9 +167,9 @@ impl Tracker {
         sizes.initialise(setting, model, poses, fit);
         steps += fit.run(setting.of(model), predicted, poses);
         // Other configurations of arms and legs.
-        if schedule.whole_body {
+        if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
-            relocalizer.look(frame, &model.body, poses[0].translation + *origin, assessor.doubts(), lost);
+            relocalizer.look(frame, poses[0].translation + *origin, assessor.doubts(), lost);
         }
         if config.hypotheses && schedule.whole_body && known {
             steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection());
@@ -149,8 +181,8 @@ impl Tracker {
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
         motion.commit(frame.stamp);
-        if self.config.relocalization && schedule.whole_body {
-            self.relocalize(frame);
+        if self.config.relocalization && schedule.whole_body && self.relocalize(frame, known) {
+            return self.follow(frame);
         }
         self.remember();
         self.report(frame.stamp, steps);
@@ -175,17 +207,19 @@ impl Tracker {
         frame.check(&self.model.body, self.motion.stamp)
     }
 
-    /// Remembers a tracked body; looks for a lost one, and takes it where it is found.
-    fn relocalize(&mut self, frame: &Frame) {
+    /// Remembers a tracked body; looks for a lost one, and takes it where it is found. A track that is not `known` for long starts
+    /// anew instead, in this frame: whether it does.
+    fn relocalize(&mut self, frame: &Frame, known: bool) -> bool {
         let lost = self.assessor.status() == Status::Lost;
-        if self.relocalizer.detection().is_some() {
+        if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost) && self.move_to_detection(frame) {
-                return;
+                // What was learnt of sizes and scene was learnt in the wrong place.
+                return self.relocalizer.young(frame.stamp) && self.restart_at_detection();
             }
         }
         if !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
-            return;
+            return false;
         }
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         let seen = observer.seen(frame, motion.origin);
@@ -197,15 +231,17 @@ impl Tracker {
         if self.relocalizer.conclude(found, sighting, &self.motion.poses) {
             self.assessor.give_up();
         }
+        false
     }
 
     /// Moves the body to where a detector sees it; whether it is there now.
     fn move_to_detection(&mut self, frame: &Frame) -> bool {
-        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         let learnt = observer.release(frame, relocalizer.own());
         let seen = observer.seen(frame, motion.origin);
         let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-        let place = relocalizer.detected(setting.of(model), fit, &motion.poses);
+        let lost = assessor.status() == Status::Lost;
+        let place = relocalizer.detected(setting.of(model), fit, &motion.poses, lost);
         let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
         let moved = better && self.move_to_predicted(frame);
         if !moved {
