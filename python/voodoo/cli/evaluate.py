@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from voodoo.cli.common import clear_errors, progressing
-from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, UseOption
+from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
 from voodoo.errors import VoodooError
+
+if TYPE_CHECKING:
+    from voodoo.evaluation.people import PeopleScore
 
 
 def eval_command(
@@ -35,6 +39,13 @@ def eval_command(
     ablation: Annotated[
         bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
     ] = False,
+    result: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv", help="Judge this result of several people instead of tracking, of one RECORDING."
+        ),
+    ] = None,
+    frame: FrameOption = None,
     loader: LoaderOption = None,
 ) -> None:
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
@@ -46,6 +57,10 @@ def eval_command(
     switch turned over, the other solvers, no prediction, no jitter penalty)
     and prints a row each; --out gets ablation.md and ablation.csv.
 
+    A recording with truth_people.csv beside it is tracked with --people any and judged for MOTA, IDF1, switches of identity,
+    false bodies and joints. With --result a .csv that any program wrote is judged: stamp_s, person, status, residual_m, then
+    NAME_x, NAME_y, NAME_z. It needs pip install voodoo[eval]; --out gets people.csv and people.md.
+
     Examples
 
     voodoo eval rendered/ --only '*_cmu' --out report
@@ -55,6 +70,8 @@ def eval_command(
     voodoo eval rendered/ --init auto
 
     voodoo eval rendered/ --ablate --out report
+
+    voodoo eval two_walk/ --result theirs.csv
     """
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.ablation import ablate, table, variants, write_tables
@@ -69,6 +86,9 @@ def eval_command(
         automatic = None if init is None else AUTO
         config_of(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
+        if result is not None:
+            _show_people([_judged(paths, result, loader, frame)], out)
+            return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
         if ablation:
@@ -92,3 +112,21 @@ def eval_command(
         failures = [score for score in scores if score.failure]
         if failures:
             raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
+
+
+def _judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:
+    """The score of a result file, which belongs to one recording."""
+    from voodoo.evaluation.people_evaluate import evaluate_result
+
+    if len(paths) != 1:
+        raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
+    return evaluate_result(paths[0], result, loader=loader, root_frame=frame)
+
+
+def _show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
+    """Print the table of several people, and write it."""
+    from voodoo.evaluation.people_report import people_markdown, write_people
+
+    typer.echo(people_markdown(scores))
+    if out is not None:
+        typer.echo("wrote " + ", ".join(str(file) for file in write_people(out, scores)))

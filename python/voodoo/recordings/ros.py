@@ -12,6 +12,7 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
+from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, reference_words
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
@@ -42,7 +43,8 @@ class RosRecording(Recording):
     and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover` repair
     it), as is one whose index announces other messages than it holds.
 
-    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`, unless `bare`.
+    truth.csv, truth_people.csv and init.json in the bag's folder or the one above become `reference`, `people` and `start`,
+    unless `bare`.
 
     Args:
         path: see voodoo.recordings.ros_bag.Bag.
@@ -100,6 +102,8 @@ class RosRecording(Recording):
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         truth, start = (None if bare else find_beside(place, name) for name in ("truth.csv", "init.json"))
         self.reference = None if truth is None else read_truth(truth, self._root_from_truth)
+        people = None if bare else find_beside(place, PEOPLE_TRUTH_FILE)
+        self.people = None if people is None else read_people_truth(people, self._root_from_truth)
         self.start = None if start is None else read_start(start, self._root_from_truth(self._driver.first_stamp))
 
     def __len__(self) -> int:
@@ -150,7 +154,7 @@ class RosRecording(Recording):
             root_frame=self.root_frame,
             sensors=tuple(sensors),
             unused=tuple(self._unused),
-            reference=reference_words(self.reference),
+            reference=reference_words(self.reference, self.people),
         )
 
     def _read_transforms(self, asked: str | None, sources: Sequence[Source]) -> str:
