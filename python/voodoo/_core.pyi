@@ -15,6 +15,7 @@ __all__ = [
     "Detector",
     "Estimate",
     "Frame",
+    "People",
     "PersonCandidate",
     "TaperedEllipticCylinder",
     "Tracker",
@@ -531,6 +532,22 @@ class Tracker:
         sites: Sequence[tuple[str, tuple[float, float, float]]],
     ) -> None: ...
     def remove_limb(self, name: str) -> None: ...
+
+@final
+class People:
+    """Several persons as the core follows them; use voodoo.People."""
+
+    def __new__(
+        cls,
+        body: Body,
+        values: Mapping[str, Any],
+        *,
+        limit: int | None,
+        forget_after: float,
+        region: tuple[Sequence[float], Sequence[float]] | None,
+    ) -> People: ...
+    def step(self, frame: Frame) -> list[tuple[int, Estimate]]: ...
+    def body(self, id: int) -> Body | None: ...
 
 @final
 class View:

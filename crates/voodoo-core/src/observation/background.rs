@@ -17,6 +17,9 @@ const LEARNING: f32 = 0.1;
 /// One row of this many is learnt in a frame, for speed: the scene stands still.
 const ROW_STEP: usize = 8;
 
+/// Stands for the depth at pixels that show another body: whatever returns there belongs to what is not this one.
+pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
+
 /// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
 #[derive(Clone, Debug, Default)]
 pub struct Background {
@@ -87,9 +90,33 @@ impl Backgrounds {
     }
 
     /// What was learnt of this image.
-    pub(super) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
+    pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
         let known = self.images.iter_mut().find(|background| background.fits(image));
         known.map(|background| background.depth.as_mut_slice())
+    }
+
+    /// Takes up what is known of another's images, and `change`s it.
+    pub(super) fn adopt(&mut self, frame: &Frame, scene: &Self, mut change: impl FnMut(usize, &mut [f32])) {
+        self.images.resize_with(frame.images.len(), Background::default);
+        for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
+            (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.width);
+            own.depth.clear();
+            match scene.of(image) {
+                Some(known) => own.depth.extend_from_slice(&known.depth),
+                None => own.depth.resize(image.pixels.len(), 0.0),
+            }
+            change(number, &mut own.depth);
+        }
+    }
+
+    /// Makes sure that something is known, if only nothing, of every image of a frame; the numbers of new ones go to `new`.
+    pub(crate) fn meet(&mut self, frame: &Frame, mut new: impl FnMut(&DepthImage, &mut [f32])) {
+        for image in frame.images {
+            if self.of(image).is_none() {
+                let index = self.start_anew(image, frame);
+                new(image, &mut self.images[index].depth);
+            }
+        }
     }
 
     /// Whether no depth image was ever seen.

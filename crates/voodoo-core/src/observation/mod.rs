@@ -14,3 +14,4 @@ pub mod observer;
 pub(crate) mod pixels;
 pub mod registration;
 pub(crate) mod segments;
+pub mod share;

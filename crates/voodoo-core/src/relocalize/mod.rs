@@ -22,6 +22,7 @@ use crate::observation::candidates::Candidates;
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
 use crate::observation::segments::Segments;
+use crate::observation::share::Share;
 use belief::Belief;
 use doubt::Doubt;
 use facing::Known;
@@ -70,9 +71,18 @@ impl Relocalizer {
         People::know(body)
     }
 
+    /// A body of a detected person's sizes, or with `known` ones that the model has, and its poses, world frame.
+    pub fn placed(&self, model: &Model, detection: &Detection, known: bool) -> Option<(Body, Vec<Pose>)> {
+        if known {
+            Some((model.body.clone(), people::posed(&model.body, detection)?))
+        } else {
+            people::sized(model, detection)
+        }
+    }
+
     /// Body and poses of the surest person in a frame.
     pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.look(frame, Wanted::Anybody);
+        let detection = self.people.look(frame, None, Wanted::Anybody);
         let detection = detection.filter(|_| self.belief.observe(detection))?;
         self.belief = Belief::default();
         people::sized(model, detection)
@@ -87,7 +97,16 @@ impl Relocalizer {
     /// was not where it should be in the frame before, or the body `lost`.
     pub fn look(&mut self, frame: &Frame, body: &Body, root: Vec3, doubtful: bool, lost: bool) {
         if self.doubt.due(frame.stamp, doubtful, lost) && People::know(body) {
-            self.people.look(frame, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+            self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+        } else {
+            self.people.forget();
+        }
+    }
+
+    /// The same for one of several persons, who is not looked for here where they are lost.
+    pub fn look_at_share(&mut self, frame: &Frame, share: Share, body: &Body, root: Vec3, [doubtful, lost]: [bool; 2]) {
+        if self.doubt.due(frame.stamp, doubtful, false) && !lost && People::know(body) {
+            self.people.look(frame, Some(share), Wanted::Near(root));
         } else {
             self.people.forget();
         }

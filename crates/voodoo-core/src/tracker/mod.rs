@@ -1,5 +1,6 @@
 //! The tracker: `step` names the method.
 
+mod among;
 mod assess;
 mod edits;
 pub mod estimate;
@@ -15,6 +16,7 @@ use crate::math::{Pose, Vec3};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
+use crate::observation::share::Share;
 use crate::relocalize::{Relocalizer, Sighting};
 use crate::sizes::{Reliance, Sizes, Start};
 use assess::Assessor;
@@ -92,7 +94,7 @@ impl Tracker {
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
         if self.is_started() {
-            self.follow(frame)
+            self.follow(frame, None)
         } else {
             self.search(frame)
         }
@@ -106,7 +108,7 @@ impl Tracker {
             self.assessor.doubt_pose();
             self.relocalizer.found_itself();
             self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.follow(frame);
+            self.follow(frame, None);
             if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
                 return;
             }
@@ -114,8 +116,8 @@ impl Tracker {
         self.stop(frame.stamp);
     }
 
-    /// The pose at the next instant (K06 IV-B).
-    fn follow(&mut self, frame: &Frame) {
+    /// The pose at the next instant (K06 IV-B), by all of a frame or by its `share` of it.
+    fn follow(&mut self, frame: &Frame, share: Option<Share>) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
@@ -125,7 +127,10 @@ impl Tracker {
         let Motion { poses, previous, predicted, origin, .. } = motion;
         let own = relocalizer.own();
         let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched, own };
-        observer.observe(frame, expected, config);
+        match share {
+            None => observer.observe(frame, expected, config),
+            Some(share) => observer.observe_share(frame, expected, share, config),
+        }
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
@@ -137,7 +142,11 @@ impl Tracker {
         // Other configurations of arms and legs.
         if schedule.whole_body {
             let lost = assessor.status() == Status::Lost;
-            relocalizer.look(frame, &model.body, poses[0].translation + *origin, assessor.doubts(), lost);
+            let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
+            match share {
+                None => relocalizer.look(frame, &model.body, root, doubtful, lost),
+                Some(share) => relocalizer.look_at_share(frame, share, &model.body, root, [doubtful, lost]),
+            }
         }
         if config.hypotheses && schedule.whole_body && known {
             steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection());
@@ -150,7 +159,7 @@ impl Tracker {
         assessor.assess(setting.of(model), fit.matched(poses));
         motion.commit(frame.stamp);
         if self.config.relocalization && schedule.whole_body {
-            self.relocalize(frame);
+            self.relocalize(frame, share.is_some());
         }
         self.remember();
         self.report(frame.stamp, steps);
@@ -175,8 +184,8 @@ impl Tracker {
         frame.check(&self.model.body, self.motion.stamp)
     }
 
-    /// Remembers a tracked body; looks for a lost one, and takes it where it is found.
-    fn relocalize(&mut self, frame: &Frame) {
+    /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found.
+    fn relocalize(&mut self, frame: &Frame, among: bool) {
         let lost = self.assessor.status() == Status::Lost;
         if self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
@@ -184,7 +193,7 @@ impl Tracker {
                 return;
             }
         }
-        if !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
+        if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
             return;
         }
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;

@@ -1,0 +1,279 @@
+//! Several persons at once, each with a number that lasts: one tracker each, which share every frame between them.
+//!
+//! A pixel belongs to the person whose surface explains it; what nobody explains may be somebody new. Who comes back gets their
+//! number back, where size, place and time agree.
+
+mod assign;
+mod claims;
+mod person;
+mod scene;
+mod strangers;
+
+use crate::body::Body;
+use crate::config::Config;
+use crate::detect::{Detection, Detector, Surroundings, Wanted};
+use crate::error::TrackError;
+use crate::math::Aabb;
+use crate::observation::background::Background;
+use crate::observation::frame::Frame;
+use crate::observation::share::{NOBODY, Share};
+use crate::tracker::Tracker;
+use claims::{Claimant, Claims};
+use person::Person;
+use rayon::ThreadPool;
+use rayon::prelude::*;
+use scene::Scene;
+use strangers::{Stranger, Strangers};
+
+/// The detector looks at what nobody explains this often at most, seconds.
+const LOOK_EVERY: f64 = 0.06;
+/// Of so many looks one is at all of the image, the others at what is no scene: somebody may have stood there from the start.
+const ALL_OF: usize = 4;
+/// Two bodies whose roots are nearer than this are one, metres.
+const ONE_BODY: f64 = 0.25;
+/// Who was there for less than this is not remembered, seconds.
+const REMEMBERED: f64 = 1.0;
+
+/// Who is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Persons that are followed at the same time, at most; none: any number.
+    pub limit: Option<usize>,
+    /// Who is away for longer is somebody new when they come back, seconds.
+    pub forget_after: f64,
+    /// Where persons are, world frame; none: everywhere.
+    pub region: Option<Aabb>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { limit: None, forget_after: 60.0, region: None }
+    }
+}
+
+/// Follows several persons through frames.
+#[derive(Debug)]
+pub struct People {
+    prototype: Body,
+    config: Config,
+    options: Options,
+    persons: Vec<Person>,
+    next_id: usize,
+    claims: Claims,
+    scene: Scene,
+    strangers: Strangers,
+    detector: Detector,
+    looked: Option<f64>,
+    looks: usize,
+    watch: Watch,
+}
+
+/// Time, and the threads.
+#[derive(Debug)]
+struct Watch {
+    stamp: Option<f64>,
+    threads: Option<ThreadPool>,
+}
+
+impl People {
+    /// Everybody who comes gets a copy of `prototype`.
+    pub fn new(prototype: Body, config: Config, options: Options) -> Result<Self, TrackError> {
+        let threads = match config.threads {
+            1 => None,
+            count => Some(rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(|error| {
+                TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
+            })?),
+        };
+        let detector = Detector::new()
+            .map_err(|error| TrackError::measurement("weights", "those that come with the library", error.to_string()))?;
+        Ok(Self {
+            prototype,
+            config: Config { threads: 1, ..config },
+            options,
+            persons: Vec::new(),
+            next_id: 1,
+            claims: Claims::default(),
+            scene: Scene::default(),
+            strangers: Strangers::default(),
+            detector,
+            looked: None,
+            looks: 0,
+            watch: Watch { stamp: None, threads },
+        })
+    }
+
+    /// What everybody's body starts from.
+    pub fn prototype(&self) -> &Body {
+        &self.prototype
+    }
+
+    /// Those who are there: their number and their tracker, in the order in which they came.
+    pub fn there(&self) -> impl Iterator<Item = (usize, &Tracker)> {
+        self.persons.iter().filter(|person| person.there).map(|person| (person.id, &person.tracker))
+    }
+
+    /// The next instant. On error everything is as before.
+    pub fn step(&mut self, frame: &Frame) -> Result<(), TrackError> {
+        frame.check(&self.prototype, self.watch.stamp)?;
+        self.watch.stamp = Some(frame.stamp);
+        self.scene.meet(frame);
+        self.share_out(frame);
+        self.follow(frame);
+        self.scene.learn(frame, self.claims.owners());
+        self.part();
+        self.look(frame);
+        self.forget(frame.stamp);
+        Ok(())
+    }
+
+    /// Gives every pixel to whose surface explains it.
+    fn share_out(&mut self, frame: &Frame) {
+        for person in self.persons.iter_mut().filter(|person| person.there) {
+            person.tracker.expect(frame.stamp, &mut person.expected);
+        }
+        // Who is lost explains nothing.
+        let claimants = (0..).zip(&self.persons).filter(|(_, person)| person.tracked()).map(|(number, person)| Claimant {
+            number,
+            body: person.tracker.body(),
+            poses: &person.expected,
+        });
+        self.claims.settle(frame, self.scene.known(), claimants);
+    }
+
+    /// Every tracker by its share.
+    fn follow(&mut self, frame: &Frame) {
+        let (owners, scene) = (self.claims.owners(), self.scene.known());
+        let work = |(own, person): (usize, &mut Person)| {
+            if person.there {
+                person.tracker.step_among(frame, Share { owners, own: own as u16, scene });
+                person.note(frame);
+            }
+        };
+        match &self.watch.threads {
+            // Every person is worked on by one thread: the result does not depend on their number.
+            Some(pool) => pool.install(|| self.persons.par_iter_mut().enumerate().for_each(work)),
+            None => self.persons.iter_mut().enumerate().for_each(work),
+        }
+    }
+
+    /// Of two on one body the younger goes; who leaves the region goes.
+    fn part(&mut self) {
+        for younger in 0..self.persons.len() {
+            let place = self.persons[younger].place;
+            let same = |older: &Person| older.tracked() && older.place.distance(place) < ONE_BODY;
+            let twice = self.persons[younger].tracked() && self.persons[..younger].iter().any(same);
+            let outside = self.options.region.is_some_and(|region| !region.contains_local_point(place));
+            if twice || outside {
+                self.persons[younger].there = false;
+            }
+        }
+    }
+
+    /// Looks for somebody at what nobody explains.
+    fn look(&mut self, frame: &Frame) {
+        if self.looked.is_some_and(|last| frame.stamp - last < LOOK_EVERY) {
+            return;
+        }
+        self.looked = Some(frame.stamp);
+        let all = self.looks.is_multiple_of(ALL_OF);
+        self.looks += 1;
+        self.strangers.fade(frame.stamp);
+        self.share_out(frame);
+        self.detect(frame, Wanted::Anybody, all);
+        let mut believed = self.strangers.believed(frame.stamp);
+        if let Some(region) = self.options.region {
+            believed.retain(|stranger| region.contains_local_point(stranger.place));
+        }
+        if !believed.is_empty() {
+            self.welcome(frame, &believed);
+        }
+    }
+
+    fn detect(&mut self, frame: &Frame, wanted: Wanted, all: bool) {
+        for (number, image) in frame.images.iter().enumerate() {
+            let scene = self.scene.known().of(image).map_or(&[][..], Background::depth);
+            let around = Surroundings {
+                ground: frame.ground,
+                excluded: frame.excluded,
+                owners: self.claims.owners().get(number).map_or(&[], Vec::as_slice),
+                background: if all { &[] } else { scene },
+                ..Surroundings::default()
+            };
+            let found: Vec<Detection> = self.detector.detect(image, &around, wanted).to_vec();
+            for detection in found {
+                let mut pixels = Vec::new();
+                self.detector.mask(&detection, &mut pixels);
+                self.strangers.note(frame.stamp, detection, number, pixels);
+            }
+        }
+    }
+
+    /// Those who are believed to be persons get a tracker: their own when they are somebody who was there.
+    fn welcome(&mut self, frame: &Frame, believed: &[Stranger]) {
+        let absent: Vec<usize> = (0..self.persons.len()).filter(|number| !self.persons[*number].tracked()).collect();
+        let cost = |stranger: &Stranger, person: &Person| person_cost(person, stranger, frame.stamp);
+        let costs: Vec<Vec<f64>> = believed
+            .iter()
+            .map(|stranger| absent.iter().map(|number| cost(stranger, &self.persons[*number])).collect())
+            .collect();
+        for (stranger, given) in believed.iter().zip(assign::assign(&costs, NEW)) {
+            match given {
+                Some(column) => self.take_up(frame, stranger, absent[column]),
+                None => self.bear(frame, stranger),
+            }
+        }
+    }
+
+    /// Somebody new.
+    fn bear(&mut self, frame: &Frame, stranger: &Stranger) {
+        if self.options.limit.is_some_and(|limit| self.there().count() >= limit) || self.persons.len() >= usize::from(NOBODY) {
+            return;
+        }
+        let Ok(person) = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), frame.stamp) else { return };
+        self.persons.push(person);
+        self.next_id += 1;
+        self.take_up(frame, stranger, self.persons.len() - 1);
+        if !self.persons.last().is_some_and(|person| person.there) {
+            self.persons.pop();
+            self.next_id -= 1;
+        }
+    }
+
+    /// Starts a person's tracker where a stranger is seen.
+    fn take_up(&mut self, frame: &Frame, stranger: &Stranger, number: usize) {
+        self.scene.release(frame, stranger.image, &stranger.pixels);
+        let (owners, scene) = (self.claims.owners(), self.scene.known());
+        let person = &mut self.persons[number];
+        let known = person.born < frame.stamp;
+        let share = Share { owners, own: number as u16, scene };
+        if person.tracker.begin(frame, share, &stranger.detection, known) {
+            person.there = true;
+            person.measure(&stranger.detection);
+        }
+        person.note(frame);
+    }
+
+    /// Forgets who has been away for too long, and who was there for a moment only.
+    fn forget(&mut self, stamp: f64) {
+        let forget_after = self.options.forget_after;
+        self.persons.retain(|person| {
+            let remembered = person.seen - person.born >= REMEMBERED && stamp - person.seen < forget_after;
+            person.there || remembered
+        });
+    }
+}
+
+/// Cost of somebody new.
+const NEW: f64 = 6.0;
+/// How far a person comes at once and in a second, metres.
+const COMES: [f64; 2] = [0.4, 1.2];
+/// Standard deviation of a detected person's sizes, relative.
+const SIZE_SIGMA: f64 = 0.04;
+
+/// What speaks against a stranger's being this person.
+fn person_cost(person: &Person, stranger: &Stranger, stamp: f64) -> f64 {
+    let reach = COMES[0] + COMES[1] * (stamp - person.seen);
+    let far = person.place.distance(stranger.place) / reach;
+    let far = if far > 2.0 { f64::INFINITY } else { 0.5 * far * far };
+    far + 0.5 * (person.unlike(&stranger.detection) / SIZE_SIGMA).powi(2)
+}

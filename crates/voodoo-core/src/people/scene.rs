@@ -1,0 +1,98 @@
+//! The still scene that all persons stand in, learnt where nobody is.
+
+use crate::observation::background::Backgrounds;
+use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::share::NOBODY;
+
+/// One row of this many is learnt in a frame, for speed: the scene stands still.
+const ROW_STEP: usize = 8;
+/// A deeper return by more than this replaces what was learnt, and a nearer one by less is taken in, metres.
+const STEP: f32 = 0.15;
+/// Share of a new return in what was learnt.
+const LEARNING: f32 = 0.1;
+/// Where nothing was known, or something deeper, a return is the scene when it was there in so many looks in a row: a person who
+/// was not found yet stands still for less.
+const PATIENCE: [u8; 2] = [4, 60];
+/// Looks are alike within this, metres.
+const SAME: f32 = 0.05;
+
+/// What is known of the scene, and what may become so.
+#[derive(Debug, Default)]
+pub(super) struct Scene {
+    known: Backgrounds,
+    images: Vec<Tentative>,
+    row: usize,
+}
+
+/// What was seen lately where the scene is not known, pixel by pixel, and in how many looks in a row.
+#[derive(Debug, Default)]
+struct Tentative {
+    depth: Vec<f32>,
+    looks: Vec<u8>,
+}
+
+impl Scene {
+    /// What is known.
+    pub(super) fn known(&self) -> &Backgrounds {
+        &self.known
+    }
+
+    /// Takes up the images of a frame that were not seen before: all that they show is the scene as far as is known.
+    pub(super) fn meet(&mut self, frame: &Frame) {
+        self.known.meet(frame, |image, depth| {
+            for (index, depth) in depth.iter_mut().enumerate() {
+                *depth = metres(image, index).unwrap_or(0.0);
+            }
+        });
+        self.images.resize_with(frame.images.len(), Tentative::default);
+        for (image, tentative) in frame.images.iter().zip(&mut self.images) {
+            tentative.depth.resize(image.pixels.len(), 0.0);
+            tentative.looks.resize(image.pixels.len(), 0);
+        }
+    }
+
+    /// Learns some rows where nobody is.
+    pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
+        self.row = (self.row + 1) % ROW_STEP;
+        for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
+            let Some(known) = self.known.depth_mut(image) else { continue };
+            for row in (self.row..image.height).step_by(ROW_STEP) {
+                for index in row * image.width..(row + 1) * image.width {
+                    let Some(z) = metres(image, index).filter(|_| owners[index] == NOBODY) else { continue };
+                    learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.looks[index], z);
+                }
+            }
+        }
+    }
+
+    /// These pixels of an image show a person.
+    pub(super) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
+        let Some(known) = frame.images.get(image).and_then(|image| self.known.depth_mut(image)) else { return };
+        for pixel in pixels {
+            if let Some(depth) = known.get_mut(*pixel) {
+                *depth = 0.0;
+            }
+        }
+    }
+}
+
+fn learn_pixel(known: &mut f32, tentative: &mut f32, looks: &mut u8, z: f32) {
+    if *known > 0.0 && z > *known - STEP {
+        *known = if z > *known + STEP { z } else { *known + LEARNING * (z - *known) };
+        *looks = 0;
+        return;
+    }
+    if (z - *tentative).abs() > SAME {
+        (*tentative, *looks) = (z, 0);
+    }
+    *looks = looks.saturating_add(1);
+    if *looks >= PATIENCE[usize::from(*known > 0.0)] {
+        (*known, *looks) = (z, 0);
+    }
+}
+
+/// Depth of a pixel, if anything returned.
+fn metres(image: &DepthImage, index: usize) -> Option<f32> {
+    let z = image.pixels.get(index) * image.metres_per_unit as f32;
+    (z > 0.0 && z.is_finite()).then_some(z)
+}

@@ -1,0 +1,144 @@
+"""Several persons at once, each with a number that lasts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import voodoo._core as _core
+from voodoo._core import Estimate, Frame
+from voodoo.config import Config
+from voodoo.errors import BodyError, ConfigError
+from voodoo.model.body import Body
+
+__all__ = ["People", "PeopleEstimate", "Person"]
+
+
+@dataclass(frozen=True)
+class Person:
+    """One of those who are there.
+
+    Args:
+        id: their number, from 1; whoever comes back has the same.
+        estimate: their pose.
+    """
+
+    id: int
+    estimate: Estimate
+
+    @property
+    def status(self) -> str:
+        """That of the estimate: tracking, degraded, or lost (hidden, or about to be given up: the pose is carried)."""
+        return self.estimate.status
+
+
+@dataclass(frozen=True)
+class PeopleEstimate:
+    """Everybody who is there.
+
+    Args:
+        stamp: time of the frame [s].
+        persons: in the order in which they first came.
+    """
+
+    stamp: float
+    persons: tuple[Person, ...]
+
+    def __iter__(self) -> Iterator[Person]:
+        """The persons."""
+        return iter(self.persons)
+
+    def __len__(self) -> int:
+        """How many are there."""
+        return len(self.persons)
+
+
+class People:
+    """Follows everybody who comes, each with a number that lasts.
+
+    Nobody needs to say where they are: persons are found in depth images. A pixel belongs to the person whose surface explains
+    it. Who is hidden is carried, and who comes back has the same number where size, place and time agree.
+
+    Args:
+        body: what every new person gets a copy of; None: `Body.human(model="measured")`.
+        config: parameters; `threads` persons are followed side by side, with the same bits.
+        limit: persons that are followed at the same time, at most; None: any number.
+        forget_after: who is away for longer is somebody new when they come back [s].
+        region: low and high corner [m] of a box of the world; who is outside is left out. None: everywhere.
+    """
+
+    def __init__(
+        self,
+        body: Body | None = None,
+        *,
+        config: Config | None = None,
+        limit: int | None = None,
+        forget_after: float = 60.0,
+        region: tuple[Sequence[float], Sequence[float]] | None = None,
+    ) -> None:
+        """Nobody is there yet.
+
+        Raises:
+            BodyError: `body` is not a Body.
+            ConfigError: a parameter that cannot be used.
+        """
+        if body is not None and not isinstance(body, Body):
+            raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
+        if config is not None and not isinstance(config, Config):
+            raise ConfigError(f"config: expected a voodoo.Config, found {type(config).__name__}")
+        if limit is not None and (not isinstance(limit, int) or limit < 1):
+            raise ConfigError(f"limit: expected a whole number from 1, or None, found {limit!r}")
+        if not (isinstance(forget_after, int | float) and math.isfinite(forget_after) and forget_after >= 0.0):
+            raise ConfigError(f"forget_after: expected a finite number of seconds, found {forget_after!r}")
+        self.config = Config() if config is None else config
+        self._prototype = Body.human(model="measured") if body is None else body
+        self._core = _core.People(
+            self._prototype.core,
+            self.config.values(),
+            limit=limit,
+            forget_after=float(forget_after),
+            region=_box(region),
+        )
+        self._estimate = PeopleEstimate(math.nan, ())
+
+    @property
+    def estimate(self) -> PeopleEstimate:
+        """The last one; at first with NaN as its stamp and nobody."""
+        return self._estimate
+
+    def step(self, frame: Frame) -> PeopleEstimate:
+        """Everybody at the frame's time. Releases the GIL; after a refused frame all is as before.
+
+        Raises:
+            MeasurementError: time not after the last frame, or a measurement that cannot be used.
+            BodyError: the frame names a limb or site that is not in the body.
+        """
+        found = self._core.step(frame)
+        self._estimate = PeopleEstimate(frame.stamp, tuple(Person(number, estimate) for number, estimate in found))
+        return self._estimate
+
+    def body(self, person: int) -> Body:
+        """The body of a person who is there, in their sizes.
+
+        Raises:
+            BodyError: nobody of this number is there.
+        """
+        core = self._core.body(person)
+        if core is None:
+            there = ", ".join(str(other.id) for other in self._estimate) or "nobody"
+            raise BodyError(f"person: expected one of those who are there ({there}), found {person}")
+        return Body(core)
+
+
+def _box(region: tuple[Sequence[float], Sequence[float]] | None) -> tuple[list[float], list[float]] | None:
+    if region is None:
+        return None
+    try:
+        low, high = ([float(value) for value in corner] for corner in region)
+    except (TypeError, ValueError):
+        low, high = [], []
+    good = len(low) == len(high) == 3 and all(math.isfinite(value) for value in (*low, *high))
+    if not good or any(a > b for a, b in zip(low, high, strict=True)):
+        raise ConfigError(f"region: expected a low and a high corner of three numbers each, found {region!r}")
+    return low, high
