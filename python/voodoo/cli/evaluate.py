@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from voodoo.cli.common import clear_errors, progressing
 from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
 from voodoo.errors import VoodooError
-
-if TYPE_CHECKING:
-    from voodoo.evaluation.people import PeopleScore
 
 
 def eval_command(
@@ -73,9 +69,11 @@ def eval_command(
 
     voodoo eval two_walk/ --result theirs.csv
     """
+    from voodoo.cli.people import judged, refuse_failures, show_people
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.ablation import ablate, table, variants, write_tables
     from voodoo.evaluation.evaluate import evaluate_all
+    from voodoo.evaluation.people_evaluate import evaluate_all_people, has_people
     from voodoo.evaluation.report import markdown, write_reports
     from voodoo.evaluation.search import find_recordings
     from voodoo.pipeline.start import AUTO
@@ -87,7 +85,7 @@ def eval_command(
         config_of(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
         if result is not None:
-            _show_people([_judged(paths, result, loader, frame)], out)
+            show_people([judged(paths, result, loader, frame)], out)
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
@@ -102,6 +100,20 @@ def eval_command(
             if failed:
                 raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
             return
+        several = [path for path in paths if has_people(path)]
+        judgements = list(
+            progressing(
+                evaluate_all_people(several, config_file=config, loader=loader, model=model, use=kinds),
+                "following everybody",
+                len(several),
+            )
+        )
+        if several:
+            show_people(judgements, out)
+            refuse_failures(judgements)
+        paths = [path for path in paths if path not in several]
+        if not paths:
+            return
         done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
         ordered = sorted(progressing(done, "evaluating", len(paths)), key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
@@ -109,24 +121,4 @@ def eval_command(
         if out is not None:
             files = write_reports(out, scores, tables)
             typer.echo("wrote " + ", ".join(str(file) for file in files))
-        failures = [score for score in scores if score.failure]
-        if failures:
-            raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
-
-
-def _judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:
-    """The score of a result file, which belongs to one recording."""
-    from voodoo.evaluation.people_evaluate import evaluate_result
-
-    if len(paths) != 1:
-        raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-    return evaluate_result(paths[0], result, loader=loader, root_frame=frame)
-
-
-def _show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
-    """Print the table of several people, and write it."""
-    from voodoo.evaluation.people_report import people_markdown, write_people
-
-    typer.echo(people_markdown(scores))
-    if out is not None:
-        typer.echo("wrote " + ", ".join(str(file) for file in write_people(out, scores)))
+        refuse_failures(scores)

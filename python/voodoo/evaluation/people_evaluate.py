@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation.people import PeopleScore, score
+from voodoo.export.people import PeopleTrack
 from voodoo.export.people_rows import read_rows
+from voodoo.model.body import Body
+from voodoo.names import HumanModel
+from voodoo.people import People
+from voodoo.pipeline.people import track_people
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, PeopleTruth
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.truth import find_beside
+from voodoo.sensors.settings import FrontEndSettings
 
 
 def has_people(path: Path) -> bool:
@@ -46,6 +56,62 @@ def evaluate_result(
             f"{rows.stamps[outside][0]:.6f}"
         )
     return score(recording.name, path, truth, rows, seconds=about.duration)
+
+
+def evaluate_people(
+    path: Path,
+    *,
+    config: Config | None = None,
+    loader: str | None = None,
+    model: HumanModel | None = None,
+    use: Sequence[str] | None = None,
+) -> PeopleScore:
+    """Track everybody in a recording, without a start, and judge the result.
+
+    Args:
+        path: of the recording, with truth_people.csv beside it.
+        config: None means the defaults.
+        loader: see open_recording.
+        model: which human; None: that of `voodoo.People`.
+        use: from which of its inputs; None: all.
+
+    Raises:
+        VoodooError: it cannot be read, or a frame was refused.
+    """
+    recording = open_recording(path, loader=loader)
+    people = People(None if model is None else Body.human(model=model), config=config)
+    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
+
+
+def judge(recording: Recording, people: People, *, settings: FrontEndSettings | None = None) -> PeopleScore:
+    """Track everybody in a recording, and judge the result.
+
+    Raises:
+        VoodooError: the recording has no truth of several people, or a frame was refused.
+    """
+    truth = truth_of(recording)
+    steps = list(track_people(recording, people, settings=settings))
+    rows = PeopleTrack.of([step.estimate for step in steps]).rows()
+    seconds = float(np.mean([step.seconds for step in steps])) if steps else np.nan
+    about = recording.info()
+    return score(recording.name, recording.path, truth, rows, seconds=about.duration, step_s=seconds)
+
+
+def evaluate_all_people(
+    paths: Sequence[Path],
+    *,
+    config_file: Path | None = None,
+    loader: str | None = None,
+    model: HumanModel | None = None,
+    use: Sequence[str] | None = None,
+) -> Iterator[PeopleScore]:
+    """Evaluate recordings one after the other; one that fails yields a score with `failure` set."""
+    for path in paths:
+        try:
+            config = None if config_file is None else Config.load(config_file)
+            yield evaluate_people(path, config=config, loader=loader, model=model, use=use)
+        except (VoodooError, OSError) as error:
+            yield PeopleScore(path.name, path, failure=str(error))
 
 
 def truth_of(recording: Recording) -> PeopleTruth:

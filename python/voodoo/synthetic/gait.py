@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -41,7 +42,7 @@ def path(points: Sequence[tuple[float, float, float]], *, standing: float = math
         standing: where who stands looks [rad]; pi is back at a camera that looks along x.
     """
     facings = []
-    for (_, x, y), (_, next_x, next_y) in zip(points, points[1:], strict=False):
+    for (_, x, y), (_, next_x, next_y) in pairwise(points):
         away = math.hypot(next_x - x, next_y - y)
         facings.append(standing if away < _STANDS_M else math.atan2(next_y - y, next_x - x))
     facings = [float(value) for value in np.unwrap(facings)]

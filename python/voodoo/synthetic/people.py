@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -14,7 +15,7 @@ from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.recordings.people_truth import PeopleTruth
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, reference_words
 from voodoo.synthetic.boxes import Box, room_depth
 from voodoo.synthetic.gait import Stop, pose_at
 from voodoo.synthetic.render import render_depth
@@ -187,7 +188,7 @@ class MadeUpRecording(Recording):
             if not self.scene.color:
                 yield RecordedFrame(stamp, (depth,))
                 continue
-            color = ColorImage(COLOR, stamp, lambda index=index: self.picture(index), CAMERA, pose)
+            color = ColorImage(COLOR, stamp, partial(self.picture, index), CAMERA, pose)
             yield RecordedFrame(stamp, (color, depth))
 
     def picture(self, index: int) -> npt.NDArray[np.uint8]:
@@ -213,7 +214,7 @@ class MadeUpRecording(Recording):
             rate_hz=rate,
             root_frame=self.root_frame,
             sensors=sensors,
-            reference=f"{len(self.people.persons)} persons, exact",
+            reference=reference_words(None, self.people),
         )
 
 
@@ -227,6 +228,4 @@ def _labels_of(limbs: Sequence[str], number: int) -> npt.NDArray[np.uint8]:
 def _wide() -> Camera:
     """CAMERA with a wider view."""
     width, height = CAMERA.width, CAMERA.height
-    return Camera(
-        width, height, CAMERA.fx / _WIDER, CAMERA.fy / _WIDER, (width - 1) / 2.0, (height - 1) / 2.0
-    )
+    return Camera(width, height, CAMERA.fx / _WIDER, CAMERA.fy / _WIDER, (width - 1) / 2.0, (height - 1) / 2.0)
