@@ -109,12 +109,11 @@ impl Backgrounds {
         }
     }
 
-    /// Makes sure that something is known, if only nothing, of every image of a frame; the numbers of new ones go to `new`.
-    pub(crate) fn meet(&mut self, frame: &Frame, mut new: impl FnMut(&DepthImage, &mut [f32])) {
+    /// Makes sure that something is known, if only nothing, of every image of a frame.
+    pub(crate) fn meet(&mut self, frame: &Frame) {
         for image in frame.images {
             if self.of(image).is_none() {
-                let index = self.start_anew(image, frame);
-                new(image, &mut self.images[index].depth);
+                self.start_anew(image, frame);
             }
         }
     }

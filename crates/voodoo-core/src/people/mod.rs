@@ -27,8 +27,6 @@ use strangers::{Stranger, Strangers};
 
 /// The detector looks at what nobody explains this often at most, seconds.
 const LOOK_EVERY: f64 = 0.06;
-/// Of so many looks one is at all of the image, the others at what is no scene: somebody may have stood there from the start.
-const ALL_OF: usize = 4;
 /// Two bodies whose roots are nearer than this are one, metres.
 const ONE_BODY: f64 = 0.25;
 /// Who was there for less than this is not remembered, seconds.
@@ -64,7 +62,6 @@ pub struct People {
     strangers: Strangers,
     detector: Detector,
     looked: Option<f64>,
-    looks: usize,
     watch: Watch,
 }
 
@@ -97,7 +94,6 @@ impl People {
             strangers: Strangers::default(),
             detector,
             looked: None,
-            looks: 0,
             watch: Watch { stamp: None, threads },
         })
     }
@@ -175,11 +171,9 @@ impl People {
             return;
         }
         self.looked = Some(frame.stamp);
-        let all = self.looks.is_multiple_of(ALL_OF);
-        self.looks += 1;
         self.strangers.fade(frame.stamp);
         self.share_out(frame);
-        self.detect(frame, Wanted::Anybody, all);
+        self.detect(frame, Wanted::Anybody);
         let mut believed = self.strangers.believed(frame.stamp);
         if let Some(region) = self.options.region {
             believed.retain(|stranger| region.contains_local_point(stranger.place));
@@ -189,14 +183,15 @@ impl People {
         }
     }
 
-    fn detect(&mut self, frame: &Frame, wanted: Wanted, all: bool) {
+    fn detect(&mut self, frame: &Frame, wanted: Wanted) {
         for (number, image) in frame.images.iter().enumerate() {
             let scene = self.scene.known().of(image).map_or(&[][..], Background::depth);
             let around = Surroundings {
                 ground: frame.ground,
                 excluded: frame.excluded,
                 owners: self.claims.owners().get(number).map_or(&[], Vec::as_slice),
-                background: if all { &[] } else { scene },
+                // Somebody may have stood there from the start.
+                background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
                 ..Surroundings::default()
             };
             let found: Vec<Detection> = self.detector.detect(image, &around, wanted).to_vec();

@@ -13,6 +13,8 @@ const LEARNING: f32 = 0.1;
 /// Where nothing was known, or something deeper, a return is the scene when it was there in so many looks in a row: a person who
 /// was not found yet stands still for less.
 const PATIENCE: [u8; 2] = [4, 60];
+/// What a camera has seen for longer than this was looked at for persons, seconds.
+const OLD: f64 = 3.0;
 /// Looks are alike within this, metres.
 const SAME: f32 = 0.05;
 
@@ -29,6 +31,10 @@ pub(super) struct Scene {
 struct Tentative {
     depth: Vec<f32>,
     looks: Vec<u8>,
+    /// Since when the camera has been there, seconds; none in the first frame.
+    since: Option<f64>,
+    /// What it showed in the second frame was learnt.
+    filled: bool,
 }
 
 impl Scene {
@@ -37,25 +43,39 @@ impl Scene {
         &self.known
     }
 
-    /// Takes up the images of a frame that were not seen before: all that they show is the scene as far as is known.
+    /// Takes up the images of a frame whose cameras were not there before: nothing is known of them.
     pub(super) fn meet(&mut self, frame: &Frame) {
-        self.known.meet(frame, |image, depth| {
-            for (index, depth) in depth.iter_mut().enumerate() {
-                *depth = metres(image, index).unwrap_or(0.0);
-            }
-        });
         self.images.resize_with(frame.images.len(), Tentative::default);
         for (image, tentative) in frame.images.iter().zip(&mut self.images) {
+            if self.known.of(image).is_none() {
+                (tentative.since, tentative.filled) = (None, false);
+            }
             tentative.depth.resize(image.pixels.len(), 0.0);
             tentative.looks.resize(image.pixels.len(), 0);
         }
+        self.known.meet(frame);
     }
 
-    /// Learns some rows where nobody is.
+    /// Whether the camera of an image has been where it is for long enough: what stood there was looked at.
+    pub(super) fn is_old(&self, image: usize, stamp: f64) -> bool {
+        self.images.get(image).and_then(|image| image.since).is_some_and(|since| stamp - since > OLD)
+    }
+
+    /// Learns some rows where nobody is; all of them where the camera has stood still for the first time.
     pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
         self.row = (self.row + 1) % ROW_STEP;
         for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
             let Some(known) = self.known.depth_mut(image) else { continue };
+            if tentative.since.is_none() {
+                tentative.since = Some(frame.stamp);
+                continue;
+            }
+            let all = !std::mem::replace(&mut tentative.filled, true);
+            if all {
+                for (known, index) in known.iter_mut().zip(0..).filter(|(_, index)| owners[*index] == NOBODY) {
+                    *known = metres(image, index).unwrap_or(0.0);
+                }
+            }
             for row in (self.row..image.height).step_by(ROW_STEP) {
                 for index in row * image.width..(row + 1) * image.width {
                     let Some(z) = metres(image, index).filter(|_| owners[index] == NOBODY) else { continue };
