@@ -31,6 +31,8 @@ from voodoo.recordings.ros_topics import COMPRESSED, Source, TopicChoice, TopicF
 from voodoo.recordings.transforms import TransformTree
 from voodoo.recordings.truth import TRUTH_FRAME, find_beside, read_start, read_truth
 
+STILL_FRAMES = ("odom", "map")
+"""Where a robot that moves says it is (REP-105): smoothly, and without drift but with jumps."""
 _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -52,7 +54,8 @@ class RosRecording(Recording):
         depth_topic, points_topic, scan_topic, color_topic: a topic or several, instead of the one found by type and
             name. The first one of the first kind makes the frames.
         camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
-        root_frame: by default base_link if the bag's transforms know it, else the frame of the first sensor.
+        root_frame: by default odom, else map, where base_link moves in it; else base_link if the bag's transforms know it, else
+            the frame of the first sensor.
         metres_per_unit: of 16-bit depth images.
         tf_max_age: how old a changing transform may be [s].
         bare: read nothing that lies beside the bag.
@@ -158,7 +161,7 @@ class RosRecording(Recording):
         )
 
     def _read_transforms(self, asked: str | None, sources: Sequence[Source]) -> str:
-        """Fill the tree and choose the root frame; the big topic tf is only read when tf_static does not suffice."""
+        """Fill the tree and choose the root frame."""
         names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
         static = [name for name in names if name.endswith("tf_static")]
         dynamic = [name for name in names if name not in static]
@@ -166,13 +169,14 @@ class RosRecording(Recording):
             for _, message in self._bag.read(topics):
                 with reading(self.path, "a readable transform"):
                     self._tree.add(message, static=is_static)
-            known = {*self._tree.frames, *(source.frame for source in sources)}
-            root = asked if asked is not None else TRUTH_FRAME
-            if root in known and all(self._reaches(root, source.frame) for source in sources):
-                return root
-        if asked is not None or TRUTH_FRAME in known:
-            return root
-        return sources[0].frame
+        if asked is not None:
+            return asked
+        known = {*self._tree.frames, *(source.frame for source in sources)}
+        if TRUTH_FRAME not in known:
+            return sources[0].frame
+        # Before a robot that moves people and rooms stand still in the frame it moves in.
+        moving = [frame for frame in STILL_FRAMES if self._tree.moves(frame, TRUTH_FRAME)]
+        return next((frame for frame in moving if all(self._reaches(frame, s.frame) for s in sources)), TRUTH_FRAME)
 
     def _reaches(self, root: str, frame: str) -> bool:
         try:
