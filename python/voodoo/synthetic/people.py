@@ -35,7 +35,7 @@ TRUTH_SITES = (
 )  # fmt: skip
 _EDGE = (0.06, 0.04)
 """A pixel at a step in depth of more than these, metres and share of the depth, may return a mixture."""
-_WIDER = 2
+WIDER = 2
 """Who is partly out of the picture is counted in one so much wider, and as much coarser."""
 _SKIN: Colour = (120, 150, 200)
 _ROOM: Colour = (150, 155, 150)
@@ -146,8 +146,6 @@ class MadeUpRecording(Recording):
             names=TRUTH_SITES,
             positions=np.array([one[1] for one in rendered]),
         )
-        colours = [_ROOM, _SKIN, *(colour for person in scene.people for colour in (person.shirt, person.trousers))]
-        self._colours = np.array(colours, dtype=np.uint8)
 
     def _frames(self) -> Iterator[tuple[float, FloatArray]]:
         yield from zip(self._stamps.tolist(), self._poses, strict=True)
@@ -168,9 +166,9 @@ class MadeUpRecording(Recording):
             nearest = (seen.depth > 0.0) & (seen.depth < depth)
             depth = np.where(nearest, seen.depth, depth)
             owner[nearest] = number
-            label[nearest] = _labels_of(person.body.limb_names, number)[seen.limb[nearest]]
-            wide = render_depth(person.body, poses, camera=_wide(), world_from_sensor=pose)
-            whole[number] = _WIDER**2 * np.count_nonzero(wide.depth)
+            label[nearest] = labels_of(person.body.limb_names, number)[seen.limb[nearest]]
+            wide = render_depth(person.body, poses, camera=wider(CAMERA), world_from_sensor=pose)
+            whole[number] = WIDER**2 * np.count_nonzero(wide.depth)
         owner[depth > scene.noise.reach_m] = -1
         visible = np.array([np.count_nonzero(owner == number) for number in range(count)])
         self._depths.append(scene.noise.image(depth, chance))
@@ -193,8 +191,7 @@ class MadeUpRecording(Recording):
 
     def picture(self, index: int) -> npt.NDArray[np.uint8]:
         """Colours (H, W, 3) BGR of a frame: clothes, skin and grey furniture, with noise."""
-        noise = np.random.default_rng((self.scene.seed, index)).integers(-4, 5, (*self._labels[index].shape, 3))
-        return np.clip(self._colours[self._labels[index]] + noise, 0, 255).astype(np.uint8)
+        return paint(self._labels[index], self.scene.people, (self.scene.seed, index))
 
     def info(self) -> RecordingInfo:
         """What is in it."""
@@ -218,14 +215,21 @@ class MadeUpRecording(Recording):
         )
 
 
-def _labels_of(limbs: Sequence[str], number: int) -> npt.NDArray[np.uint8]:
+def paint(label: npt.NDArray[np.uint8], people: Sequence[Walker], seed: tuple[int, int]) -> npt.NDArray[np.uint8]:
+    """Colours (H, W, 3) BGR of labels (H, W), see `labels_of`; 0 is the room."""
+    colours = [_ROOM, _SKIN, *(colour for person in people for colour in (person.shirt, person.trousers))]
+    noise = np.random.default_rng(seed).integers(-4, 5, (*label.shape, 3))
+    return np.clip(np.array(colours, dtype=np.int64)[label] + noise, 0, 255).astype(np.uint8)
+
+
+def labels_of(limbs: Sequence[str], number: int) -> npt.NDArray[np.uint8]:
     """Index of the colour of each limb of a person."""
     legs = ("thigh", "calf", "foot", "pelvis")
     worn = [1 if name in _BARE else 3 + 2 * number if name.endswith(legs) else 2 + 2 * number for name in limbs]
     return np.array(worn, dtype=np.uint8)
 
 
-def _wide() -> Camera:
-    """CAMERA with a wider view."""
-    width, height = CAMERA.width, CAMERA.height
-    return Camera(width, height, CAMERA.fx / _WIDER, CAMERA.fy / _WIDER, (width - 1) / 2.0, (height - 1) / 2.0)
+def wider(camera: Camera) -> Camera:
+    """A camera with WIDER times the view and as many pixels."""
+    width, height = camera.width, camera.height
+    return Camera(width, height, camera.fx / WIDER, camera.fy / WIDER, (width - 1) / 2.0, (height - 1) / 2.0)
