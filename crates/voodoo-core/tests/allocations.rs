@@ -73,7 +73,6 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
         let (pixels, points) = &frames[index % frames.len()];
         let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);
         let frame = Frame {
-            colors: &[],
             clouds: &clouds,
             images: &images,
             positions: &positions,

@@ -34,7 +34,8 @@ impl PyPeople {
     ) -> PyResult<Self> {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
         let options = Options { limit, forget_after, region };
-        let people = People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
+        let people =
+            People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
         let names = Arc::new(Names::of(people.prototype()));
         Ok(Self { people, names })
     }

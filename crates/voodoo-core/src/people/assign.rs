@@ -25,7 +25,11 @@ pub(super) fn assign(costs: &[Vec<f64>], alone: f64) -> Vec<Option<usize>> {
         }
     });
     let (_, given) = kuhn_munkres_min(&matrix);
-    given.into_iter().enumerate().map(|(row, column)| (column < columns && costs[row][column] < alone).then_some(column)).collect()
+    given
+        .into_iter()
+        .enumerate()
+        .map(|(row, column)| (column < columns && costs[row][column] < alone).then_some(column))
+        .collect()
 }
 
 #[cfg(test)]

@@ -119,11 +119,7 @@ fn add(counts: &mut [f32], [first, green, last]: [u8; 3]) {
     let brightness = 0.2 * x + 0.6 * y + 0.2 * z;
     let place = |value: f32, bins: usize| (value * (bins - 1) as f32).clamp(0.0, (bins - 1) as f32);
     let difference = |value: f32| (value - brightness) / (2.0 * COLORFUL) + 0.5;
-    let at = [
-        place(brightness / 255.0, BINS[0]),
-        place(difference(x), BINS[1]),
-        place(difference(z), BINS[2]),
-    ];
+    let at = [place(brightness / 255.0, BINS[0]), place(difference(x), BINS[1]), place(difference(z), BINS[2])];
     for corner in 0..8_usize {
         let (mut index, mut share) = (0, 1.0);
         for axis in 0..3 {

@@ -84,8 +84,9 @@ impl People {
                 TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
             })?),
         };
-        let detector = Detector::new()
-            .map_err(|error| TrackError::measurement("weights", "those that come with the library", error.to_string()))?;
+        let detector = Detector::new().map_err(|error| {
+            TrackError::measurement("weights", "those that come with the library", error.to_string())
+        })?;
         Ok(Self {
             prototype,
             config: Config { threads: 1, ..config },
@@ -131,11 +132,10 @@ impl People {
             person.tracker.expect(frame.stamp, &mut person.expected);
         }
         // Who is lost explains nothing.
-        let claimants = (0..).zip(&self.persons).filter(|(_, person)| person.tracked()).map(|(number, person)| Claimant {
-            number,
-            body: person.tracker.body(),
-            poses: &person.expected,
-        });
+        let claimants = (0..)
+            .zip(&self.persons)
+            .filter(|(_, person)| person.tracked())
+            .map(|(number, person)| Claimant { number, body: person.tracker.body(), poses: &person.expected });
         self.claims.settle(frame, self.scene.known(), claimants);
     }
 
@@ -238,10 +238,14 @@ impl People {
 
     /// Somebody new.
     fn bear(&mut self, frame: &Frame, stranger: &Stranger) {
-        if self.options.limit.is_some_and(|limit| self.there().count() >= limit) || self.persons.len() >= usize::from(NOBODY) {
+        if self.options.limit.is_some_and(|limit| self.there().count() >= limit)
+            || self.persons.len() >= usize::from(NOBODY)
+        {
             return;
         }
-        let Ok(person) = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), frame.stamp) else { return };
+        let Ok(person) = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), frame.stamp) else {
+            return;
+        };
         self.persons.push(person);
         self.next_id += 1;
         self.take_up(frame, stranger, self.persons.len() - 1);

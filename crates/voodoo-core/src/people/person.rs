@@ -87,7 +87,10 @@ impl Person {
         if self.tracked() {
             self.seen = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
-            if estimate.status == Status::Tracking && frame.stamp - self.looked >= LOOK_EVERY && !frame.colors.is_empty() {
+            if estimate.status == Status::Tracking
+                && frame.stamp - self.looked >= LOOK_EVERY
+                && !frame.colors.is_empty()
+            {
                 let own = |image, pixel: usize| share.owners(image).get(pixel) == Some(&share.own);
                 self.clothes.look(frame, self.tracker.body(), &estimate.world_from_limb, own);
                 self.looked = frame.stamp;
