@@ -176,7 +176,6 @@ impl People {
         }
         self.looked = Some(frame.stamp);
         self.strangers.fade(frame.stamp);
-        self.share_out(frame);
         self.detect(frame, Wanted::Anybody);
         let mut believed = self.strangers.believed(frame.stamp);
         if let Some(region) = self.options.region {
