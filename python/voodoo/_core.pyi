@@ -280,6 +280,23 @@ class Frame:
         Raises:
             MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
         """
+    def add_color(
+        self,
+        image: npt.NDArray[np.uint8],
+        *,
+        camera: _Camera,
+        world_from_sensor: npt.ArrayLike | None = None,
+    ) -> None:
+        """Add a colour picture, by which People tells persons apart who come back; Tracker does not look at it.
+
+        Args:
+            image: (height, width, 3) uint8, channels in any order that is the same in all frames.
+            camera: its calibration, a voodoo.Camera of the same size.
+            world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
+
+        Raises:
+            MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
+        """
     def add_position(
         self,
         site: str,

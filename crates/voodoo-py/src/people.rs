@@ -9,6 +9,7 @@ use voodoo_core::people::Options;
 use voodoo_core::{Frame, People};
 
 use crate::body::PyBody;
+use crate::borrowed::ColorView;
 use crate::config::config;
 use crate::errors::IntoPy;
 use crate::estimate::{Names, PyEstimate};
@@ -43,10 +44,13 @@ impl PyPeople {
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<Vec<(usize, PyEstimate)>> {
         let borrowed = frame.borrow_for(py, self.people.prototype())?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
+        let views = frame.color_views(py);
+        let colors = views.iter().map(ColorView::image).collect::<PyResult<Vec<_>>>()?;
         let input = Frame {
             stamp: frame.stamp,
             clouds: &clouds,
             images: &images,
+            colors: &colors,
             positions: &borrowed.positions,
             rays: &borrowed.rays,
             ground: borrowed.ground,

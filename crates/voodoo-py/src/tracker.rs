@@ -88,6 +88,7 @@ impl PyTracker {
             stamp: frame.stamp,
             clouds: &clouds,
             images: &images,
+            colors: &[],
             positions: &borrowed.positions,
             rays: &borrowed.rays,
             ground: borrowed.ground,

@@ -1,7 +1,7 @@
 //! Whose surface explains each pixel of a frame.
 
 use crate::body::Body;
-use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted};
+use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::{body_box, image_window};
 use crate::observation::frame::{DepthImage, Frame};
@@ -9,6 +9,11 @@ use crate::observation::share::NOBODY;
 
 /// A surface explains what lies within this of where it is expected, metres: as far as candidates are looked for.
 const REACH: f32 = 0.20;
+
+/// Neighbours in a row stand for one another so that a row has at most about this many.
+const COLUMNS: usize = 106;
+/// On one surface depths of neighbours differ by less, metres.
+const ONE_SURFACE: f32 = 0.05;
 
 /// A body where it is expected.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +30,8 @@ pub(super) struct Claims {
     owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
     queries: Points,
-    pixels: Vec<u32>,
+    /// The first pixel that each query stands for, and how many.
+    pixels: Vec<(u32, u32)>,
     nearest: Vec<f32>,
     limb: Vec<f32>,
 }
@@ -59,8 +65,7 @@ impl Claims {
     fn claim(&mut self, number: usize, image: &DepthImage, background: &[f32], claimant: Claimant) {
         let Claimant { body, poses, .. } = claimant;
         let Some(origin) = poses.first().map(|root| root.translation) else { return };
-        let bounds = body_box(body, poses, f64::from(REACH));
-        self.gather(image, background, origin, &bounds);
+        self.gather(image, background, origin, &body_box(body, poses, f64::from(REACH)));
         let Self { owners, distances, queries, pixels, nearest, limb } = self;
         nearest.clear();
         nearest.resize(queries.len(), REACH);
@@ -68,34 +73,41 @@ impl Claims {
             own.shape.approximate_distances(&shifted(pose, origin), queries, limb);
             nearest.iter_mut().zip(limb.iter()).for_each(|(nearest, limb)| *nearest = nearest.min(*limb));
         }
-        for (pixel, distance) in pixels.iter().zip(nearest.iter()) {
-            let before = &mut distances[*pixel as usize];
-            if *distance < *before {
-                *before = *distance;
-                owners[number][*pixel as usize] = claimant.number;
+        for ((pixel, run), distance) in pixels.iter().zip(nearest.iter()) {
+            let pixel = *pixel as usize..(*pixel + *run) as usize;
+            for (before, owner) in distances[pixel.clone()].iter_mut().zip(&mut owners[number][pixel]) {
+                if *distance < *before {
+                    (*before, *owner) = (*distance, claimant.number);
+                }
             }
         }
     }
 
-    /// The returns within a box of the world that are no scene; points about `origin`.
+    /// The returns within a box of the world that are no scene, about `origin`: of neighbours on one surface the first stands for
+    /// all.
     fn gather(&mut self, image: &DepthImage, background: &[f32], origin: Vec3, bounds: &Aabb) {
         let (columns, rows) = image_window(image, &image.world_from_sensor, bounds);
-        let turn = Mat3::from_quat(image.world_from_sensor.rotation);
-        let shift = image.world_from_sensor.translation;
+        let together = (image.width / COLUMNS).max(1);
+        let scale = image.metres_per_unit as f32;
         self.queries.clear();
         self.pixels.clear();
         for row in rows {
-            for index in row * image.width + columns.start..row * image.width + columns.end {
-                let z = image.pixels.get(index) * image.metres_per_unit as f32;
-                let seen = z > 0.0 && z.is_finite();
-                if !seen || background.get(index).is_some_and(|depth| Background::holds(*depth, z)) {
-                    continue;
+            let (mut index, end) = (row * image.width + columns.start, row * image.width + columns.end);
+            while index < end {
+                let z = image.pixels.get(index) * scale;
+                let mut run = 1;
+                if z > 0.0 && z.is_finite() && !background.get(index).is_some_and(|depth| Background::holds(*depth, z)) {
+                    let last = end.min(index + together);
+                    while index + run < last && (image.pixels.get(index + run) * scale - z).abs() < ONE_SURFACE {
+                        run += 1;
+                    }
+                    let point = image.world_from_sensor * image.back_project(index, z);
+                    if bounds.contains_local_point(point) {
+                        self.queries.push((point - origin).to_array().map(|value| value as f32));
+                        self.pixels.push((index as u32, run as u32));
+                    }
                 }
-                let point = turn * image.back_project(index, z) + shift;
-                if bounds.contains_local_point(point) {
-                    self.queries.push((point - origin).to_array().map(|value| value as f32));
-                    self.pixels.push(index as u32);
-                }
+                index += run;
             }
         }
     }

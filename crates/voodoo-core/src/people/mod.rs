@@ -5,11 +5,12 @@
 
 mod assign;
 mod claims;
+mod clothes;
 mod person;
 mod scene;
 mod strangers;
 
-use crate::body::Body;
+use crate::body::{Body, Model};
 use crate::config::Config;
 use crate::detect::{Detection, Detector, Surroundings, Wanted};
 use crate::error::TrackError;
@@ -17,8 +18,10 @@ use crate::math::Aabb;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
 use crate::observation::share::{NOBODY, Share};
+use crate::relocalize::sized;
 use crate::tracker::Tracker;
 use claims::{Claimant, Claims};
+use clothes::Clothes;
 use person::Person;
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -141,8 +144,9 @@ impl People {
         let (owners, scene) = (self.claims.owners(), self.scene.known());
         let work = |(own, person): (usize, &mut Person)| {
             if person.there {
-                person.tracker.step_among(frame, Share { owners, own: own as u16, scene });
-                person.note(frame);
+                let share = Share { owners, own: own as u16, scene };
+                person.tracker.step_among(frame, share);
+                person.note(frame, share);
             }
         };
         match &self.watch.threads {
@@ -172,7 +176,6 @@ impl People {
         }
         self.looked = Some(frame.stamp);
         self.strangers.fade(frame.stamp);
-        self.share_out(frame);
         self.detect(frame, Wanted::Anybody);
         let mut believed = self.strangers.believed(frame.stamp);
         if let Some(region) = self.options.region {
@@ -206,10 +209,13 @@ impl People {
     /// Those who are believed to be persons get a tracker: their own when they are somebody who was there.
     fn welcome(&mut self, frame: &Frame, believed: &[Stranger]) {
         let absent: Vec<usize> = (0..self.persons.len()).filter(|number| !self.persons[*number].tracked()).collect();
-        let cost = |stranger: &Stranger, person: &Person| person_cost(person, stranger, frame.stamp);
         let costs: Vec<Vec<f64>> = believed
             .iter()
-            .map(|stranger| absent.iter().map(|number| cost(stranger, &self.persons[*number])).collect())
+            .map(|stranger| {
+                let clothes = self.clothes_of(frame, stranger);
+                let cost = |number: &usize| person_cost(&self.persons[*number], stranger, &clothes, frame.stamp);
+                absent.iter().map(cost).collect()
+            })
             .collect();
         for (stranger, given) in believed.iter().zip(assign::assign(&costs, NEW)) {
             match given {
@@ -217,6 +223,16 @@ impl People {
                 None => self.bear(frame, stranger),
             }
         }
+    }
+
+    /// What a stranger wears.
+    fn clothes_of(&self, frame: &Frame, stranger: &Stranger) -> Clothes {
+        let mut clothes = Clothes::default();
+        if let Some((body, poses)) = sized(&Model::new(self.prototype.clone()), &stranger.detection) {
+            let free = |image: usize, pixel: usize| self.claims.owners()[image].get(pixel) == Some(&NOBODY);
+            clothes.look(frame, &body, &poses, free);
+        }
+        clothes
     }
 
     /// Somebody new.
@@ -249,7 +265,7 @@ impl People {
             person.there = true;
             person.measure(&stranger.detection);
         }
-        person.note(frame);
+        person.note(frame, share);
     }
 
     /// Forgets who has been away for too long, and who was there for a moment only.
@@ -263,16 +279,23 @@ impl People {
 }
 
 /// Cost of somebody new.
-const NEW: f64 = 6.0;
+const NEW: f64 = 4.0;
 /// How far a person comes at once and in a second, metres.
 const COMES: [f64; 2] = [0.4, 1.2];
 /// Standard deviation of a detected person's sizes, relative.
-const SIZE_SIGMA: f64 = 0.04;
+const SIZE_SIGMA: f64 = 0.025;
+/// How unlike the clothes of one person are who is seen twice, and the spread of that.
+const CLOTHES: [f64; 2] = [0.10, 0.07];
+/// What like clothes speak for a person.
+const LIKE_CLOTHES: f64 = 3.0;
 
 /// What speaks against a stranger's being this person.
-fn person_cost(person: &Person, stranger: &Stranger, stamp: f64) -> f64 {
+fn person_cost(person: &Person, stranger: &Stranger, clothes: &Clothes, stamp: f64) -> f64 {
     let reach = COMES[0] + COMES[1] * (stamp - person.seen);
     let far = person.place.distance(stranger.place) / reach;
     let far = if far > 2.0 { f64::INFINITY } else { 0.5 * far * far };
-    far + 0.5 * (person.unlike(&stranger.detection) / SIZE_SIGMA).powi(2)
+    let size = 0.5 * (person.unlike(&stranger.detection) / SIZE_SIGMA).powi(2);
+    let unlike = person.clothes.unlike(clothes);
+    let color = unlike.map_or(0.0, |unlike| 0.5 * ((unlike - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
+    far + size + color
 }

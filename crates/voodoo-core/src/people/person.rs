@@ -1,10 +1,12 @@
 //! One of several persons: their tracker, and what is remembered of them while they are away.
 
+use super::clothes::Clothes;
 use crate::config::Config;
-use crate::detect::Detection;
+use crate::detect::{Detection, LENGTHS};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
+use crate::observation::share::Share;
 use crate::tracker::estimate::Status;
 use crate::{Body, Tracker};
 
@@ -12,6 +14,10 @@ use crate::{Body, Tracker};
 const GONE: f64 = 0.3;
 /// Who is hidden is waited for so long, seconds.
 const HIDDEN: f64 = 2.0;
+/// Number of the stature among a detection's sizes.
+const STATURE: usize = LENGTHS.len() - 1;
+/// Clothes are looked at this often at most, seconds.
+const LOOK_EVERY: f64 = 0.3;
 /// What is measured so much nearer than a place hides it, and so much farther shows that it is free, metres.
 const BEFORE: f64 = 0.08;
 
@@ -29,6 +35,9 @@ pub(super) struct Person {
     /// Sizes as the detector told them, the mean of all looks, and their number.
     sizes: Vec<f64>,
     looks: f64,
+    /// What they wear.
+    pub(super) clothes: Clothes,
+    looked: f64,
     /// Poses expected in this frame, world frame.
     pub(super) expected: Vec<Pose>,
 }
@@ -44,6 +53,8 @@ impl Person {
             place: Vec3::ZERO,
             sizes: Vec::new(),
             looks: 0.0,
+            clothes: Clothes::default(),
+            looked: f64::NEG_INFINITY,
             expected: Vec::new(),
         })
     }
@@ -63,20 +74,27 @@ impl Person {
         }
     }
 
-    /// By how much a detected person's sizes differ, relative, root of the mean square.
+    /// By how much a detected person's stature differs, relative: all sizes follow it.
     pub(super) fn unlike(&self, detection: &Detection) -> f64 {
         let sizes = detection.sizes();
-        let square = |(own, other): (&f64, f64)| (other / own).ln().powi(2);
-        let sum: f64 = self.sizes.iter().zip(&sizes).map(|(own, other)| square((own, *other))).sum();
-        (sum / sizes.len().max(1) as f64).sqrt()
+        let stature = |sizes: &[f64]| sizes.get(STATURE).copied();
+        stature(&self.sizes).zip(stature(&sizes)).map_or(0.0, |(own, other)| (other / own).ln().abs())
     }
 
     /// Notes how they came out of a frame; they are away when they are lost for too long.
-    pub(super) fn note(&mut self, frame: &Frame) {
+    pub(super) fn note(&mut self, frame: &Frame, share: Share) {
         let estimate = self.tracker.estimate();
         if self.tracked() {
             self.seen = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
+            if estimate.status == Status::Tracking
+                && frame.stamp - self.looked >= LOOK_EVERY
+                && !frame.colors.is_empty()
+            {
+                let own = |image, pixel: usize| share.owners(image).get(pixel) == Some(&share.own);
+                self.clothes.look(frame, self.tracker.body(), &estimate.world_from_limb, own);
+                self.looked = frame.stamp;
+            }
             return;
         }
         let patience = if self.hidden(frame) { HIDDEN } else { GONE };

@@ -27,6 +27,7 @@ use belief::Belief;
 use doubt::Doubt;
 use facing::Known;
 use people::People;
+pub(crate) use people::sized;
 use posture::{Place, Postures};
 use segment_motion::SegmentMotion;
 use trials::Trials;

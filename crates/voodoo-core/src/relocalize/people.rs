@@ -75,7 +75,7 @@ impl People {
 }
 
 /// A body of a detected person's sizes, like on both sides, and the pose that fits the joints best, world frame.
-pub(super) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<Pose>)> {
+pub(crate) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<Pose>)> {
     let body = with_sizes(&model.reference_body, &detection.sizes())?;
     let poses = posed(&body, detection)?;
     Some((body, poses))
