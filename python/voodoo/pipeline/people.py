@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from voodoo._core import Frame
 from voodoo.errors import MeasurementError, VoodooError
-from voodoo.measurements import RecordedFrame
+from voodoo.measurements import ColorImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate
 from voodoo.pipeline.frozen import FrozenSensors
@@ -24,7 +24,7 @@ from voodoo.tracker import Tracker
 
 
 class PeopleFrontEnd:
-    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose to be understood.
+    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose to be understood, and pictures in colour.
 
     Args:
         people: who is followed.
@@ -77,6 +77,9 @@ class PeopleFrontEnd:
             adapter = adapter_of(item)
             if adapter.kind in chosen.use and adapter.while_searching:
                 adapter.add(frame, item, context)
+            if isinstance(item, ColorImage) and adapter.kind in chosen.use:
+                # By their clothes persons are known who come back.
+                frame.add_color(item.image, camera=item.camera, world_from_sensor=item.root_from_sensor)
         return frame
 
 
