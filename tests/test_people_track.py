@@ -1,9 +1,9 @@
 """voodoo track --people: rows, files of every kind, pictures; and recordings of made-up people."""
 
 import csv
+from itertools import islice
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
@@ -21,6 +21,8 @@ from voodoo.names import SEARCHING
 from voodoo.pipeline.people import track_people
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.synthetic.people import MadeUpRecording
+from voodoo.visualization.ink import person_color
+from voodoo.visualization.overlay import Overlay
 
 
 @pytest.fixture(scope="module")
@@ -186,11 +188,23 @@ def test_readers_of_one_person_take_the_only_one_and_refuse_several(followed, tm
         Track.load(tmp_path / f"two{suffix}")
 
 
-def test_the_overlay_shows_everybody_in_a_colour_of_their_own(run):
-    assert run("--people", "any", "--out", "a.csv", "--overlay", "look").exit_code == 0
-    last = cv2.imread(str(max(Path("look").iterdir())))
-    for color in ((80, 190, 255), (255, 170, 60)):
-        assert (np.abs(last.astype(int) - color).max(axis=2) < 40).sum() > 300
+def test_the_overlay_shows_everybody_in_a_colour_of_their_own():
+    people = voodoo.People()
+    *_, last = track_people(two_people(), people)
+    bodies = {person.id: people.body(person.id) for person in last.estimate}
+    picture = Overlay(two_people()).draw_people(last.recorded, last.estimate, bodies, index=last.index)
+    assert sorted(bodies) == [1, 2]
+    for one in bodies:
+        assert (np.abs(picture.astype(int) - person_color(one)).max(axis=2) < 40).sum() > 300
+
+
+def test_the_command_line_draws_every_frame(run, monkeypatch):
+    monkeypatch.setattr(MadeUpRecording, "__len__", lambda _: 2)
+    monkeypatch.setattr(MadeUpRecording, "__iter__", lambda own, every=MadeUpRecording.__iter__: islice(every(own), 2))
+    told = run("--people", "any", "--out", "a.csv", "--overlay", "look")
+    assert told.exit_code == 0, told.output
+    assert len(list(Path("look").iterdir())) == 2
+    assert "nobody was found in 2 frames" in told.stderr
 
 
 def test_boxes_and_the_floor_reach_the_frame():
