@@ -1,8 +1,9 @@
-//! The still scene behind the body, learnt from the depth images of a camera that does not move.
+//! The still scene behind the body, learnt from the depth images of a camera.
 
 use std::ops::Range;
 
 use crate::math::{Pose, widest};
+use crate::observation::background_moved::stands;
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 
 /// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth, which the noise
@@ -23,16 +24,18 @@ pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 /// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
 #[derive(Clone, Debug, Default)]
 pub struct Background {
-    world_from_sensor: Option<Pose>,
-    width: usize,
-    depth: Vec<f32>,
+    pub(super) world_from_sensor: Option<Pose>,
+    pub(super) width: usize,
+    pub(super) depth: Vec<f32>,
+    /// The ray `(x/z, y/z)` that each depth was seen on; empty while the camera has not moved: through the middle of its pixel.
+    pub(super) rays: Vec<[f32; 2]>,
     row: usize,
 }
 
 /// The backgrounds of all depth images, in the order of the frame.
 #[derive(Clone, Debug, Default)]
 pub struct Backgrounds {
-    images: Vec<Background>,
+    pub(super) images: Vec<Background>,
 }
 
 impl Background {
@@ -47,10 +50,14 @@ impl Background {
         depth > 0.0 && z > depth - SCENE_MARGIN.0 - SCENE_MARGIN.1 * depth
     }
 
-    fn fits(&self, image: &DepthImage) -> bool {
-        self.world_from_sensor == Some(image.world_from_sensor)
-            && self.width == image.width
-            && self.depth.len() == image.pixels.len()
+    /// Whether it is that of this image: of its camera, where it stands.
+    pub(super) fn fits(&self, image: &DepthImage) -> bool {
+        self.is_sized_like(image)
+            && self.world_from_sensor.is_some_and(|known| stands(&known, &image.world_from_sensor))
+    }
+
+    pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
+        self.width == image.width && self.depth.len() == image.pixels.len()
     }
 
     /// Learns from neighbouring pixels, without a branch.
@@ -109,11 +116,13 @@ impl Backgrounds {
         }
     }
 
-    /// Makes sure that something is known, if only nothing, of every image of a frame.
-    pub(crate) fn meet(&mut self, frame: &Frame) {
-        for image in frame.images {
+    /// Makes sure that something is known, if only nothing, of every image of a frame; `moved` gets the numbers of those whose
+    /// cameras are not where they were, and whether what they had learnt was carried along.
+    pub(crate) fn meet(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
+        for (number, image) in frame.images.iter().enumerate() {
             if self.of(image).is_none() {
-                self.start_anew(image, frame);
+                let (_, carried) = self.carry(image, frame);
+                moved(number, carried);
             }
         }
     }
@@ -140,6 +149,7 @@ impl Backgrounds {
                 world_from_sensor: Some(image.world_from_sensor),
                 width: image.width,
                 depth,
+                rays: Vec::new(),
                 row: 0,
             });
         }
@@ -155,12 +165,12 @@ impl Backgrounds {
         }
     }
 
-    /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. A camera that moved
-    /// starts anew with nothing known; one that is silent in this frame is remembered.
+    /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. What a
+    /// camera learnt that moved since is carried along; one that is silent in this frame is remembered.
     pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> (Range<usize>, Range<usize>)) {
         for image in frame.images {
             let known = self.images.iter().position(|background| background.fits(image));
-            let index = known.unwrap_or_else(|| self.start_anew(image, frame));
+            let index = known.unwrap_or_else(|| self.carry(image, frame).0);
             let background = &mut self.images[index];
             let (columns, rows) = window(image);
             background.row = (background.row + 1) % ROW_STEP;
@@ -174,21 +184,6 @@ impl Backgrounds {
                 }
             }
         }
-    }
-
-    /// Nothing is known behind this image any more; in the place of a background that no image of the frame has.
-    fn start_anew(&mut self, image: &DepthImage, frame: &Frame) -> usize {
-        let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
-        let index = self.images.iter().position(gone).unwrap_or(self.images.len());
-        if index == self.images.len() {
-            self.images.push(Background::default());
-        }
-        let background = &mut self.images[index];
-        background.world_from_sensor = Some(image.world_from_sensor);
-        background.width = image.width;
-        background.depth.clear();
-        background.depth.resize(image.pixels.len(), 0.0);
-        index
     }
 }
 

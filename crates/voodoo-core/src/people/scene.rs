@@ -43,17 +43,19 @@ impl Scene {
         &self.known
     }
 
-    /// Takes up the images of a frame whose cameras were not there before: nothing is known of them.
+    /// Takes up the images of a frame whose cameras were not there before: nothing is known of them, unless they came from near by.
     pub(super) fn meet(&mut self, frame: &Frame) {
         self.images.resize_with(frame.images.len(), Tentative::default);
         for (image, tentative) in frame.images.iter().zip(&mut self.images) {
-            if self.known.of(image).is_none() {
-                (tentative.since, tentative.filled) = (None, false);
-            }
             tentative.depth.resize(image.pixels.len(), 0.0);
             tentative.looks.resize(image.pixels.len(), 0);
         }
-        self.known.meet(frame);
+        let images = &mut self.images;
+        self.known.meet(frame, |number, carried| {
+            if !carried {
+                (images[number].since, images[number].filled) = (None, false);
+            }
+        });
     }
 
     /// Whether the camera of an image has been where it is for long enough: what stood there was looked at.
