@@ -6,13 +6,16 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.config import Config
-from voodoo.errors import BodyError, ConfigError
+from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.model.body import Body, checked_joints
 
-__all__ = ["People", "PeopleEstimate", "Person"]
+__all__ = ["Followed", "People", "PeopleEstimate", "Person"]
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,11 @@ class People:
         self._estimate = PeopleEstimate(math.nan, ())
 
     @property
+    def prototype(self) -> Body:
+        """What every new person gets a copy of."""
+        return self._prototype
+
+    @property
     def estimate(self) -> PeopleEstimate:
         """The last one; at first with NaN as its stamp and nobody."""
         return self._estimate
@@ -123,12 +131,17 @@ class People:
             MeasurementError: time not after the last frame, or a measurement that cannot be used.
             BodyError: a frame names a limb or site that is not in the body.
         """
+        wrong = sorted({other.stamp for other in (own or {}).values()} - {frame.stamp})
+        if wrong:
+            raise MeasurementError(f"own: expected frames with the stamp {frame.stamp} s, found {wrong[0]} s")
         found = self._core.step(frame, list((own or {}).items()))
         self._estimate = PeopleEstimate(frame.stamp, tuple(Person(number, estimate) for number, estimate in found))
         return self._estimate
 
     def add(self, joints: Mapping[str, Sequence[float]], *, fit_sizes: bool = True) -> int:
-        """Follow somebody whose place is known; their number. Who is seen in depth images need not be added.
+        """Follow somebody whose place is known; their number, which is that of who was lost or away and can have come there.
+
+        Who is seen in depth images need not be added.
 
         Args:
             joints: site name -> (x, y, z) [m] in the world frame, as for `Tracker.reset`.
@@ -155,6 +168,48 @@ class People:
             there = ", ".join(str(other.id) for other in self._estimate) or "nobody"
             raise BodyError(f"person: expected one of those who are there ({there}), found {person}")
         return Body(core)
+
+
+class Followed:
+    """One of those who are there, asked as a `Tracker` is; valid until the next step.
+
+    Args:
+        people: who follows them.
+        number: of the person.
+    """
+
+    def __init__(self, people: People, number: int) -> None:
+        """Ask `people` about somebody."""
+        self._people = people
+        self._number = number
+
+    @property
+    def body(self) -> Body:
+        """The body in their sizes."""
+        return self._people.body(self._number)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The last estimate.
+
+        Raises:
+            BodyError: they are not there.
+        """
+        found = self._people._core.estimate(self._number)
+        if found is None:
+            raise BodyError(f"person: expected one of those who are there, found {self._number}")
+        return found
+
+    def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+        """See Tracker.limb_distances."""
+        found = self._people._core.limb_distances(self._number, points)
+        if found is None:
+            raise BodyError(f"person: expected one of those who are there, found {self._number}")
+        return found
+
+    def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+        """See Tracker.distance."""
+        return np.asarray(self.limb_distances(points).min(axis=0))
 
 
 def _box(region: tuple[Sequence[float], Sequence[float]] | None) -> tuple[list[float], list[float]] | None:

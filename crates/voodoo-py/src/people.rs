@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use numpy::PyArray2;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::{Aabb, Vec3};
@@ -9,6 +11,7 @@ use voodoo_core::observation::frame::{Cloud, PositionRelation, RayRelation};
 use voodoo_core::people::Options;
 use voodoo_core::{Frame, People};
 
+use crate::arrays::PointArray;
 use crate::body::PyBody;
 use crate::borrowed::{Borrowed, ColorView};
 use crate::config::config;
@@ -91,6 +94,26 @@ impl PyPeople {
     /// Follows these numbers alone; None: everybody.
     fn only(&mut self, ids: Option<Vec<usize>>) {
         self.people.only(ids);
+    }
+
+    /// Signed distances of world points `(N, 3)` to every limb of a person who is there, limb by limb; None: they are not there.
+    fn limb_distances<'py>(
+        &self,
+        py: Python<'py>,
+        id: usize,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        let array = PointArray::new("points", points)?;
+        let view = array.view(py);
+        let Some((_, tracker)) = self.people.there().find(|(there, _)| *there == id) else { return Ok(None) };
+        let distances = tracker.limb_distances(view.slice()?).map_err(|error| error.into_py(py))?;
+        PyArray2::from_vec2(py, &distances).map(Some).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The last estimate of a person who is there.
+    fn estimate(&self, id: usize) -> Option<PyEstimate> {
+        let (_, tracker) = self.people.there().find(|(there, _)| *there == id)?;
+        Some(PyEstimate { estimate: tracker.estimate().clone(), names: self.names.clone(), sources: Vec::new() })
     }
 
     /// The body of a person who is there, in their sizes.

@@ -98,13 +98,21 @@ impl People {
         self.part();
     }
 
-    /// Somebody is where these positions of named sites say (index of the site, world position); their number. On error nobody
-    /// came.
+    /// Somebody is where these positions of named sites say (index of the site, world position): who was lost or away and can have
+    /// come there, or somebody new; their number. On error nobody came.
     pub fn add(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<usize, TrackError> {
         let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
         let mut person = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), stamp)?;
         person.tracker.reset(positions, fit_sizes)?;
         person.there = true;
+        person.place = person.tracker.estimate().world_from_limb.first().map_or(Vec3::ZERO, |root| root.translation);
+        let far = |known: &Person| came_from(known, person.place, stamp);
+        let known = self.persons.iter_mut().filter(|known| !known.tracked() && far(known) < NEW);
+        if let Some(known) = known.min_by(|a, b| far(a).total_cmp(&far(b))) {
+            known.tracker.reset(positions, false)?;
+            (known.there, known.place, known.seen) = (true, person.place, stamp);
+            return Ok(known.id);
+        }
         self.persons.push(person);
         self.next_id += 1;
         Ok(self.next_id - 1)
@@ -301,11 +309,16 @@ const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// What like clothes speak for a person.
 const LIKE_CLOTHES: f64 = 3.0;
 
+/// What speaks against a person's having come to a place.
+fn came_from(person: &Person, place: Vec3, stamp: f64) -> f64 {
+    let reach = COMES[0] + COMES[1] * (stamp - person.seen);
+    let far = person.place.distance(place) / reach;
+    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far }
+}
+
 /// What speaks against a stranger's being this person.
 fn person_cost(person: &Person, stranger: &Stranger, clothes: &Clothes, stamp: f64) -> f64 {
-    let reach = COMES[0] + COMES[1] * (stamp - person.seen);
-    let far = person.place.distance(stranger.place) / reach;
-    let far = if far > 2.0 { f64::INFINITY } else { 0.5 * far * far };
+    let far = came_from(person, stranger.place, stamp);
     let size = 0.5 * (person.unlike(&stranger.detection) / SIZE_SIGMA).powi(2);
     let unlike = person.clothes.unlike(clothes);
     let color = unlike.map_or(0.0, |unlike| 0.5 * ((unlike - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
