@@ -14,6 +14,7 @@ from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.people_keypoints import PeopleKeypoints
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import Context, Memory, adapter_of
 from voodoo.sensors.gating import SiteGate, SitePredictor
@@ -24,7 +25,7 @@ from voodoo.tracker import Tracker
 
 
 class PeopleFrontEnd:
-    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose to be understood, and pictures in colour.
+    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose, pictures in colour, keypoints.
 
     Args:
         people: who is followed.
@@ -36,6 +37,7 @@ class PeopleFrontEnd:
         self.people = people
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
+        self.keypoints = PeopleKeypoints(people, self.settings)
         self._frozen = FrozenSensors()
         # Adapters ask who is tracked; nobody in particular is.
         self._nobody = Tracker(Body.human())
@@ -46,17 +48,21 @@ class PeopleFrontEnd:
         Raises:
             MeasurementError: a measurement that cannot be used; all is as it was.
         """
-        memory, frozen = copy(self.memory), copy(self._frozen)
+        memory, frozen, keypoints = copy(self.memory), copy(self._frozen), copy(self.keypoints)
         try:
-            return self.people.step(self.frame(recorded))
+            frame = self.frame(recorded)
+            own = self.keypoints.frames(recorded.stamp, self._alive)
+            estimate = self.people.step(frame, own=own)
         except BaseException:
-            self.memory, self._frozen = memory, frozen
+            self.memory, self._frozen, self.keypoints = memory, frozen, keypoints
             raise
+        self.keypoints.learn(estimate)
+        return estimate
 
     def frame(self, recorded: RecordedFrame) -> Frame:
         """The frame of all persons, without stepping."""
         chosen = self.settings
-        alive = self._frozen.without(recorded.measurements, use=chosen.use)
+        alive = self._alive = self._frozen.without(recorded.measurements, use=chosen.use)
         frame = Frame(stamp=recorded.stamp)
         for low, high in chosen.exclude:
             frame.exclude(low, high)
@@ -77,8 +83,8 @@ class PeopleFrontEnd:
             adapter = adapter_of(item)
             if adapter.kind in chosen.use and adapter.while_searching:
                 adapter.add(frame, item, context)
-            if isinstance(item, ColorImage) and adapter.kind in chosen.use:
-                # By their clothes persons are known who come back.
+            elif isinstance(item, ColorImage) and adapter.kind in chosen.use:
+                # Clothes tell persons apart.
                 frame.add_color(item.image, camera=item.camera, world_from_sensor=item.root_from_sensor)
         return frame
 
@@ -107,7 +113,7 @@ def track_people(
 
     Args:
         recording: read while iterating.
-        people: who is followed; somebody new is found in depth images.
+        people: who is followed; somebody new is found in depth images, and in keypoints of several cameras.
         settings: what is used and how; None means all there is, see FrontEndSettings.of.
 
     Raises:
@@ -115,9 +121,9 @@ def track_people(
     """
     chosen = settings or FrontEndSettings.of(recording)
     has = {kind for sensor in recording.info().sensors if (kind := input_of(sensor.kind)) is not None}
-    if "depth" not in has & set(chosen.use):
+    if not {"depth", "keypoints"} & has & set(chosen.use):
         raise MeasurementError(
-            f"{recording.name}: several people are found in depth images, expected some, found "
+            f"{recording.name}: several people are found in depth images or keypoints, expected some, found "
             f"{', '.join(sorted(has & set(chosen.use))) or 'none'}"
         )
     front_end = PeopleFrontEnd(people, settings=chosen)

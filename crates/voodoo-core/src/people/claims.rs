@@ -96,7 +96,8 @@ impl Claims {
             while index < end {
                 let z = image.pixels.get(index) * scale;
                 let mut run = 1;
-                if z > 0.0 && z.is_finite() && !background.get(index).is_some_and(|depth| Background::holds(*depth, z)) {
+                if z > 0.0 && z.is_finite() && !background.get(index).is_some_and(|depth| Background::holds(*depth, z))
+                {
                     let last = end.min(index + together);
                     while index + run < last && (image.pixels.get(index + run) * scale - z).abs() < ONE_SURFACE {
                         run += 1;

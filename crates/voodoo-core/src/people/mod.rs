@@ -9,12 +9,13 @@ mod clothes;
 mod person;
 mod scene;
 mod strangers;
+mod wanted;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
 use crate::detect::{Detection, Detector, Surroundings, Wanted};
 use crate::error::TrackError;
-use crate::math::Aabb;
+use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
 use crate::observation::share::{NOBODY, Share};
@@ -27,6 +28,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 use scene::Scene;
 use strangers::{Stranger, Strangers};
+pub use wanted::Options;
 
 /// The detector looks at what nobody explains this often at most, seconds.
 const LOOK_EVERY: f64 = 0.06;
@@ -34,23 +36,6 @@ const LOOK_EVERY: f64 = 0.06;
 const ONE_BODY: f64 = 0.25;
 /// Who was there for less than this is not remembered, seconds.
 const REMEMBERED: f64 = 1.0;
-
-/// Who is looked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// Persons that are followed at the same time, at most; none: any number.
-    pub limit: Option<usize>,
-    /// Who is away for longer is somebody new when they come back, seconds.
-    pub forget_after: f64,
-    /// Where persons are, world frame; none: everywhere.
-    pub region: Option<Aabb>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { limit: None, forget_after: 60.0, region: None }
-    }
-}
 
 /// Follows several persons through frames.
 #[derive(Debug)]
@@ -65,12 +50,6 @@ pub struct People {
     strangers: Strangers,
     detector: Detector,
     looked: Option<f64>,
-    watch: Watch,
-}
-
-/// Time, and the threads.
-#[derive(Debug)]
-struct Watch {
     stamp: Option<f64>,
     threads: Option<ThreadPool>,
 }
@@ -98,7 +77,8 @@ impl People {
             strangers: Strangers::default(),
             detector,
             looked: None,
-            watch: Watch { stamp: None, threads },
+            stamp: None,
+            threads,
         })
     }
 
@@ -112,13 +92,40 @@ impl People {
         self.persons.iter().filter(|person| person.there).map(|person| (person.id, &person.tracker))
     }
 
-    /// The next instant. On error everything is as before.
-    pub fn step(&mut self, frame: &Frame) -> Result<(), TrackError> {
-        frame.check(&self.prototype, self.watch.stamp)?;
-        self.watch.stamp = Some(frame.stamp);
+    /// Follows these numbers and nobody else from now on; with `None` everybody.
+    pub fn only(&mut self, ids: Option<Vec<usize>>) {
+        self.options.only = ids;
+        self.part();
+    }
+
+    /// Somebody is where these positions of named sites say (index of the site, world position): who was lost or away and can have
+    /// come there, or somebody new; their number. On error nobody came.
+    pub fn add(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<usize, TrackError> {
+        let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
+        let mut person = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), stamp)?;
+        person.tracker.reset(positions, fit_sizes)?;
+        person.there = true;
+        person.place = person.tracker.estimate().world_from_limb.first().map_or(Vec3::ZERO, |root| root.translation);
+        let far = |known: &Person| came_from(known, person.place, stamp);
+        let known = self.persons.iter_mut().filter(|known| !known.tracked() && far(known) < NEW);
+        if let Some(known) = known.min_by(|a, b| far(a).total_cmp(&far(b))) {
+            known.tracker.reset(positions, false)?;
+            (known.there, known.place, known.seen) = (true, person.place, stamp);
+            return Ok(known.id);
+        }
+        self.persons.push(person);
+        self.next_id += 1;
+        Ok(self.next_id - 1)
+    }
+
+    /// The next instant; `own` has the frames of those of whom more was measured than of others. On error everything is as before.
+    pub fn step(&mut self, frame: &Frame, own: &[(usize, Frame)]) -> Result<(), TrackError> {
+        frame.check(&self.prototype, self.stamp)?;
+        own.iter().try_for_each(|(_, frame)| frame.check(&self.prototype, self.stamp))?;
+        self.stamp = Some(frame.stamp);
         self.scene.meet(frame);
         self.share_out(frame);
-        self.follow(frame);
+        self.follow(frame, own);
         self.scene.learn(frame, self.claims.owners());
         self.part();
         self.look(frame);
@@ -140,32 +147,31 @@ impl People {
     }
 
     /// Every tracker by its share.
-    fn follow(&mut self, frame: &Frame) {
+    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
         let (owners, scene) = (self.claims.owners(), self.scene.known());
-        let work = |(own, person): (usize, &mut Person)| {
+        let work = |(number, person): (usize, &mut Person)| {
             if person.there {
-                let share = Share { owners, own: own as u16, scene };
-                person.tracker.step_among(frame, share);
+                let share = Share { owners, own: number as u16, scene };
+                let of = own.iter().find(|(id, _)| *id == person.id).map_or(frame, |(_, frame)| frame);
+                person.tracker.step_among(of, share);
                 person.note(frame, share);
             }
         };
-        match &self.watch.threads {
+        match &self.threads {
             // Every person is worked on by one thread: the result does not depend on their number.
             Some(pool) => pool.install(|| self.persons.par_iter_mut().enumerate().for_each(work)),
             None => self.persons.iter_mut().enumerate().for_each(work),
         }
     }
 
-    /// Of two on one body the younger goes; who leaves the region goes.
+    /// Of two on one body the younger goes; who leaves the region goes, and who is not wanted.
     fn part(&mut self) {
         for younger in 0..self.persons.len() {
             let place = self.persons[younger].place;
             let same = |older: &Person| older.tracked() && older.place.distance(place) < ONE_BODY;
             let twice = self.persons[younger].tracked() && self.persons[..younger].iter().any(same);
-            let outside = self.options.region.is_some_and(|region| !region.contains_local_point(place));
-            if twice || outside {
-                self.persons[younger].there = false;
-            }
+            let wanted = self.options.allows(place) && self.options.wants(self.persons[younger].id);
+            self.persons[younger].there &= wanted && !twice;
         }
     }
 
@@ -178,9 +184,7 @@ impl People {
         self.strangers.fade(frame.stamp);
         self.detect(frame, Wanted::Anybody);
         let mut believed = self.strangers.believed(frame.stamp);
-        if let Some(region) = self.options.region {
-            believed.retain(|stranger| region.contains_local_point(stranger.place));
-        }
+        believed.retain(|stranger| self.options.allows(stranger.place));
         if !believed.is_empty() {
             self.welcome(frame, &believed);
         }
@@ -206,21 +210,33 @@ impl People {
         }
     }
 
-    /// Those who are believed to be persons get a tracker: their own when they are somebody who was there.
+    /// Those who are believed to be persons get a tracker: their own when they are somebody who was there. Who they are is asked
+    /// together with all others who are seen.
     fn welcome(&mut self, frame: &Frame, believed: &[Stranger]) {
         let absent: Vec<usize> = (0..self.persons.len()).filter(|number| !self.persons[*number].tracked()).collect();
-        let costs: Vec<Vec<f64>> = believed
-            .iter()
-            .map(|stranger| {
-                let clothes = self.clothes_of(frame, stranger);
-                let cost = |number: &usize| person_cost(&self.persons[*number], stranger, &clothes, frame.stamp);
-                absent.iter().map(cost).collect()
-            })
-            .collect();
+        if !absent.is_empty() {
+            self.detect(frame, Wanted::All);
+            self.strangers.leave_out(believed);
+        }
+        let cost = |stranger: &Stranger| {
+            let clothes = self.clothes_of(frame, stranger);
+            let cost = |number: &usize| person_cost(&self.persons[*number], stranger, &clothes, frame.stamp);
+            absent.iter().map(cost).collect()
+        };
+        let costs: Vec<Vec<f64>> = believed.iter().chain(self.strangers.seen_at(frame.stamp)).map(cost).collect();
         for (stranger, given) in believed.iter().zip(assign::assign(&costs, NEW)) {
-            match given {
-                Some(column) => self.take_up(frame, stranger, absent[column]),
+            let known = given.map(|column| absent[column]);
+            let others: Vec<(usize, Vec3)> = (0..self.persons.len())
+                .filter(|number| self.persons[*number].there && Some(*number) != known)
+                .map(|number| (number, self.persons[number].place))
+                .collect();
+            let Some(leaves) = self.options.room(frame, stranger.place, &others) else { continue };
+            let came = match known {
+                Some(number) => self.take_up(frame, stranger, number),
                 None => self.bear(frame, stranger),
+            };
+            if let Some(leaves) = leaves.filter(|_| came) {
+                self.persons[leaves].there = false;
             }
         }
     }
@@ -235,37 +251,41 @@ impl People {
         clothes
     }
 
-    /// Somebody new.
-    fn bear(&mut self, frame: &Frame, stranger: &Stranger) {
-        if self.options.limit.is_some_and(|limit| self.there().count() >= limit)
-            || self.persons.len() >= usize::from(NOBODY)
-        {
-            return;
+    /// Somebody new, if they are there.
+    fn bear(&mut self, frame: &Frame, stranger: &Stranger) -> bool {
+        let full = self.persons.len() >= usize::from(NOBODY);
+        if full || !self.options.wants(self.next_id) {
+            return false;
         }
-        let Ok(person) = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), frame.stamp) else {
-            return;
-        };
+        let person = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), frame.stamp);
+        let Ok(person) = person else { return false };
         self.persons.push(person);
-        self.next_id += 1;
-        self.take_up(frame, stranger, self.persons.len() - 1);
-        if !self.persons.last().is_some_and(|person| person.there) {
+        let came = self.take_up(frame, stranger, self.persons.len() - 1);
+        if came {
+            self.next_id += 1;
+        } else {
             self.persons.pop();
-            self.next_id -= 1;
         }
+        came
     }
 
-    /// Starts a person's tracker where a stranger is seen.
-    fn take_up(&mut self, frame: &Frame, stranger: &Stranger, number: usize) {
+    /// Starts a person's tracker where a stranger is seen; whether they are there.
+    fn take_up(&mut self, frame: &Frame, stranger: &Stranger, number: usize) -> bool {
         self.scene.release(frame, stranger.image, &stranger.pixels);
         let (owners, scene) = (self.claims.owners(), self.scene.known());
         let person = &mut self.persons[number];
+        if !self.options.wants(person.id) {
+            return false;
+        }
         let known = person.born < frame.stamp;
         let share = Share { owners, own: number as u16, scene };
-        if person.tracker.begin(frame, share, &stranger.detection, known) {
+        let came = person.tracker.begin(frame, share, &stranger.detection, known);
+        if came {
             person.there = true;
             person.measure(&stranger.detection);
         }
         person.note(frame, share);
+        came
     }
 
     /// Forgets who has been away for too long, and who was there for a moment only.
@@ -289,11 +309,16 @@ const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// What like clothes speak for a person.
 const LIKE_CLOTHES: f64 = 3.0;
 
+/// What speaks against a person's having come to a place.
+fn came_from(person: &Person, place: Vec3, stamp: f64) -> f64 {
+    let reach = COMES[0] + COMES[1] * (stamp - person.seen);
+    let far = person.place.distance(place) / reach;
+    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far }
+}
+
 /// What speaks against a stranger's being this person.
 fn person_cost(person: &Person, stranger: &Stranger, clothes: &Clothes, stamp: f64) -> f64 {
-    let reach = COMES[0] + COMES[1] * (stamp - person.seen);
-    let far = person.place.distance(stranger.place) / reach;
-    let far = if far > 2.0 { f64::INFINITY } else { 0.5 * far * far };
+    let far = came_from(person, stranger.place, stamp);
     let size = 0.5 * (person.unlike(&stranger.detection) / SIZE_SIGMA).powi(2);
     let unlike = person.clothes.unlike(clothes);
     let color = unlike.map_or(0.0, |unlike| 0.5 * ((unlike - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);

@@ -47,6 +47,17 @@ impl Strangers {
         self.seen.push(Stranger { place, detection, image, pixels, sum, stamp });
     }
 
+    /// Those seen in the frame of this time.
+    pub(super) fn seen_at(&self, stamp: f64) -> impl Iterator<Item = &Stranger> {
+        self.seen.iter().filter(move |stranger| stranger.stamp == stamp)
+    }
+
+    /// Forgets those who are somebody else of these.
+    pub(super) fn leave_out(&mut self, others: &[Stranger]) {
+        let same = |a: &Stranger, b: &Stranger| a.place.distance(b.place) < SAME_PERSON;
+        self.seen.retain(|stranger| !others.iter().any(|other| same(stranger, other)));
+    }
+
     /// Takes out those seen in the frame of this time who are persons for sure.
     pub(super) fn believed(&mut self, stamp: f64) -> Vec<Stranger> {
         let sure = |stranger: &mut Stranger| stranger.stamp == stamp && stranger.sum >= ENOUGH_ODDS;
