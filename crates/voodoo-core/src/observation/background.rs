@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use crate::math::{Pose, widest};
-use crate::observation::background_moved::stands;
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 
 /// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth, which the noise
@@ -18,6 +17,8 @@ const LEARNING: f32 = 0.1;
 /// One row of this many is learnt in a frame, for speed: the scene stands still.
 const ROW_STEP: usize = 8;
 
+/// A camera that moved by no more than this stands: metres, and radians; the odometry of a robot that stands wavers by less.
+const STANDS: (f64, f64) = (0.003, 0.0015);
 /// Stands for the depth at pixels that show another body: whatever returns there belongs to what is not this one.
 pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 
@@ -36,6 +37,17 @@ pub struct Background {
 #[derive(Clone, Debug, Default)]
 pub struct Backgrounds {
     pub(super) images: Vec<Background>,
+}
+
+/// How far apart two poses are: metres, and radians.
+pub(super) fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+    (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
+}
+
+/// Whether a camera stands where it was.
+fn stands(a: &Pose, b: &Pose) -> bool {
+    let (metres, radians) = apart(a, b);
+    a == b || (metres <= STANDS.0 && radians <= STANDS.1)
 }
 
 impl Background {

@@ -1,28 +1,15 @@
 //! A scene that was learnt by a camera which has moved since: its surfaces stay where they are in the world.
 
-use super::background::{Background, Backgrounds};
+use super::background::{Background, Backgrounds, apart};
 use super::frame::{DepthImage, Frame};
 use crate::math::Pose;
 
-/// A camera that moved by no more than this stands: metres, and radians; the odometry of a robot that stands wavers by less.
-const STANDS: (f64, f64) = (0.003, 0.0015);
 /// A camera that moved by more than this from one image to the next is another one: metres, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
 /// Surfaces nearer to the camera plane are not carried along, metres: no sensor measures there.
 const NEAREST: f32 = 0.1;
 /// Two sides of a crack that differ by less, metres, belong to one surface.
 const ONE_SURFACE: f32 = 0.15;
-
-/// How far apart two poses are: metres, and radians.
-fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
-    (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
-}
-
-/// Whether a camera stands where it was.
-pub(super) fn stands(a: &Pose, b: &Pose) -> bool {
-    let (metres, radians) = apart(a, b);
-    a == b || (metres <= STANDS.0 && radians <= STANDS.1)
-}
 
 impl Backgrounds {
     /// The number of a background for an image that has none, and whether anything is known there: what the same camera has learnt elsewhere is carried to where it is
