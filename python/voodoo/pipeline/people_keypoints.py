@@ -75,7 +75,7 @@ class PeopleKeypoints:
         shared = [shared_out(item, predicted) for item in images]
         pictures = {number: [each.of[number] for each in shared if number in each.of] for number in predicted}
         for number, joints in self._come(stamp, [each.rest for each in shared], predicted).items():
-            predicted[number] = joints
+            predicted[number] = dict(joints)
             rest = [shared_out(each.rest, {number: joints}).of for each in shared]
             pictures[number] = [of[number] for of in rest if number in of]
         return {

@@ -17,11 +17,11 @@ const LEARNING: f32 = 0.1;
 /// One row of this many is learnt in a frame, for speed: the scene stands still.
 const ROW_STEP: usize = 8;
 
+/// A camera that moved by no more than this stands: metres, and radians; the odometry of a robot that stands wavers by less.
+const STANDS: (f64, f64) = (0.003, 0.0015);
 /// Stands for the depth at pixels that show another body: whatever returns there belongs to what is not this one.
 pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 
-/// A camera that moved by no more than this stands: metres, and radians; the odometry of a robot that stands wavers by less.
-const STANDS: (f64, f64) = (0.003, 0.0015);
 /// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
 #[derive(Clone, Debug, Default)]
 pub struct Background {
@@ -37,6 +37,17 @@ pub struct Background {
 #[derive(Clone, Debug, Default)]
 pub struct Backgrounds {
     pub(super) images: Vec<Background>,
+}
+
+/// How far apart two poses are: metres, and radians.
+pub(super) fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+    (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
+}
+
+/// Whether a camera stands where it was.
+fn stands(a: &Pose, b: &Pose) -> bool {
+    let (metres, radians) = apart(a, b);
+    a == b || (metres <= STANDS.0 && radians <= STANDS.1)
 }
 
 impl Background {
@@ -80,17 +91,6 @@ impl Background {
             },
         );
     }
-}
-
-/// How far apart two poses are: metres, and radians.
-pub(super) fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
-    (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
-}
-
-/// Whether a camera stands where it was.
-fn stands(a: &Pose, b: &Pose) -> bool {
-    let (metres, radians) = apart(a, b);
-    a == b || (metres <= STANDS.0 && radians <= STANDS.1)
 }
 
 /// What is known of a pixel after a return at `z`.

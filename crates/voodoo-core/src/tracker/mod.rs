@@ -1,6 +1,5 @@
 //! The tracker: `step` names the method.
 
-mod among;
 mod assess;
 mod edits;
 pub mod estimate;
@@ -9,6 +8,7 @@ mod report;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
+use crate::detect::Detection;
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
@@ -167,6 +167,26 @@ impl Tracker {
         if self.relocalizer.nobody(frame.stamp, lost) {
             self.stop(frame.stamp);
         }
+    }
+
+    /// The pose at the next instant by its share of a frame, which was checked.
+    pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
+        if self.is_started() {
+            self.follow(frame, Some(share));
+        }
+        &self.estimate
+    }
+
+    /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
+    pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detection: &Detection, known: bool) -> bool {
+        let Some((body, poses)) = self.relocalizer.placed(&self.model, detection, known) else { return false };
+        self.restart(body, poses, !known);
+        self.assessor.doubt_pose();
+        if !known {
+            self.sizes.restart(&self.model, Start::Detected, &self.config);
+        }
+        self.follow(frame, Some(share));
+        !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
     /// There is nobody: from the next frame on somebody is looked for.
