@@ -7,9 +7,9 @@ use crate::math::Pose;
 /// A camera that moved by more than this from one image to the next is another one: metres, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
 /// Surfaces nearer to the camera plane are not carried along, metres: no sensor measures there.
-const NEAREST: f32 = 0.1;
+const NEAREST_CARRIED: f32 = 0.1;
 /// Two sides of a crack that differ by less, metres, belong to one surface.
-const ONE_SURFACE: f32 = 0.15;
+const ONE_CARRIED: f32 = 0.15;
 
 impl Backgrounds {
     /// The number of a background for an image that has none, and whether anything is known there: what the same camera has learnt elsewhere is carried to where it is
@@ -67,7 +67,7 @@ impl Background {
             let [x, y] = old_rays.get(index).copied().filter(|ray| *ray != NO_RAY).unwrap_or_else(centre);
             let place =
                 [0, 1, 2].map(|axis| z * (turn[0][axis] * x + turn[1][axis] * y + turn[2][axis]) + turn[3][axis]);
-            if place[2] < NEAREST {
+            if place[2] < NEAREST_CARRIED {
                 continue;
             }
             let ray = [place[0] / place[2], place[1] / place[2]];
@@ -89,7 +89,7 @@ impl Background {
     fn close_cracks(&mut self, step: usize) {
         for index in step..self.depth.len().saturating_sub(step) {
             let (a, b) = (self.depth[index - step], self.depth[index + step]);
-            if self.depth[index] == 0.0 && a > 0.0 && b > 0.0 && (a - b).abs() < ONE_SURFACE {
+            if self.depth[index] == 0.0 && a > 0.0 && b > 0.0 && (a - b).abs() < ONE_CARRIED {
                 self.depth[index] = 0.5 * (a + b);
             }
         }
