@@ -9,7 +9,7 @@ const LEAPS: (f64, f64) = (0.5, 0.5);
 /// Surfaces nearer to the camera plane are not carried along, metres: no sensor measures there.
 const NEAREST_CARRIED: f32 = 0.1;
 /// Two sides of a crack that differ by less, metres, belong to one surface.
-const ONE_CARRIED: f32 = 0.15;
+const CRACK_STEP: f32 = 0.15;
 
 impl Backgrounds {
     /// The number of a background for an image that has none, and whether anything is known there: what the same camera has learnt elsewhere is carried to where it is
@@ -89,7 +89,7 @@ impl Background {
     fn close_cracks(&mut self, step: usize) {
         for index in step..self.depth.len().saturating_sub(step) {
             let (a, b) = (self.depth[index - step], self.depth[index + step]);
-            if self.depth[index] == 0.0 && a > 0.0 && b > 0.0 && (a - b).abs() < ONE_CARRIED {
+            if self.depth[index] == 0.0 && a > 0.0 && b > 0.0 && (a - b).abs() < CRACK_STEP {
                 self.depth[index] = 0.5 * (a + b);
             }
         }
