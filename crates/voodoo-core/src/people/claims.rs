@@ -13,7 +13,7 @@ const REACH: f32 = 0.20;
 /// Neighbours in a row stand for one another so that a row has at most about this many.
 const COLUMNS: usize = 106;
 /// On one surface depths of neighbours differ by less, metres.
-const ONE_SURFACE: f32 = 0.05;
+const LIKE_DEPTH: f32 = 0.05;
 
 /// A body where it is expected.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +99,7 @@ impl Claims {
                 if z > 0.0 && z.is_finite() && !background.get(index).is_some_and(|depth| Background::holds(*depth, z))
                 {
                     let last = end.min(index + together);
-                    while index + run < last && (image.pixels.get(index + run) * scale - z).abs() < ONE_SURFACE {
+                    while index + run < last && (image.pixels.get(index + run) * scale - z).abs() < LIKE_DEPTH {
                         run += 1;
                     }
                     let point = image.world_from_sensor * image.back_project(index, z);

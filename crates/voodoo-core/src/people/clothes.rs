@@ -16,9 +16,9 @@ const BINS: [usize; 3] = [5, 9, 9];
 /// Range of the colour differences that the bins cover: clothes are seldom more colourful.
 const COLORFUL: f32 = 80.0;
 /// A look at fewer places than this tells nothing.
-const LEAST: usize = 15;
+const FEWEST_PLACES: usize = 15;
 /// Share of a new look in what is remembered, at least.
-const LEARNING: f32 = 0.1;
+const NEW_LOOK: f32 = 0.1;
 
 /// How often each colour was seen; sums to one.
 #[derive(Clone, Debug, Default)]
@@ -61,7 +61,7 @@ impl Clothes {
                     }
                 }
             }
-            if seen >= LEAST {
+            if seen >= FEWEST_PLACES {
                 histogram.take(counts, seen as f32);
             }
         }
@@ -84,7 +84,7 @@ impl Histogram {
     fn take(&mut self, counts: &[f32], total: f32) {
         self.shares.resize(counts.len(), 0.0);
         self.looks += 1.0;
-        let new = LEARNING.max(1.0 / self.looks);
+        let new = NEW_LOOK.max(1.0 / self.looks);
         for (share, count) in self.shares.iter_mut().zip(counts) {
             *share += new * (count / total - *share);
         }

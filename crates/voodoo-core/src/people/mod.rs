@@ -35,7 +35,7 @@ const LOOK_EVERY: f64 = 0.06;
 /// Two bodies whose roots are nearer than this are one, metres.
 const ONE_BODY: f64 = 0.25;
 /// Who was there for less than this is not remembered, seconds.
-const REMEMBERED: f64 = 1.0;
+const KNOWN_AFTER: f64 = 1.0;
 
 /// Follows several persons through frames.
 #[derive(Debug)]
@@ -177,14 +177,16 @@ impl People {
 
     /// Looks for somebody at what nobody explains.
     fn look(&mut self, frame: &Frame) {
-        if self.looked.is_some_and(|last| frame.stamp - last < LOOK_EVERY) {
+        let everybody_there = self.options.only.as_ref().is_some_and(|only| {
+            only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.tracked()))
+        });
+        if everybody_there || self.looked.is_some_and(|last| frame.stamp - last < LOOK_EVERY) {
             return;
         }
         self.looked = Some(frame.stamp);
         self.strangers.fade(frame.stamp);
         self.detect(frame, Wanted::Anybody);
-        let mut believed = self.strangers.believed(frame.stamp);
-        believed.retain(|stranger| self.options.allows(stranger.place));
+        let believed = self.strangers.believed(frame.stamp);
         if !believed.is_empty() {
             self.welcome(frame, &believed);
         }
@@ -203,11 +205,28 @@ impl People {
             };
             let found: Vec<Detection> = self.detector.detect(image, &around, wanted).to_vec();
             for detection in found {
+                if !self.asked_for(frame, &detection) {
+                    self.detector.refuse(&detection);
+                    continue;
+                }
                 let mut pixels = Vec::new();
                 self.detector.mask(&detection, &mut pixels);
                 self.strangers.note(frame.stamp, detection, number, pixels);
             }
         }
+    }
+
+    /// Whether somebody where a person is seen is to be followed.
+    fn asked_for(&self, frame: &Frame, detection: &Detection) -> bool {
+        let Some(place) = detection.joint("humanoid_root").map(|root| root.position) else { return false };
+        let others = self.others_than(None);
+        self.options.allows(place) && self.options.room(frame, place, &others).is_some()
+    }
+
+    /// Numbers and places of those who are seen.
+    fn others_than(&self, one: Option<usize>) -> Vec<(usize, Vec3)> {
+        let others = (0..self.persons.len()).filter(|number| self.persons[*number].tracked() && Some(*number) != one);
+        others.map(|number| (number, self.persons[number].place)).collect()
     }
 
     /// Those who are believed to be persons get a tracker: their own when they are somebody who was there. Who they are is asked
@@ -226,10 +245,7 @@ impl People {
         let costs: Vec<Vec<f64>> = believed.iter().chain(self.strangers.seen_at(frame.stamp)).map(cost).collect();
         for (stranger, given) in believed.iter().zip(assign::assign(&costs, NEW)) {
             let known = given.map(|column| absent[column]);
-            let others: Vec<(usize, Vec3)> = (0..self.persons.len())
-                .filter(|number| self.persons[*number].there && Some(*number) != known)
-                .map(|number| (number, self.persons[number].place))
-                .collect();
+            let others = self.others_than(known);
             let Some(leaves) = self.options.room(frame, stranger.place, &others) else { continue };
             let came = match known {
                 Some(number) => self.take_up(frame, stranger, number),
@@ -237,6 +253,10 @@ impl People {
             };
             if let Some(leaves) = leaves.filter(|_| came) {
                 self.persons[leaves].there = false;
+            }
+            if came && self.options.limit.is_some_and(|limit| self.there().count() > limit) {
+                // Somebody else takes the place of who is hidden.
+                self.persons.iter_mut().for_each(|person| person.there &= person.tracked());
             }
         }
     }
@@ -292,7 +312,7 @@ impl People {
     fn forget(&mut self, stamp: f64) {
         let forget_after = self.options.forget_after;
         self.persons.retain(|person| {
-            let remembered = person.seen - person.born >= REMEMBERED && stamp - person.seen < forget_after;
+            let remembered = person.seen - person.born >= KNOWN_AFTER && stamp - person.seen < forget_after;
             person.there || remembered
         });
     }

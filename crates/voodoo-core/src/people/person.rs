@@ -11,15 +11,15 @@ use crate::tracker::estimate::Status;
 use crate::{Body, Tracker};
 
 /// A lost person of whom nothing hides the place, or who left the images, is gone after this, seconds.
-const GONE: f64 = 0.3;
+const LEAVES: f64 = 0.3;
 /// Who is hidden is waited for so long, seconds.
 const HIDDEN: f64 = 2.0;
 /// Number of the stature among a detection's sizes.
 const STATURE: usize = LENGTHS.len() - 1;
 /// Clothes are looked at this often at most, seconds.
-const LOOK_EVERY: f64 = 0.3;
+const CLOTHES_EVERY: f64 = 0.3;
 /// What is measured so much nearer than a place hides it, and so much farther shows that it is free, metres.
-const BEFORE: f64 = 0.08;
+const HIDES: f64 = 0.08;
 
 /// A person, there or away.
 #[derive(Debug)]
@@ -88,7 +88,7 @@ impl Person {
             self.seen = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
             if estimate.status == Status::Tracking
-                && frame.stamp - self.looked >= LOOK_EVERY
+                && frame.stamp - self.looked >= CLOTHES_EVERY
                 && !frame.colors.is_empty()
             {
                 let own = |image, pixel: usize| share.owners(image).get(pixel) == Some(&share.own);
@@ -97,7 +97,7 @@ impl Person {
             }
             return;
         }
-        let patience = if self.hidden(frame) { HIDDEN } else { GONE };
+        let patience = if self.hidden(frame) { HIDDEN } else { LEAVES };
         self.there &= estimate.status != Status::Searching && frame.stamp - self.seen < patience;
     }
 
@@ -114,7 +114,7 @@ impl Person {
                     return false;
                 }
                 let z = f64::from(image.pixels.get(v as usize * image.width + u as usize)) * image.metres_per_unit;
-                z > 0.0 && z < point.z - BEFORE
+                z > 0.0 && z < point.z - HIDES
             })
         };
         2 * sites.iter().filter(hides).count() > sites.len()

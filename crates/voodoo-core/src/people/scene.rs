@@ -5,14 +5,14 @@ use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::share::NOBODY;
 
 /// One row of this many is learnt in a frame, for speed: the scene stands still.
-const ROW_STEP: usize = 8;
+const LEARNT_ROWS: usize = 8;
 /// A deeper return by more than this replaces what was learnt, and a nearer one by less is taken in, metres.
-const STEP: f32 = 0.15;
+const DEPTH_STEP: f32 = 0.15;
 /// Share of a new return in what was learnt.
-const LEARNING: f32 = 0.1;
+const NEW_DEPTH: f32 = 0.1;
 /// Where nothing was known, or something deeper, a return is the scene when it was there in so many looks in a row: a person who
 /// was not found yet stands still for less.
-const PATIENCE: [u8; 2] = [4, 60];
+const STILL_LOOKS: [u8; 2] = [4, 60];
 /// What a camera has seen for longer than this was looked at for persons, seconds.
 const OLD: f64 = 3.0;
 /// Looks are alike within this, metres.
@@ -65,7 +65,7 @@ impl Scene {
 
     /// Learns some rows where nobody is; all of them where the camera has stood still for the first time.
     pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
-        self.row = (self.row + 1) % ROW_STEP;
+        self.row = (self.row + 1) % LEARNT_ROWS;
         for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
             let Some(known) = self.known.depth_mut(image) else { continue };
             if tentative.since.is_none() {
@@ -78,7 +78,7 @@ impl Scene {
                     *known = metres(image, index).unwrap_or(0.0);
                 }
             }
-            for row in (self.row..image.height).step_by(ROW_STEP) {
+            for row in (self.row..image.height).step_by(LEARNT_ROWS) {
                 for index in row * image.width..(row + 1) * image.width {
                     let Some(z) = metres(image, index).filter(|_| owners[index] == NOBODY) else { continue };
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.looks[index], z);
@@ -99,8 +99,8 @@ impl Scene {
 }
 
 fn learn_pixel(known: &mut f32, tentative: &mut f32, looks: &mut u8, z: f32) {
-    if *known > 0.0 && z > *known - STEP {
-        *known = if z > *known + STEP { z } else { *known + LEARNING * (z - *known) };
+    if *known > 0.0 && z > *known - DEPTH_STEP {
+        *known = if z > *known + DEPTH_STEP { z } else { *known + NEW_DEPTH * (z - *known) };
         *looks = 0;
         return;
     }
@@ -108,7 +108,7 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, looks: &mut u8, z: f32) {
         (*tentative, *looks) = (z, 0);
     }
     *looks = looks.saturating_add(1);
-    if *looks >= PATIENCE[usize::from(*known > 0.0)] {
+    if *looks >= STILL_LOOKS[usize::from(*known > 0.0)] {
         (*known, *looks) = (z, 0);
     }
 }

@@ -2,13 +2,8 @@
 
 use crate::detect::Detection;
 use crate::math::Vec3;
+use crate::relocalize::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 
-/// From this sum of log odds on it is a person.
-const ENOUGH_ODDS: f64 = 4.0;
-/// What a look counts less than its log odds: looks at a thing that stands still err alike.
-const LOOK_COSTS: f64 = 1.0;
-/// What is seen within this of the last place is the same, metres.
-const SAME_PERSON: f64 = 0.5;
 /// Who was not seen for so long is forgotten, seconds.
 const FORGOTTEN: f64 = 0.5;
 

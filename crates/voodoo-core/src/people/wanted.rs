@@ -4,7 +4,7 @@ use crate::math::{Aabb, Vec3};
 use crate::observation::frame::Frame;
 
 /// Somebody takes the place of another when they are nearer to a camera by this, metres: two at one distance do not take turns.
-const NEARER: f64 = 0.3;
+const CLEARLY_NEARER: f64 = 0.3;
 
 /// Who is looked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +48,7 @@ impl Options {
             cameras.map(|camera| camera.distance(place)).fold(f64::INFINITY, f64::min)
         };
         let farthest = others.iter().max_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
-        (self.nearest && distance(place) + NEARER < distance(farthest.1)).then_some(Some(farthest.0))
+        (self.nearest && distance(place) + CLEARLY_NEARER < distance(farthest.1)).then_some(Some(farthest.0))
     }
 }
 

@@ -24,6 +24,7 @@ use crate::observation::observer::Own;
 use crate::observation::segments::Segments;
 use crate::observation::share::Share;
 use belief::Belief;
+pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 use doubt::Doubt;
 use facing::Known;
 use people::People;
