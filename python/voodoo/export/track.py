@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, reading
+from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
 from voodoo.ik.angles import angle_names as angle_names_of
 from voodoo.ik.angles import angles_of
 from voodoo.ik.chain import Chain
@@ -188,28 +189,19 @@ class Track:
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as file:
-            np.savez_compressed(
-                file,
-                stamps=self.stamps,
-                status=np.array(self.status, dtype=np.str_),
-                residual=self.residual,
-                joint_names=np.array(self.joint_names, dtype=np.str_),
-                joints=self.joints,
-                limb_names=np.array(self.limb_names, dtype=np.str_),
-                world_from_limb=self.world_from_limb,
-                angle_names=np.array(self.angle_names, dtype=np.str_),
-                angles=self.angles,
-            )
+            np.savez_compressed(file, allow_pickle=False, **arrays_of(self))
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
-        """Read what save() wrote.
+        """Read what save() wrote, or the only person of a result of several people.
 
         Raises:
-            VoodooError: another suffix, damage, or a file of another kind.
+            VoodooError: another suffix, damage, a file of another kind, or several persons.
         """
         path = Path(path)
         check_suffix(path)
+        if is_people_file(path):
+            return _only_person(path)
         with reading(path, "a result of voodoo track"):
             try:
                 return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
@@ -245,21 +237,78 @@ class Track:
     @classmethod
     def _read_npz(cls, path: Path) -> Track:
         with np.load(path, allow_pickle=False) as content:
-            missing = [name for name in _ARRAYS if name not in content]
-            if missing:
-                raise VoodooError(f"expected the arrays {', '.join(_ARRAYS)}, found no {', '.join(missing)}")
-            return cls(
-                stamps=content["stamps"],
-                status=tuple(str(value) for value in content["status"]),
-                residual=content["residual"],
-                joint_names=tuple(str(value) for value in content["joint_names"]),
-                joints=content["joints"],
-                limb_names=tuple(str(value) for value in content["limb_names"]),
-                world_from_limb=content["world_from_limb"],
-                # Files of earlier versions have no angles.
-                angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
-                angles=content["angles"] if "angles" in content else np.empty((0, 0)),
-            )
+            return track_of(content)
+
+
+def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:
+    """All of a track as arrays of numbers and words, for .npz."""
+    words = ("status", "joint_names", "limb_names", "angle_names")
+    return {name: np.array(getattr(track, name), dtype=np.str_) for name in words} | {
+        name: getattr(track, name) for name in _BY_FRAME
+    }
+
+
+def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
+    """The track of such arrays.
+
+    Raises:
+        VoodooError: one is missing, or they do not belong together.
+    """
+    missing = [name for name in _ARRAYS if name not in content]
+    if missing:
+        raise VoodooError(f"expected the arrays {', '.join(_ARRAYS)}, found no {', '.join(missing)}")
+    return Track(
+        stamps=content["stamps"],
+        status=tuple(str(value) for value in content["status"]),
+        residual=content["residual"],
+        joint_names=tuple(str(value) for value in content["joint_names"]),
+        joints=content["joints"],
+        limb_names=tuple(str(value) for value in content["limb_names"]),
+        world_from_limb=content["world_from_limb"],
+        # Files of earlier versions have no angles.
+        angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
+        angles=content["angles"] if "angles" in content else np.empty((0, 0)),
+    )
+
+
+def track_of_rows(rows: PeopleRows, person: int) -> Track:
+    """The rows of one person."""
+    own = np.flatnonzero(rows.persons == person)
+    return Track(
+        stamps=rows.stamps[own],
+        status=tuple(rows.status[index] for index in own),
+        residual=rows.residual[own],
+        joint_names=rows.joint_names,
+        joints=rows.joints[own],
+        limb_names=(),
+        world_from_limb=np.empty((len(own), 0, 4, 4)),
+        angle_names=rows.angle_names,
+        angles=rows.angles[own],
+    )
+
+
+def tracks_of(content: Mapping[str, npt.NDArray[Any]]) -> dict[int, Track]:
+    """The tracks of an .npz of several people, by person."""
+    tracks = {}
+    for one in content["persons"].tolist():
+        prefix = f"person_{one}/"
+        own = {name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)}
+        tracks[int(one)] = track_of(own)
+    return tracks
+
+
+def _only_person(path: Path) -> Track:
+    """The track in a result of several people that holds one."""
+    if path.suffix == ".npz":
+        with reading(path, "a result of voodoo track --people"), np.load(path, allow_pickle=False) as content:
+            tracks = tracks_of(content)
+    else:
+        rows = read_rows(path)
+        tracks = {one: track_of_rows(rows, one) for one in np.unique(rows.persons).tolist()}
+    if len(tracks) != 1:
+        found = ", ".join(str(one) for one in tracks) or "nobody"
+        raise VoodooError(f"{path}: expected the result of one person, found persons {found}")
+    return next(iter(tracks.values()))
 
 
 def check_suffix(path: Path) -> None:

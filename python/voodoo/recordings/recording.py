@@ -13,6 +13,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray, RecordedFrame
+from voodoo.recordings.people_truth import PeopleTruth
 
 
 class _Joints(TypedDict):
@@ -120,6 +121,7 @@ class Recording(ABC):
         root_frame: frame all poses and the reference are in.
         start: where the body is in the first frame, or None.
         reference: joint positions to compare with, or None.
+        people: where everybody is, of a recording of several people with a truth, or None.
     """
 
     path: Path
@@ -127,6 +129,7 @@ class Recording(ABC):
     root_frame: str
     start: Start | None
     reference: Reference | None
+    people: PeopleTruth | None = None
 
     @abstractmethod
     def __len__(self) -> int:
@@ -149,8 +152,10 @@ class Recording(ABC):
         return f"{type(self).__name__}({self.name!r}, {len(self)} frames, root frame {self.root_frame!r})"
 
 
-def reference_words(reference: Reference | None) -> str:
+def reference_words(reference: Reference | None, people: PeopleTruth | None = None) -> str:
     """The reference in words for RecordingInfo."""
+    if reference is None and people is not None:
+        return f"{len(people.persons)} persons, {len(people.names)} joints, {len(people.stamps)} stamps, exact"
     if reference is None:
         return "none"
     kind = "exact" if reference.exact else "estimated by another tracker"

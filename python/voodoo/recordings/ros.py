@@ -12,6 +12,7 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
+from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, reference_words
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
@@ -30,6 +31,8 @@ from voodoo.recordings.ros_topics import COMPRESSED, Source, TopicChoice, TopicF
 from voodoo.recordings.transforms import TransformTree
 from voodoo.recordings.truth import TRUTH_FRAME, find_beside, read_start, read_truth
 
+STILL_FRAMES = ("odom", "map")
+"""Where a robot that moves says it is (REP-105): smoothly, and without drift but with jumps."""
 _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -42,7 +45,8 @@ class RosRecording(Recording):
     and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover` repair
     it), as is one whose index announces other messages than it holds.
 
-    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`, unless `bare`.
+    truth.csv, truth_people.csv and init.json in the bag's folder or the one above become `reference`, `people` and `start`,
+    unless `bare`.
 
     Args:
         path: see voodoo.recordings.ros_bag.Bag.
@@ -50,7 +54,8 @@ class RosRecording(Recording):
         depth_topic, points_topic, scan_topic, color_topic: a topic or several, instead of the one found by type and
             name. The first one of the first kind makes the frames.
         camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
-        root_frame: by default base_link if the bag's transforms know it, else the frame of the first sensor.
+        root_frame: by default odom, else map, where base_link moves in it; else base_link if the bag's transforms know it, else
+            the frame of the first sensor.
         metres_per_unit: of 16-bit depth images.
         tf_max_age: how old a changing transform may be [s].
         bare: read nothing that lies beside the bag.
@@ -100,6 +105,8 @@ class RosRecording(Recording):
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         truth, start = (None if bare else find_beside(place, name) for name in ("truth.csv", "init.json"))
         self.reference = None if truth is None else read_truth(truth, self._root_from_truth)
+        people = None if bare else find_beside(place, PEOPLE_TRUTH_FILE)
+        self.people = None if people is None else read_people_truth(people, self._root_from_truth)
         self.start = None if start is None else read_start(start, self._root_from_truth(self._driver.first_stamp))
 
     def __len__(self) -> int:
@@ -150,11 +157,11 @@ class RosRecording(Recording):
             root_frame=self.root_frame,
             sensors=tuple(sensors),
             unused=tuple(self._unused),
-            reference=reference_words(self.reference),
+            reference=reference_words(self.reference, self.people),
         )
 
     def _read_transforms(self, asked: str | None, sources: Sequence[Source]) -> str:
-        """Fill the tree and choose the root frame; the big topic tf is only read when tf_static does not suffice."""
+        """Fill the tree and choose the root frame."""
         names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
         static = [name for name in names if name.endswith("tf_static")]
         dynamic = [name for name in names if name not in static]
@@ -162,13 +169,14 @@ class RosRecording(Recording):
             for _, message in self._bag.read(topics):
                 with reading(self.path, "a readable transform"):
                     self._tree.add(message, static=is_static)
-            known = {*self._tree.frames, *(source.frame for source in sources)}
-            root = asked if asked is not None else TRUTH_FRAME
-            if root in known and all(self._reaches(root, source.frame) for source in sources):
-                return root
-        if asked is not None or TRUTH_FRAME in known:
-            return root
-        return sources[0].frame
+        if asked is not None:
+            return asked
+        known = {*self._tree.frames, *(source.frame for source in sources)}
+        if TRUTH_FRAME not in known:
+            return sources[0].frame
+        # Before a robot that moves people and rooms stand still in the frame it moves in.
+        moving = [frame for frame in STILL_FRAMES if self._tree.moves(frame, TRUTH_FRAME)]
+        return next((frame for frame in moving if all(self._reaches(frame, s.frame) for s in sources)), TRUTH_FRAME)
 
     def _reaches(self, root: str, frame: str) -> bool:
         try:

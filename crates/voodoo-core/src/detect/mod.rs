@@ -190,6 +190,13 @@ impl Detector {
         self.nearest
     }
 
+    /// Nobody asks for a person of the last image: others are looked at before them.
+    pub fn refuse(&mut self, detection: &Detection) {
+        if let Some(candidate) = self.segmentation.candidates().get(detection.candidate) {
+            self.rejections.note(candidate, false);
+        }
+    }
+
     /// Indices of the pixels of a detection of the last image.
     pub fn mask(&self, detection: &Detection, into: &mut Vec<usize>) {
         into.clear();

@@ -22,10 +22,13 @@ use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
 use crate::observation::segments::Segments;
+use crate::observation::share::Share;
 use belief::Belief;
+pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 use doubt::Doubt;
 use facing::Known;
 use people::People;
+pub(crate) use people::sized;
 use posture::{Place, Postures};
 use segment_motion::SegmentMotion;
 use trials::Trials;
@@ -73,9 +76,18 @@ impl Relocalizer {
         People::know(body)
     }
 
+    /// A body of a detected person's sizes, or with `known` ones that the model has, and its poses, world frame.
+    pub fn placed(&self, model: &Model, detection: &Detection, known: bool) -> Option<(Body, Vec<Pose>)> {
+        if known {
+            Some((model.body.clone(), people::posed(&model.body, detection)?))
+        } else {
+            people::sized(model, detection)
+        }
+    }
+
     /// Body and poses of the surest person in a frame.
     pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.look(frame, Wanted::Anybody);
+        let detection = self.people.look(frame, None, Wanted::Anybody);
         let detection = detection.filter(|_| self.belief.observe(detection))?;
         self.belief = Belief::default();
         people::sized(model, detection)
@@ -106,7 +118,16 @@ impl Relocalizer {
     pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {
         let often = lost || self.watch.open();
         if self.doubt.due(frame.stamp, doubtful, often) && self.known {
-            self.people.look(frame, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+            self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+        } else {
+            self.people.forget();
+        }
+    }
+
+    /// The same for one of several persons, who is not looked for here where they are lost.
+    pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, doubtful: bool, lost: bool) {
+        if self.doubt.due(frame.stamp, doubtful, false) && !lost && self.known {
+            self.people.look(frame, Some(share), Wanted::Near(root));
         } else {
             self.people.forget();
         }

@@ -5,6 +5,7 @@ mod edits;
 pub mod estimate;
 mod queries;
 mod report;
+mod start;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
@@ -15,6 +16,7 @@ use crate::math::{Pose, Vec3};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
+use crate::observation::share::Share;
 use crate::relocalize::{Relocalizer, Sighting};
 use crate::sizes::{Reliance, Sizes, Start};
 use assess::Assessor;
@@ -93,61 +95,15 @@ impl Tracker {
         self.check(frame)?;
         if self.is_started() {
             self.verify_start(frame);
-            self.follow(frame)
+            self.follow(frame, None)
         } else {
             self.search(frame)
         }
         Ok(&self.estimate)
     }
 
-    /// In the first frame after a reset: where a detector sees the person elsewhere or the other way round, and the frame agrees,
-    /// the start was given wrongly.
-    fn verify_start(&mut self, frame: &Frame) {
-        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
-        if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
-            return;
-        }
-        relocalizer.look(frame, motion.poses[0].translation, false, false);
-        if relocalizer.elsewhere(&model.body, &motion.poses, false) {
-            observer.face(frame);
-            let seen = observer.seen(frame, motion.origin);
-            let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-            if relocalizer.detected(setting.of(model), fit, &motion.poses, false).is_some() {
-                self.restart_at_detection();
-            }
-        }
-    }
-
-    /// Starts anew where a detector sees the body, in the sizes it was set in; whether it could.
-    fn restart_at_detection(&mut self) -> bool {
-        let body = self.sizes.as_set().unwrap_or(&self.model.body).clone();
-        let Some(poses) = self.relocalizer.posed(&body) else { return false };
-        let (known, itself) = (self.sizes.known(), self.relocalizer.found_itself());
-        self.restart(body, poses, !known);
-        self.relocalizer.take_note_of_start(itself);
-        if !known {
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-        }
-        true
-    }
-
-    /// Looks for a person, and follows the one that is found.
-    fn search(&mut self, frame: &Frame) {
-        if let Some((body, poses)) = self.relocalizer.first(frame, &self.model) {
-            self.restart(body, poses, true);
-            self.assessor.doubt_pose();
-            self.relocalizer.take_note_of_start(true);
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.follow(frame);
-            if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
-                return;
-            }
-        }
-        self.stop(frame.stamp);
-    }
-
-    /// The pose at the next instant (K06 IV-B).
-    fn follow(&mut self, frame: &Frame) {
+    /// The pose at the next instant (K06 IV-B), by all of a frame or by its `share` of it.
+    fn follow(&mut self, frame: &Frame, share: Option<Share>) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
@@ -157,7 +113,10 @@ impl Tracker {
         let Motion { poses, previous, predicted, origin, .. } = motion;
         let own = relocalizer.own();
         let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched, own };
-        observer.observe(frame, expected, config);
+        match share {
+            None => observer.observe(frame, expected, config),
+            Some(share) => observer.observe_share(frame, expected, share, config),
+        }
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
@@ -169,7 +128,11 @@ impl Tracker {
         // Other configurations of arms and legs.
         if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
-            relocalizer.look(frame, poses[0].translation + *origin, assessor.doubts(), lost);
+            let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
+            match share {
+                None => relocalizer.look(frame, root, doubtful, lost),
+                Some(share) => relocalizer.look_at_share(frame, share, root, doubtful, lost),
+            }
         }
         if config.hypotheses && schedule.whole_body && known {
             steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection());
@@ -181,8 +144,9 @@ impl Tracker {
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
         motion.commit(frame.stamp);
-        if self.config.relocalization && schedule.whole_body && self.relocalize(frame, known) {
-            return self.follow(frame);
+        let relocalizes = self.config.relocalization && schedule.whole_body;
+        if relocalizes && self.relocalize(frame, known, share.is_some()) {
+            return self.follow(frame, share);
         }
         self.remember();
         self.report(frame.stamp, steps);
@@ -192,11 +156,12 @@ impl Tracker {
         }
     }
 
-    /// There is nobody: from the next frame on somebody is looked for.
-    fn stop(&mut self, stamp: f64) {
-        self.motion.poses.clear();
-        self.motion.stamp = Some(stamp);
-        self.estimate = Estimate { stamp, ..Estimate::default() };
+    /// The pose at the next instant by its share of a frame, which was checked.
+    pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
+        if self.is_started() {
+            self.follow(frame, Some(share));
+        }
+        &self.estimate
     }
 
     /// Refuses what cannot be used, before anything changes.
@@ -207,9 +172,9 @@ impl Tracker {
         frame.check(&self.model.body, self.motion.stamp)
     }
 
-    /// Remembers a tracked body; looks for a lost one, and takes it where it is found. A track that is not `known` for long starts
-    /// anew instead, in this frame: whether it does.
-    fn relocalize(&mut self, frame: &Frame, known: bool) -> bool {
+    /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found. A track
+    /// that is not `known` for long starts anew instead, in this frame: whether it does.
+    fn relocalize(&mut self, frame: &Frame, known: bool, among: bool) -> bool {
         let lost = self.assessor.status() == Status::Lost;
         if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
@@ -218,7 +183,7 @@ impl Tracker {
                 return self.relocalizer.young(frame.stamp) && self.restart_at_detection();
             }
         }
-        if !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
+        if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
             return false;
         }
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
