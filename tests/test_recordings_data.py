@@ -51,7 +51,7 @@ def test_rendered_recordings_are_as_described(voodoo_data, name):
 def test_the_real_laser_opens_from_its_zip(voodoo_data):
     recording = open_recording(voodoo_data / "laser" / "general_tracking_moving_1.zip")
     info = recording.info()
-    assert (info.loader, info.frames, info.root_frame) == ("ros1", 873, "base_link")
+    assert (info.loader, info.frames, info.root_frame) == ("ros1", 873, "odom")
     assert info.duration == pytest.approx(116.0, abs=1.0)
     frames = list(recording)
     assert len(frames) == 873 and all(len(frame.measurements) == 1 for frame in frames)

@@ -281,10 +281,39 @@ class TestTransforms:
     def x_of(self, path, **options):
         return [m.root_from_sensor[0, 3] for m in only(open_recording(path, **options))]
 
-    def test_the_latest_one_at_or_before_the_stamp_counts_whenever_it_arrived(self, tmp_path):
+    def test_one_that_changes_is_interpolated_whenever_it_arrived(self, tmp_path):
         moves = self.entries((9.9, 1.0), (10.1, 2.0), (10.3, 3.0))
         depth = [depth_entry(stamp) for stamp in (9.9, 10.0, 10.1, 10.25, 10.4)]
-        assert self.x_of(bag(tmp_path, INFO, *depth, *moves)) == [1.0, 1.0, 2.0, 2.0, 3.0]
+        np.testing.assert_allclose(self.x_of(bag(tmp_path, INFO, *depth, *moves)), [1.0, 1.5, 2.0, 2.75, 3.0])
+
+    def test_it_turns_evenly_between_two_stamps(self, tmp_path):
+        turns = [(10.0, 0.0), (10.2, 0.8)]
+        tf = [
+            ("/tf", stamp, M.tf((stamp, "base_link", "cam", (0, 0, 1), (0, 0, np.sin(a / 2), np.cos(a / 2)))))
+            for stamp, a in turns
+        ]
+        (image,) = only(open_recording(bag(tmp_path, INFO, depth_entry(10.05), *tf)))
+        c, s = np.cos(0.2), np.sin(0.2)
+        np.testing.assert_allclose(image.root_from_sensor[:3, :3], [[c, -s, 0], [s, c, 0], [0, 0, 1]], atol=1e-9)
+
+    def test_across_a_gap_the_latest_one_counts(self, tmp_path):
+        moves = self.entries((10.0, 1.0), (12.0, 2.0))
+        assert self.x_of(bag(tmp_path, INFO, depth_entry(10.4), *moves)) == [1.0]
+        with pytest.raises(RecordingError, match="before it"):
+            self.x_of(bag(tmp_path / "late", INFO, depth_entry(11.8), *moves))
+
+    @pytest.mark.parametrize(
+        ("frame", "far", "root"), [("odom", 0.3, "odom"), ("map", 0.3, "map"), ("odom", 0.01, "base_link")]
+    )
+    def test_where_the_robot_moves_the_frame_it_moves_in_is_the_root(self, tmp_path, frame, far, root):
+        fixed = ("/tf_static", 9.0, M.tf((0, "base_link", "cam", (0, 0, 1), IDENTITY)))
+        moves = [("/tf", 10.0 + k, M.tf((10.0 + k, frame, "base_link", (k * far, 0, 0), IDENTITY))) for k in range(2)]
+        path = bag(tmp_path, INFO, fixed, depth_entry(10.0), depth_entry(10.5), depth_entry(11.0), *moves)
+        recording = open_recording(path)
+        assert recording.root_frame == root
+        expected = [0.0, far / 2, far] if root == frame else [0.0] * 3
+        np.testing.assert_allclose([m.root_from_sensor[0, 3] for m in only(recording)], expected, atol=1e-12)
+        assert open_recording(path, root_frame="base_link").root_frame == "base_link"
 
     def test_one_that_never_changes_holds_always(self, tmp_path):
         moves = self.entries((50.0, 1.0), (51.0, 1.0))

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
     from voodoo.model.body import Body, Joint, Limb, Place
     from voodoo.model.camera import Camera
+    from voodoo.people import People, PeopleEstimate, Person
     from voodoo.recordings.loaders import open_recording
     from voodoo.synthetic.render import RenderedDepth, render_depth
     from voodoo.tracker import Tracker
@@ -31,6 +32,9 @@ __all__ = [
     "Joint",
     "Limb",
     "MeasurementError",
+    "People",
+    "PeopleEstimate",
+    "Person",
     "Place",
     "RecordingError",
     "RenderedDepth",
@@ -65,6 +69,7 @@ _HOMES = {
     ),
     "voodoo.model.body": ("Body", "Joint", "Limb", "Place"),
     "voodoo.model.camera": ("Camera",),
+    "voodoo.people": ("People", "PeopleEstimate", "Person"),
     "voodoo.recordings.loaders": ("open_recording",),
     "voodoo.synthetic.render": ("RenderedDepth", "render_depth"),
     "voodoo.tracker": ("Tracker",),
@@ -80,6 +85,7 @@ _ROOMS = (
     "ik",
     "measurements",
     "model",
+    "people",
     "pipeline",
     "recordings",
     "sensors",

@@ -15,6 +15,7 @@ __all__ = [
     "Detector",
     "Estimate",
     "Frame",
+    "People",
     "PersonCandidate",
     "TaperedEllipticCylinder",
     "Tracker",
@@ -279,6 +280,23 @@ class Frame:
         Raises:
             MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
         """
+    def add_color(
+        self,
+        image: npt.NDArray[np.uint8],
+        *,
+        camera: _Camera,
+        world_from_sensor: npt.ArrayLike | None = None,
+    ) -> None:
+        """Add a colour picture, by which People tells persons apart who come back; Tracker does not look at it.
+
+        Args:
+            image: (height, width, 3) uint8, channels in any order that is the same in all frames.
+            camera: its calibration, a voodoo.Camera of the same size.
+            world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
+
+        Raises:
+            MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
+        """
     def add_position(
         self,
         site: str,
@@ -531,6 +549,27 @@ class Tracker:
         sites: Sequence[tuple[str, tuple[float, float, float]]],
     ) -> None: ...
     def remove_limb(self, name: str) -> None: ...
+
+@final
+class People:
+    """Several persons as the core follows them; use voodoo.People."""
+
+    def __new__(
+        cls,
+        body: Body,
+        values: Mapping[str, Any],
+        *,
+        limit: int | None,
+        nearest: bool,
+        forget_after: float,
+        region: tuple[Sequence[float], Sequence[float]] | None,
+    ) -> People: ...
+    def step(self, frame: Frame, own: Sequence[tuple[int, Frame]]) -> list[tuple[int, Estimate]]: ...
+    def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
+    def only(self, ids: Sequence[int] | None) -> None: ...
+    def limb_distances(self, id: int, points: _Points) -> npt.NDArray[np.float32] | None: ...
+    def estimate(self, id: int) -> Estimate | None: ...
+    def body(self, id: int) -> Body | None: ...
 
 @final
 class View:

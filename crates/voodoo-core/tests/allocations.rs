@@ -10,8 +10,9 @@ use voodoo_core::body::HumanModel;
 use voodoo_core::ik::{Aim, Criterion, Goal, Model, Options, Rest, Root, Solver, View, bones, trunk};
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{Frame, PositionRelation, RayRelation};
+use voodoo_core::people;
 use voodoo_core::visibility::render::{Rendering, Viewpoint};
-use voodoo_core::{Body, Config, Tracker};
+use voodoo_core::{Body, Config, People, Tracker};
 
 struct Counting;
 
@@ -130,6 +131,35 @@ fn ik_allocations() -> usize {
     count
 }
 
+/// Of frames of two persons who stand before a camera, how many allocate, after a warm-up, and how many there are.
+fn people_allocations() -> [usize; 2] {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let camera = scene::DepthCamera { width: 160, height: 124, focal: 110.0 };
+    let mut noise = scene::Noise(3);
+    let mut pixels = vec![u16::MAX; 160 * 124];
+    for aside in [-0.6, 0.6] {
+        let shift = Vec3::new(0.3, aside, 0.0);
+        let place = |pose: &Pose| Pose::from_parts(pose.translation + shift, pose.rotation);
+        let poses: Vec<Pose> = scene::standing(&body).iter().map(place).collect();
+        let (seen, _) = camera.shoot(&body, &poses, 0.002, &mut noise);
+        pixels.iter_mut().zip(seen).for_each(|(all, pixel)| *all = pixel.min(*all));
+    }
+    let mut people = People::new(body, Config::default(), people::Options::default()).unwrap();
+    let mut counts = [0, 0];
+    for index in 0..200 {
+        let images = [camera.image(&pixels)];
+        let frame = Frame { images: &images, ..Frame::empty(index as f64 / 100.0) };
+        let before = COUNT.load(Ordering::Relaxed);
+        people.step(&frame, &[]).unwrap();
+        if index >= 140 {
+            counts[0] += usize::from(COUNT.load(Ordering::Relaxed) > before);
+            counts[1] += 1;
+        }
+    }
+    assert_eq!(people.there().count(), 2, "both are followed");
+    counts
+}
+
 /// Allocations of a rendering after one of the same size.
 fn allocations_of_a_rendering() -> usize {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
@@ -157,6 +187,9 @@ fn a_warm_step_or_rendering_allocates_nothing() {
 
     assert_eq!(ik_allocations(), 0, "inverse kinematics");
     assert_eq!(allocations_of_a_rendering(), 0);
+    // A detector looks once in six such frames.
+    let [allocating, all] = people_allocations();
+    assert!(allocating <= all / 6, "{allocating} of {all} frames of two persons");
 
     let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);
     // To and fro, so that the frames after the warm-up need no more memory than those before.

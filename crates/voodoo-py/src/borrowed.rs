@@ -4,7 +4,9 @@ use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArra
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::observation::frame::{
+    Cloud, ColorImage, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope,
+};
 
 use crate::arrays::{PointArray, PointView};
 use crate::errors::IntoPy;
@@ -37,6 +39,32 @@ pub struct ImageData {
     pub world_from_sensor: Pose,
     pub weight: f64,
     pub source: u16,
+}
+
+pub struct ColorData {
+    pub pixels: Py<PyArray3<u8>>,
+    pub size: [usize; 2],
+    pub intrinsics: [f64; 4],
+    pub world_from_sensor: Pose,
+}
+
+/// A borrow of a [`ColorData`].
+pub struct ColorView<'py, 'a> {
+    pixels: PyReadonlyArray3<'py, u8>,
+    data: &'a ColorData,
+}
+
+impl ColorData {
+    pub fn view<'py>(&self, py: Python<'py>) -> ColorView<'py, '_> {
+        ColorView { pixels: self.pixels.bind(py).readonly(), data: self }
+    }
+}
+
+impl ColorView<'_, '_> {
+    pub fn image(&self) -> PyResult<ColorImage<'_>> {
+        let ColorData { size: [height, width], intrinsics, world_from_sensor, .. } = *self.data;
+        Ok(ColorImage { pixels: self.pixels.as_slice()?.as_chunks().0, width, height, intrinsics, world_from_sensor })
+    }
 }
 
 pub struct SiteData {

@@ -74,7 +74,8 @@ impl PyDetector {
         let mut found = py.detach(|| {
             let mut found = Vec::new();
             for image in &images {
-                let around = Surroundings { ground: input.ground, up, background: &[], excluded: input.excluded };
+                let around =
+                    Surroundings { ground: input.ground, up, excluded: input.excluded, ..Surroundings::default() };
                 for detection in detector.detect(image, &around, Wanted::All).to_vec() {
                     let mut pixels = Vec::new();
                     detector.mask(&detection, &mut pixels);

@@ -8,8 +8,8 @@ use voodoo_core::observation::frame::Ground;
 
 use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
-use crate::borrowed::{Borrowed, CloudData, DepthArray, Held, ImageData, SiteData};
-use crate::errors::exception;
+use crate::borrowed::{Borrowed, CloudData, ColorData, ColorView, DepthArray, Held, ImageData, SiteData};
+use crate::errors::{exception, wrong_argument};
 
 /// All measurements of one instant, from any number of sensors.
 ///
@@ -25,6 +25,7 @@ pub struct PyFrame {
     pub stamp: f64,
     pub(crate) clouds: Vec<CloudData>,
     pub(crate) images: Vec<ImageData>,
+    pub(crate) colors: Vec<ColorData>,
     pub(crate) sites: Vec<SiteData>,
     pub(crate) ground: Option<Ground>,
     pub(crate) excluded: Vec<Aabb>,
@@ -43,6 +44,11 @@ impl PyFrame {
         Held { clouds: &[], images: &self.images, sites: &[], ground: self.ground }.borrow_for(py, body)
     }
 
+    /// Borrows the colour pictures.
+    pub fn color_views<'py>(&self, py: Python<'py>) -> Vec<ColorView<'py, '_>> {
+        self.colors.iter().map(|data| data.view(py)).collect()
+    }
+
     fn source(&mut self, name: &str) -> u16 {
         let index = self.sources.iter().position(|known| known == name).unwrap_or_else(|| {
             self.sources.push(name.to_owned());
@@ -57,8 +63,8 @@ impl PyFrame {
     #[new]
     #[pyo3(signature = (stamp))]
     fn new(#[pyo3(from_py_with = arguments::stamp)] stamp: f64) -> Self {
-        let (clouds, images, sites, excluded, sources) = Default::default();
-        Self { stamp, clouds, images, sites, ground: None, excluded, sources }
+        let (clouds, images, colors, sites, excluded, sources) = Default::default();
+        Self { stamp, clouds, images, colors, sites, ground: None, excluded, sources }
     }
 
     /// Add 3-D points (N, 3) [m] in the sensor's frame (K06 IV-A, first three kinds).
@@ -119,14 +125,7 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
-        let number = |name: &str| camera.getattr(name)?.extract::<f64>();
-        let pixels = |name: &str| camera.getattr(name)?.extract::<usize>();
-        let (Ok(width), Ok(height)) = (pixels("width"), pixels("height")) else {
-            let found = camera.get_type().name()?;
-            let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
-            return Err(exception(camera.py(), "MeasurementError", text));
-        };
-        let intrinsics = [number("fx")?, number("fy")?, number("cx")?, number("cy")?];
+        let ([height, width], intrinsics) = calibration(camera)?;
         let rays = match camera.getattr("distorted")?.extract::<bool>()? {
             true => Some(camera.call_method0("rays")?.cast::<PyArray3<f32>>()?.clone()),
             false => None,
@@ -170,6 +169,34 @@ impl PyFrame {
             source: self.source(source),
         };
         self.images.push(data);
+        Ok(())
+    }
+
+    /// Add a colour picture, by which People tells persons apart who come back; Tracker does not look at it.
+    ///
+    /// Args:
+    ///     image: (height, width, 3) uint8, channels in any order that is the same in all frames.
+    ///     camera: its calibration, a voodoo.Camera of the same size.
+    ///     world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
+    ///
+    /// Raises:
+    ///     MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
+    #[pyo3(signature = (image, *, camera, world_from_sensor=None))]
+    fn add_color(
+        &mut self,
+        image: &Bound<'_, PyAny>,
+        camera: &Bound<'_, PyAny>,
+        world_from_sensor: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (size, intrinsics) = calibration(camera)?;
+        let expected = format!("an array of shape ({}, {}, 3) and dtype uint8", size[0], size[1]);
+        let wrong = || wrong_argument(image.py(), "image", &expected, image);
+        let array = contiguous(image).map_err(|_| wrong())?.cast_into::<PyArray3<u8>>().map_err(|_| wrong())?;
+        if array.shape() != [size[0], size[1], 3] {
+            return Err(wrong());
+        }
+        let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
+        self.colors.push(ColorData { pixels: array.unbind(), size, intrinsics, world_from_sensor });
         Ok(())
     }
 
@@ -281,4 +308,16 @@ impl PyFrame {
             self.sources
         )
     }
+}
+
+/// Size (rows, columns) and intrinsics of a calibration.
+fn calibration(camera: &Bound<'_, PyAny>) -> PyResult<([usize; 2], [f64; 4])> {
+    let number = |name: &str| camera.getattr(name)?.extract::<f64>();
+    let pixels = |name: &str| camera.getattr(name)?.extract::<usize>();
+    let (Ok(width), Ok(height)) = (pixels("width"), pixels("height")) else {
+        let found = camera.get_type().name()?;
+        let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
+        return Err(exception(camera.py(), "MeasurementError", text));
+    };
+    Ok(([height, width], [number("fx")?, number("fy")?, number("cx")?, number("cy")?]))
 }

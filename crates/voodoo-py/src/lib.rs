@@ -15,6 +15,7 @@ mod estimate;
 mod frame;
 mod ik;
 mod ik_view;
+mod people;
 mod registration;
 mod render;
 mod shape;
@@ -38,6 +39,8 @@ mod _core {
     use super::ik::PyChain;
     #[pymodule_export]
     use super::ik_view::PyView;
+    #[pymodule_export]
+    use super::people::PyPeople;
     #[pymodule_export]
     use super::registration::{nearest_surface, points_within, splat};
     #[pymodule_export]

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::Vec3;
-use voodoo_core::{Frame, Tracker};
+use voodoo_core::{Body, Frame, Tracker};
 
 use crate::arrays::{PointArray, limb_poses, vector};
 use crate::body::{JointParts, PyBody, joint};
@@ -22,6 +22,16 @@ pub struct PyTracker {
     tracker: Tracker,
     names: Arc<Names>,
     sources: Vec<String>,
+}
+
+/// Named positions with the indices of their sites.
+pub fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
+    let place = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let name: String = name.extract()?;
+        let site = body.site_index(&name).map_err(|error| error.into_py(joints.py()))?;
+        Ok((site, vector(&format!("joints[{name}]"), &position)?))
+    };
+    joints.iter().map(place).collect()
 }
 
 impl PyTracker {
@@ -59,14 +69,7 @@ impl PyTracker {
     #[pyo3(signature = (joints, *, fit_sizes=true))]
     fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
         let py = joints.py();
-        let positions = joints
-            .iter()
-            .map(|(name, position)| {
-                let name: String = name.extract()?;
-                let site = self.tracker.body().site_index(&name).map_err(|error| error.into_py(py))?;
-                Ok((site, vector(&format!("joints[{name}]"), &position)?))
-            })
-            .collect::<PyResult<Vec<(usize, Vec3)>>>()?;
+        let positions = site_positions(self.tracker.body(), joints)?;
         self.tracker.reset(&positions, fit_sizes).map_err(|error| error.into_py(py))?;
         self.body_changed();
         self.sources.clear();
@@ -88,6 +91,7 @@ impl PyTracker {
             stamp: frame.stamp,
             clouds: &clouds,
             images: &images,
+            colors: &[],
             positions: &borrowed.positions,
             rays: &borrowed.rays,
             ground: borrowed.ground,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from voodoo.cli.common import clear_errors, progressing, say_interrupted, until_interrupted
-from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, UseOption
+from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
 from voodoo.errors import VoodooError
 
 
@@ -35,6 +35,13 @@ def eval_command(
     ablation: Annotated[
         bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
     ] = False,
+    result: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv", help="Judge this result of several people instead of tracking, of one RECORDING."
+        ),
+    ] = None,
+    frame: FrameOption = None,
     loader: LoaderOption = None,
 ) -> None:
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
@@ -47,6 +54,10 @@ def eval_command(
     switch turned over, the other solvers, no prediction, no jitter penalty)
     and prints a row each; --out gets ablation.md and ablation.csv.
 
+    A recording with truth_people.csv beside it is tracked with --people any and judged for MOTA, IDF1, switches of identity,
+    false bodies and joints. With --result a .csv that any program wrote is judged: stamp_s, person, status, residual_m, then
+    NAME_x, NAME_y, NAME_z. It needs pip install voodoo[eval]; --out gets people.csv and people.md.
+
     Examples
 
     voodoo eval rendered/ --only '*_cmu' --out report
@@ -56,10 +67,14 @@ def eval_command(
     voodoo eval rendered/ --init auto
 
     voodoo eval rendered/ --ablate --out report
+
+    voodoo eval two_walk/ --result theirs.csv
     """
+    from voodoo.cli.people import judged, refuse_failures, show_people
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.ablation import ablate, table, variants, write_tables
     from voodoo.evaluation.evaluate import evaluate_all
+    from voodoo.evaluation.people_evaluate import evaluate_all_people, has_people
     from voodoo.evaluation.report import markdown, write_reports
     from voodoo.evaluation.search import find_recordings
     from voodoo.pipeline.start import AUTO
@@ -70,6 +85,9 @@ def eval_command(
         automatic = None if init is None else AUTO
         config_of(config)  # a bad file is one error here instead of one for each recording
         paths = find_recordings(recordings, only=only or ())
+        if result is not None:
+            show_people([judged(paths, result, loader, frame)], out)
+            return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
         if ablation:
@@ -84,6 +102,20 @@ def eval_command(
             if failed:
                 raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
             return
+        several = [path for path in paths if has_people(path)]
+        judgements = list(
+            progressing(
+                evaluate_all_people(several, config_file=config, loader=loader, model=model, use=kinds),
+                "following everybody",
+                len(several),
+            )
+        )
+        if several:
+            show_people(judgements, out)
+            refuse_failures(judgements)
+        paths = [path for path in paths if path not in several]
+        if not paths:
+            return
         done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
         ordered = sorted(finished, key=lambda item: item[0])
@@ -94,6 +126,4 @@ def eval_command(
             files = write_reports(out, scores, tables, picture=not interrupted)
             typer.echo("wrote " + ", ".join(str(file) for file in files))
         say_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
-        failures = [score for score in scores if score.failure]
-        if failures:
-            raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
+        refuse_failures(scores)

@@ -53,6 +53,14 @@ ModelOption = Annotated[
         help="The human: full (eighteen limbs), papers (their ten), or measured (full, as bodies are; if nobody tells a pose).",
     ),
 ]
+PeopleOption = Annotated[
+    str,
+    typer.Option(
+        "--people",
+        metavar="any|N",
+        help="How many to follow: 1 (default) the most visible person; any, or up to N, each with an id that lasts.",
+    ),
+]
 FrameOption = Annotated[
     str | None,
     typer.Option("--frame", metavar="NAME", help="Root frame of the result, instead of the recording's own."),

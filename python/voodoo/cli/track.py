@@ -18,6 +18,7 @@ from voodoo.cli.options import (
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
+    PeopleOption,
     RecordingArgument,
     StrictOption,
     TopicOption,
@@ -38,6 +39,7 @@ def track_command(
     height: HeightOption = None,
     model: ModelOption = None,
     config: ConfigOption = None,
+    people: PeopleOption = "1",
     out: Annotated[
         list[Path] | None,
         typer.Option(
@@ -99,7 +101,13 @@ def track_command(
     --init FILE gives the pose in the first frame, by any subset of names that fixes it, or with stamp_s that of a later one:
     {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
 
+    --people any or N follows several people, found in depth images; no start is read. The .csv then begins stamp_s, person,
+    status, residual_m and has a row for every person who is there; person is an id from 1, which whoever comes back has again.
+    The .npz and bags hold everybody (frames body_1, body_2, ...); of .bvh and .trc there is one file a person: NAME_1.bvh, ...
+
     Examples
+
+    voodoo track walk_bag/ --people any --out all.csv --overlay all.mp4
 
     voodoo track walk_bag/ --out walk.csv --overlay look.mp4
 
@@ -111,10 +119,12 @@ def track_command(
     """
     from dataclasses import replace
 
+    from voodoo.cli.people import Outputs, body_of, follow_people, limit_of, no_starts
     from voodoo.cli.running import bare_for, boxes_of, config_of, depth_filter_of, kinds_of, opened, run, viewer_of
     from voodoo.export.files import check_target
     from voodoo.export.files import save as export
     from voodoo.model.body import Body
+    from voodoo.people import People
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
     from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
     from voodoo.recordings.left_out import LeftOut
@@ -128,7 +138,8 @@ def track_command(
             raise typer.BadParameter("--offset is for the stamps of --with, give both")
         kinds, left_out = kinds_of(use), None if strict else LeftOut()
         depth_filter, boxes = depth_filter_of(depth_range), boxes_of(exclude)
-        beginning = beginning_of(init)
+        several, limit = limit_of(people)
+        beginning = no_starts(init) if several else beginning_of(init)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
         numbers, others = numbers_of(option), with_ or ()
         options = topics_of(topic) | loader_options(recording, loader, markers=markers, layout=layout, numbers=numbers)
@@ -151,6 +162,12 @@ def track_command(
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target, inputs=(recording, *(with_ or ())))
+        if several:
+            everybody = People(body_of(body, height=height, model=model), config=config_of(config), limit=limit)
+            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
+            with viewer_of(view, save, source.name) as viewer:
+                follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer))
+            return
         tracker = start_tracker(
             source,
             init=beginning,

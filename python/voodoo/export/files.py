@@ -31,12 +31,12 @@ def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
     """
     if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
         raise VoodooError(f"{path}: expected another file than what is read, found the same")
-    if path.suffix not in FORMATS and not _is_folder(path):
+    if path.suffix not in FORMATS and not is_folder(path):
         raise VoodooError(
             f"{path}: expected a name that ends in {', '.join(FORMATS)}, or a new folder for a ROS 2 bag, found "
             f"{path.suffix!r}"
         )
-    if _is_folder(path) and path.exists():
+    if is_folder(path) and path.exists():
         raise VoodooError(f"{path}: expected a new folder for a ROS 2 bag, found one that exists")
     if path.is_dir():
         raise VoodooError(f"{path}: expected a file, found a folder")
@@ -45,7 +45,7 @@ def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
         raise VoodooError(f"{path}: expected a folder that can be written to, found {above}")
 
 
-def _is_folder(path: Path) -> bool:
+def is_folder(path: Path) -> bool:
     """Whether a name is a bag folder's: what follows its last dot, if any, is no file's suffix (run.2026-05-01)."""
     return path.suffix not in FORMATS and not path.suffix[1:].isalpha()
 
@@ -74,7 +74,7 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
             bag = Path(folder) / path.stem
             write_bag(bag, track, body, root_frame=root_frame)
             shutil.move(next(bag.glob("*.mcap")), path)
-    elif _is_folder(path):
+    elif is_folder(path):
         write_bag(path, track, body, root_frame=root_frame)
     else:
         track.save(path)

@@ -8,6 +8,7 @@ left, z up when the person stands at rest (REP-103). The parent of `body_<id>` i
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ FRAMES = {"pelvis": "waist", "thorax": "torso", "torso": "torso", "head": "head"
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
+_TF = "tf2_msgs/msg/TFMessage"
 _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 1, 7, 0, 3
 
 
@@ -56,43 +58,92 @@ def write_bag(
             of another body.
         OSError: the bag cannot be written.
     """
+    if not person.isidentifier():
+        raise VoodooError(f"person: expected a name, found {person!r}")
+    _write(path, [_Human(track, body, person, f"/humans/bodies/{person}")], root_frame, markers=markers)
+
+
+def write_people_bag(
+    path: str | Path, people: Mapping[str, tuple[Track, Body]], *, root_frame: str, markers: bool = True
+) -> None:
+    """Write a new bag folder of several people.
+
+    As `write_bag`, with frames `body_<person>`, `torso_<person>`, ... and topics `/humans/bodies/body_<person>/...`: a name in a
+    ROS 2 topic does not begin with a digit.
+
+    Args:
+        path: the folder, which must not exist.
+        people: REP-155 id -> track with limb poses, and body in the sizes it was tracked with.
+        root_frame: frame of the tracks.
+        markers: also write the markers.
+
+    Raises:
+        VoodooError: as `write_bag`.
+        OSError: the bag cannot be written.
+    """
+    humans = [_Human(track, body, name, f"/humans/bodies/body_{name}") for name, (track, body) in people.items()]
+    _write(path, humans, root_frame, markers=markers)
+
+
+class _Human:
+    """The messages of one person."""
+
+    def __init__(self, track: Track, body: Body, person: str, topic: str) -> None:
+        self.track, self.body, self.person, self.topic = track, body, person, topic
+        if (track.stamps < 0.0).any():
+            raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
+        self._posed, self._shown = skeleton(track, body), track.found
+        shown = self._shown
+        self._names, angles = joint_angles(self._posed.of_frames(shown)) if shown.any() else ((), np.empty((0, 0)))
+        self._rows = iter(angles)
+
+    def kinds(self, markers: bool) -> dict[str, str]:
+        """Topics and types of the messages, without /tf."""
+        kinds = {f"{self.topic}/joint_states": "sensor_msgs/msg/JointState"}
+        return kinds | ({f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"} if markers else {})
+
+    def messages(self, index: int, root_frame: str, *, markers: bool) -> dict[str, Any]:
+        """Topic -> message of a frame; frames are asked for in order."""
+        nanoseconds = round(float(self.track.stamps[index]) * 1e9)
+        header = _header(nanoseconds, root_frame)
+        messages: dict[str, Any] = {}
+        if self._shown[index]:
+            messages["/tf"] = _new(
+                _TF, transforms=_transforms(self.track, self._posed, index, root_frame, self.person, nanoseconds)
+            )
+            messages[f"{self.topic}/joint_states"] = _new(
+                "sensor_msgs/msg/JointState",
+                header=_header(nanoseconds, f"body_{self.person}"),
+                name=[f"{name}_{self.person}" for name in self._names],
+                position=next(self._rows),
+                velocity=np.empty(0),
+                effort=np.empty(0),
+            )
+        if markers:
+            drawn = _markers(self.track, self.body, index, header) if self._shown[index] else [_no_markers(header)]
+            messages[f"{self.topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
+        return messages
+
+
+def _write(path: str | Path, humans: Sequence[_Human], root_frame: str, *, markers: bool) -> None:
     path = Path(path)
     if path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
-    if not root_frame or not person.isidentifier():
-        raise VoodooError(f"root_frame, person: expected names, found {root_frame!r} and {person!r}")
-    if (track.stamps < 0.0).any():
-        raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
-    posed, shown = skeleton(track, body), track.found
-    names, angles = joint_angles(posed.of_frames(shown)) if shown.any() else ((), np.empty((0, 0)))
-    topic = f"/humans/bodies/{person}"
-    kinds = {"/tf": "tf2_msgs/msg/TFMessage", f"{topic}/joint_states": "sensor_msgs/msg/JointState"}
-    if markers:
-        kinds[f"{topic}/markers"] = "visualization_msgs/msg/MarkerArray"
+    if not root_frame:
+        raise VoodooError("root_frame: expected a name, found none")
+    kinds = {"/tf": _TF}
+    for human in humans:
+        kinds |= human.kinds(markers)
+    frames = sorted(
+        (float(stamp), number, index)
+        for number, human in enumerate(humans)
+        for index, stamp in enumerate(human.track.stamps)
+    )
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connect = {name: writer.add_connection(name, kind, typestore=_STORE) for name, kind in kinds.items()}
-        rows = iter(angles)
-        for index, stamp in enumerate(track.stamps):
-            nanoseconds = round(float(stamp) * 1e9)
-            header = _header(nanoseconds, root_frame)
-            messages: dict[str, Any] = {}
-            if shown[index]:
-                messages["/tf"] = _new(
-                    kinds["/tf"], transforms=_transforms(track, posed, index, root_frame, person, nanoseconds)
-                )
-                messages[f"{topic}/joint_states"] = _new(
-                    "sensor_msgs/msg/JointState",
-                    header=_header(nanoseconds, f"body_{person}"),
-                    name=[f"{name}_{person}" for name in names],
-                    position=next(rows),
-                    velocity=np.empty(0),
-                    effort=np.empty(0),
-                )
-            if markers:
-                drawn = _markers(track, body, index, header) if shown[index] else [_no_markers(header)]
-                messages[f"{topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
-            for name, message in messages.items():
-                writer.write(connect[name], nanoseconds, _STORE.serialize_cdr(message, message.__msgtype__))
+        for stamp, number, index in frames:
+            for name, message in humans[number].messages(index, root_frame, markers=markers).items():
+                writer.write(connect[name], round(stamp * 1e9), _STORE.serialize_cdr(message, message.__msgtype__))
 
 
 def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[str, tuple[str | None, FloatArray]]:

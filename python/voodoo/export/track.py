@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, reading
+from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
 from voodoo.ik.angles import angle_names as angle_names_of
 from voodoo.ik.angles import angles_of
 from voodoo.ik.chain import Chain
@@ -218,33 +219,19 @@ class Track:
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as file:
-            np.savez_compressed(
-                file,
-                stamps=self.stamps,
-                status=np.array(self.status, dtype=np.str_),
-                residual=self.residual,
-                joint_names=np.array(self.joint_names, dtype=np.str_),
-                joints=self.joints,
-                limb_names=np.array(self.limb_names, dtype=np.str_),
-                world_from_limb=self.world_from_limb,
-                angle_names=np.array(self.angle_names, dtype=np.str_),
-                angles=self.angles,
-                format_version=np.array(FORMAT_VERSION),
-                limb_status_names=np.array(list(self.limb_status), dtype=np.str_),
-                limb_status=np.array(list(self.limb_status.values()), dtype=np.str_).reshape(-1, len(self)).T,
-                left_out_reasons=np.array(list(self.left_out), dtype=np.str_),
-                left_out_counts=np.array(list(self.left_out.values()), dtype=np.int64),
-            )
+            np.savez_compressed(file, allow_pickle=False, **arrays_of(self))
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
-        """Read what save() wrote.
+        """Read what save() wrote, or the only person of a result of several people.
 
         Raises:
-            VoodooError: another suffix, damage, or a file of another kind.
+            VoodooError: another suffix, damage, a file of another kind, or several persons.
         """
         path = a_path(path, error=VoodooError)
         check_suffix(path)
+        if is_people_file(path):
+            return _only_person(path)
         with reading(path, "a result of voodoo track"):
             try:
                 return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
@@ -288,27 +275,90 @@ class Track:
     @classmethod
     def _read_npz(cls, path: Path) -> Track:
         with np.load(path, allow_pickle=False) as content:
-            missing = [name for name in _ARRAYS if name not in content]
-            if missing:
-                raise VoodooError(f"expected the arrays {', '.join(_ARRAYS)}, found no {', '.join(missing)}")
-            version = int(content["format_version"]) if "format_version" in content else 1
-            if version > FORMAT_VERSION:
-                raise VoodooError(
-                    f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
-                )
-            return cls(
-                stamps=content["stamps"],
-                status=tuple(str(value) for value in content["status"]),
-                residual=content["residual"],
-                joint_names=tuple(str(value) for value in content["joint_names"]),
-                joints=content["joints"],
-                limb_names=tuple(str(value) for value in content["limb_names"]),
-                world_from_limb=content["world_from_limb"],
-                # Files of earlier versions have no angles.
-                angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
-                angles=content["angles"] if "angles" in content else np.empty((0, 0)),
-                **_told(content),
-            )
+            return track_of(content)
+
+
+def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:
+    """All of a track as arrays of numbers and words, for .npz."""
+    words = ("status", "joint_names", "limb_names", "angle_names")
+    limbs = np.array(list(track.limb_status.values()), dtype=np.str_)
+    return {name: np.array(getattr(track, name), dtype=np.str_) for name in words} | {
+        **{name: getattr(track, name) for name in _BY_FRAME},
+        "format_version": np.array(FORMAT_VERSION),
+        "limb_status_names": np.array(list(track.limb_status), dtype=np.str_),
+        "limb_status": limbs.reshape(len(track.limb_status), len(track)).T,
+        "left_out_reasons": np.array(list(track.left_out), dtype=np.str_),
+        "left_out_counts": np.array(list(track.left_out.values()), dtype=np.int64),
+    }
+
+
+def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
+    """The track of such arrays.
+
+    Raises:
+        VoodooError: one is missing, or they do not belong together.
+    """
+    missing = [name for name in _ARRAYS if name not in content]
+    if missing:
+        raise VoodooError(f"expected the arrays {', '.join(_ARRAYS)}, found no {', '.join(missing)}")
+    version = int(content["format_version"]) if "format_version" in content else 1
+    if version > FORMAT_VERSION:
+        raise VoodooError(
+            f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
+        )
+    return Track(
+        stamps=content["stamps"],
+        status=tuple(str(value) for value in content["status"]),
+        residual=content["residual"],
+        joint_names=tuple(str(value) for value in content["joint_names"]),
+        joints=content["joints"],
+        limb_names=tuple(str(value) for value in content["limb_names"]),
+        world_from_limb=content["world_from_limb"],
+        # Files of earlier versions have no angles.
+        angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
+        angles=content["angles"] if "angles" in content else np.empty((0, 0)),
+        **_told(content),
+    )
+
+
+def track_of_rows(rows: PeopleRows, person: int) -> Track:
+    """The rows of one person."""
+    own = np.flatnonzero(rows.persons == person)
+    return Track(
+        stamps=rows.stamps[own],
+        status=tuple(rows.status[index] for index in own),
+        residual=rows.residual[own],
+        joint_names=rows.joint_names,
+        joints=rows.joints[own],
+        limb_names=(),
+        world_from_limb=np.empty((len(own), 0, 4, 4)),
+        angle_names=rows.angle_names,
+        angles=rows.angles[own],
+    )
+
+
+def tracks_of(content: Mapping[str, npt.NDArray[Any]]) -> dict[int, Track]:
+    """The tracks of an .npz of several people, by person."""
+    tracks = {}
+    for one in content["persons"].tolist():
+        prefix = f"person_{one}/"
+        own = {name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)}
+        tracks[int(one)] = track_of(own)
+    return tracks
+
+
+def _only_person(path: Path) -> Track:
+    """The track in a result of several people that holds one."""
+    if path.suffix == ".npz":
+        with reading(path, "a result of voodoo track --people"), np.load(path, allow_pickle=False) as content:
+            tracks = tracks_of(content)
+    else:
+        rows = read_rows(path)
+        tracks = {one: track_of_rows(rows, one) for one in np.unique(rows.persons).tolist()}
+    if len(tracks) != 1:
+        found = ", ".join(str(one) for one in tracks) or "nobody"
+        raise VoodooError(f"{path}: expected the result of one person, found persons {found}")
+    return next(iter(tracks.values()))
 
 
 def _told(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.model.joint import short
+from voodoo.recordings.people_truth import PeopleTruth
 
 
 class _Joints(TypedDict):
@@ -122,6 +123,7 @@ class Recording(ABC):
         start: where the body is in the first frame, or None.
         reference: joint positions to compare with, or None.
         assumed: what nothing in the recording tells and was assumed, or is not used, in words.
+        people: where everybody is, of a recording of several people with a truth, or None.
     """
 
     assumed: tuple[str, ...] = ()
@@ -130,6 +132,7 @@ class Recording(ABC):
     root_frame: str
     start: Start | None
     reference: Reference | None
+    people: PeopleTruth | None = None
 
     @abstractmethod
     def __len__(self) -> int:
@@ -162,8 +165,10 @@ class Recording(ABC):
         return f"{type(self).__name__}({self.name!r}, {len(self)} frames, root frame {self.root_frame!r})"
 
 
-def reference_words(reference: Reference | None) -> str:
+def reference_words(reference: Reference | None, people: PeopleTruth | None = None) -> str:
     """The reference in words for RecordingInfo."""
+    if reference is None and people is not None:
+        return f"{len(people.persons)} persons, {len(people.names)} joints, {len(people.stamps)} stamps, exact"
     if reference is None:
         return "none"
     kind = "exact" if reference.exact else "estimated by another tracker"

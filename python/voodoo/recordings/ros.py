@@ -15,6 +15,7 @@ from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, M
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
@@ -41,6 +42,8 @@ from voodoo.recordings.transforms import TransformTree, matrix
 from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
 
 _MILLIMETRE = 0.001
+STILL_FRAMES = ("odom", "map")
+"""Where a robot that moves says it is (REP-105): smoothly, and without drift but with jumps."""
 _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -53,8 +56,9 @@ class RosRecording(Recording):
     and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover` repair
     it), as is one whose index announces other messages than it holds.
 
-    truth.csv and init.json in the bag's folder or the one above become `reference` and `start`, unless `bare`. Their positions
-    are in the recording's own root frame, or in the one that init.json's key `frame` names.
+    truth.csv, truth_people.csv and init.json in the bag's folder or the one above become `reference`, `people` and `start`,
+    unless `bare`. Their positions are in base_link, or else world, or else the first sensor's frame, or in the one that
+    init.json's key `frame` names.
 
     A .bag of librealsense's recorder has no ROS frames: its streams are frames of their own ("Depth_0").
 
@@ -64,7 +68,8 @@ class RosRecording(Recording):
         depth_topic, points_topic, scan_topic, color_topic: a topic or several, instead of the one found by type and
             name. The first one of the first kind makes the frames.
         camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
-        root_frame: by default base_link, or else world, if the bag's transforms know it, else the frame of the first sensor.
+        root_frame: by default odom, else map, where base_link moves in it; else base_link, or else world, if the bag's
+            transforms know it, else the frame of the first sensor.
         metres_per_unit: of 16-bit depth images; None: what a bag of librealsense's recorder tells, else 0.001.
         tf_max_age: how old a changing transform may be [s].
         bare: read nothing that lies beside the bag.
@@ -192,7 +197,7 @@ class RosRecording(Recording):
             root_frame=self.root_frame,
             sensors=tuple(sensors),
             unused=tuple(self._unused),
-            reference=reference_words(self.reference),
+            reference=reference_words(self.reference, self.people),
             notes=self.assumed,
         )
 
@@ -208,12 +213,14 @@ class RosRecording(Recording):
 
     def _read_beside(self, place: Path, *, bare: bool) -> None:
         """Reference and start from the files beside the bag; where damage is left out, ones that do not fit are only noted."""
-        self.reference, self.start = None, None
-        truth, start = (None if bare else find_beside(place, name) for name in ("truth.csv", "init.json"))
-        for file in (truth, start):
+        self.reference, self.start, self.people = None, None, None
+        for name in () if bare else ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
+            file = find_beside(place, name)
             try:
-                if file is not None and file is truth:
+                if file is not None and name == "truth.csv":
                     self.reference = read_truth(file, self._root_from_own)
+                elif file is not None and name == PEOPLE_TRUTH_FILE:
+                    self.people = read_people_truth(file, self._root_from_own)
                 elif file is not None:
                     self.start = read_start(file, self._root_from_start)
             except RecordingError as error:
@@ -222,7 +229,7 @@ class RosRecording(Recording):
                 self.assumed = (*self.assumed, f"{file} is not used: {error}")
 
     def _read_transforms(self, asked: str | None, sources: Sequence[Source]) -> str:
-        """Fill the tree and choose the root frame; the big topic tf is only read when tf_static does not suffice."""
+        """Fill the tree and choose the root frame."""
         self._read_recorders_transforms()
         names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
         static = [name for name in names if name.endswith("tf_static")]
@@ -230,14 +237,15 @@ class RosRecording(Recording):
         for topics, is_static in ((static, True), (dynamic, False)):
             for _, message in self._bag.read(topics):
                 self._add_transforms(message, static=is_static)
-            known = {*self._tree.frames, *(source.frame for source in sources)}
-            self._own_root = next((name for name in OWN_ROOTS if name in known), sources[0].frame)
-            root = asked if asked is not None else self._own_root
-            # base_link may still come, on tf.
-            told = asked is not None or root == OWN_ROOTS[0]
-            if told and root in known and all(self._reaches(root, source.frame) for source in sources):
-                return root
-        return root
+        known = {*self._tree.frames, *(source.frame for source in sources)}
+        self._own_root = next((name for name in OWN_ROOTS if name in known), sources[0].frame)
+        if asked is not None:
+            return asked
+        if self._own_root != OWN_ROOTS[0]:
+            return self._own_root
+        # Before a robot that moves people and rooms stand still in the frame it moves in.
+        moving = [frame for frame in STILL_FRAMES if self._tree.moves(frame, self._own_root)]
+        return next((frame for frame in moving if all(self._reaches(frame, s.frame) for s in sources)), self._own_root)
 
     def _add_transforms(self, message: Message | None, *, static: bool) -> None:
         try:

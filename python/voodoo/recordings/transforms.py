@@ -8,10 +8,14 @@ from collections import deque
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.recordings.ros_messages import Message
+
+WAVERS_M, WAVERS_RAD = 0.05, math.radians(2.0)
+"""A robot whose odometry stays within this stands: how far wheels and gyroscopes drift in a recording."""
 
 
 def matrix(translation: Message, rotation: Message, source: object) -> FloatArray:
@@ -44,6 +48,15 @@ def inverse(a_from_b: FloatArray) -> FloatArray:
     return result
 
 
+def between(first: FloatArray, second: FloatArray, share: float) -> FloatArray:
+    """The rigid transform (4, 4) at a share, 0 to 1, of the way from one to another: straight on, turning evenly."""
+    turns = Rotation.from_matrix([first[:3, :3], second[:3, :3]])
+    result = np.eye(4)
+    result[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
+    result[:3, 3] = (1.0 - share) * first[:3, 3] + share * second[:3, 3]
+    return result
+
+
 class _Edge:
     """parent_from_child over time, sorted by stamp."""
 
@@ -62,13 +75,23 @@ class _Edge:
         self.stamps.insert(at, stamp)
         self.transforms.insert(at, transform)
 
+    def moves(self) -> bool:
+        """Whether any transform is farther from the first one than odometry wavers."""
+        if self.constant:
+            return False
+        all_of_them = np.array(self.transforms)
+        away = np.linalg.norm(all_of_them[:, :3, 3] - all_of_them[0, :3, 3], axis=1).max()
+        cosines = (np.einsum("fij,ij->f", all_of_them[:, :3, :3], all_of_them[0, :3, :3]) - 1.0) / 2.0
+        return bool(away > WAVERS_M or np.arccos(np.clip(cosines, -1.0, 1.0)).max() > WAVERS_RAD)
+
 
 class TransformTree:
     """Frames joined by transforms.
 
-    A transform that never changes holds at all times, whichever topic it came on. One that changes is taken at
-    the latest stamp at or before the one asked for, if that is at most `max_age` seconds old; before its first stamp
-    the first one is taken, if it comes at most `max_age` later.
+    A transform that never changes holds at all times, whichever topic it came on. One that changes is interpolated between
+    the stamps before and after the one asked for, if these are at most `2 max_age` apart. Else, and after its last stamp, the
+    latest one before counts, if it is at most `max_age` seconds old; before its first stamp the first one is taken, if it comes
+    at most `max_age` later.
 
     Args:
         source: recording to name in errors.
@@ -136,6 +159,16 @@ class TransformTree:
         path = self.path(root, frame)
         return all(self._edge(a, b)[0].constant for a, b in pairwise(path))
 
+    def moves(self, root: str, frame: str) -> bool:
+        """Whether a frame moves in another one, by more than odometry wavers while a robot stands; False if not connected."""
+        if not {root, frame} <= self._neighbours.keys():
+            return False
+        try:
+            path = self.path(root, frame)
+        except RecordingError:
+            return False
+        return any(self._edge(a, b)[0].moves() for a, b in pairwise(path))
+
     def lookup(self, root: str, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) at `stamp`.
 
@@ -158,6 +191,10 @@ class TransformTree:
         if edge.constant:
             return edge.transforms[0]
         index = max(bisect_right(edge.stamps, stamp) - 1, 0)
+        span = edge.stamps[index + 1] - edge.stamps[index] if index + 1 < len(edge.stamps) else math.inf
+        if stamp > edge.stamps[index] and span <= 2.0 * self.max_age:
+            share = (stamp - edge.stamps[index]) / span
+            return between(edge.transforms[index], edge.transforms[index + 1], share)
         age = stamp - edge.stamps[index]
         if abs(age) > self.max_age:
             raise RecordingError(

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 import voodoo._core as _core
-from voodoo.ik.chain import Chain
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
+from voodoo.synthetic.gait import Stop, pose_at
 from voodoo.synthetic.render import render_depth
 from voodoo.synthetic.sequence import METRES_PER_UNIT, FloatArray, VirtualFrame
 
@@ -20,8 +19,6 @@ CAMERA = Camera(320, 240, 275.0, 275.0, 159.5, 119.5)
 
 _RATE_HZ = 30.0
 _NOISE_AT_M = 2.4
-_STRIDE_M = 1.4
-"""Two steps."""
 # The camera stands 0.9 m above the floor and looks along the world's x axis.
 _WORLD_FROM_SENSOR = np.array(
     [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.9], [0.0, 0.0, 0.0, 1.0]]
@@ -33,16 +30,6 @@ FURNITURE: tuple[Box, ...] = (
     ((3.0, -2.0, 0.65), (3.8, -1.0, 0.72)),  # a table
     ((2.9, 1.5, 0.0), (3.3, 1.8, 0.9)),  # a chair
 )
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Where the person is at a time: seconds, metres on the floor, direction it faces [rad], 0 away from the camera."""
-
-    time: float
-    x: float
-    y: float
-    facing: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,22 +69,7 @@ class Walk:
 
     def truth(self, time: float) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray]]:
         """True poses of the limbs and positions of the sites at a time [s]."""
-        times = [stop.time for stop in self.stops]
-        place = np.array([[stop.x, stop.y] for stop in self.stops])
-        x, y = (float(np.interp(time, times, place[:, axis])) for axis in (0, 1))
-        facing = float(np.interp(time, times, np.unwrap([stop.facing for stop in self.stops])))
-        lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1))])
-        walked = float(np.interp(time, times, lengths))
-        index = min(int(np.searchsorted(times, time, side="right")), len(times) - 1)
-        speed = (lengths[index] - lengths[index - 1]) / max(times[index] - times[index - 1], 1e-9) if index else 0.0
-        chain = Chain(self.body)
-        root = np.eye(4)
-        c, s = math.cos(facing), math.sin(facing)
-        root[:3, :3] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
-        root[:3, 3] = (x, y, self._hip_height())
-        swing = min(speed, 1.0)
-        angles = np.array([self._angle(name, math.tau * walked / _STRIDE_M, swing) for name in chain.angle_names])
-        return chain.forward(angles, world_from_base=root)
+        return pose_at(self.body, self.stops, time)
 
     def __iter__(self) -> Iterator[VirtualFrame]:
         """The frames in order, rendered one by one."""
@@ -124,23 +96,6 @@ class Walk:
         )
         found.set_ground(normal=(0.0, 0.0, 1.0), offset=0.0)
         return found
-
-    def _hip_height(self) -> float:
-        _, sites = Chain(self.body).forward(np.zeros(len(Chain(self.body).angle_names)))
-        return float(0.08 - min(sites["l_ankle"][2], sites["r_ankle"][2]))
-
-    @staticmethod
-    def _angle(name: str, phase: float, swing: float) -> float:
-        side, _, plain = name.partition("_")
-        wave = math.sin(phase) if side == "l" else -math.sin(phase)
-        lift = max(math.cos(phase) if side == "l" else -math.cos(phase), 0.0)
-        return {
-            "hip_rx": 0.5 * wave * swing,
-            "knee_flexion": 0.08 + 0.9 * lift * swing,
-            "shoulder_rx": -0.45 * wave * swing,
-            "shoulder_ry": -0.12 if side == "l" else 0.12,
-            "elbow_flexion": 0.25 + 0.2 * swing,
-        }.get(plain if side in ("l", "r") else "", 0.0)
 
 
 def _room(boxes: Sequence[Box]) -> FloatArray:

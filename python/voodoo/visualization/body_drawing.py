@@ -9,16 +9,23 @@ import numpy.typing as npt
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.model.body import Body
 from voodoo.model.projection import View, limb_outline, limb_rings, transform
-from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, FloatArray, Picture, fixed, point, side_color
+from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Picture, fixed, point, side_color
 
 _OPACITY = 0.62
 _FACETS = 64
 
 
-def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View) -> None:
+def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View, *, color: Color | None = None) -> None:
     """Draw limbs as shaded, half transparent solids with outlines, far ones first, then joints and sites.
 
     Nothing is drawn while nobody is tracked.
+
+    Args:
+        picture: drawn into.
+        body: with its sizes.
+        estimate: the pose.
+        view: where places are in the picture.
+        color: of everything; None: by side, see `side_color`.
     """
     if not estimate.joints:
         return
@@ -31,7 +38,7 @@ def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View) -> N
             limbs.append((float(view.project(centre)[1][0]), limb, root_from_limb, outline))
     layer, covered = picture.copy(), np.zeros(picture.shape[:2], dtype=np.uint8)
     for _, limb, root_from_limb, outline in sorted(limbs, key=lambda item: -item[0]):
-        _draw_solid(layer, limb.shape, root_from_limb, view, side_color(limb.name))
+        _draw_solid(layer, limb.shape, root_from_limb, view, color or side_color(limb.name))
         border = fixed(outline)
         cv2.polylines(layer, [border], True, PAPER, 1, cv2.LINE_AA, SUBPIXEL)
         cv2.fillConvexPoly(covered, border, 255, cv2.LINE_8, SUBPIXEL)
@@ -39,8 +46,8 @@ def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View) -> N
     mixed = cv2.addWeighted(layer, _OPACITY, picture, 1.0 - _OPACITY, 0.0)
     picture[inside] = mixed[inside]
     for _, limb, _, outline in limbs:
-        cv2.polylines(picture, [fixed(outline)], True, side_color(limb.name), 1, cv2.LINE_AA, SUBPIXEL)
-    _draw_sites(picture, estimate, view)
+        cv2.polylines(picture, [fixed(outline)], True, color or side_color(limb.name), 1, cv2.LINE_AA, SUBPIXEL)
+    _draw_sites(picture, estimate, view, color)
 
 
 def _draw_solid(
@@ -79,7 +86,7 @@ def _ahead(facets: FloatArray) -> npt.NDArray[np.bool_]:
     return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) > 0.0)
 
 
-def _draw_sites(picture: Picture, estimate: Estimate, view: View) -> None:
+def _draw_sites(picture: Picture, estimate: Estimate, view: View, color: Color | None) -> None:
     """Draw every joint and site as a dot with a dark rim."""
     pixels, _ = view.project(np.array(list(estimate.joints.values()), dtype=np.float64))
     radius = max(3, round(picture.shape[0] / 160))
@@ -87,5 +94,5 @@ def _draw_sites(picture: Picture, estimate: Estimate, view: View) -> None:
         if np.isfinite(pixel).all() and np.abs(pixel).max() < 1e5:
             centre = point(pixel)
             cv2.circle(picture, centre, (radius + 2) << SUBPIXEL, PAPER, -1, cv2.LINE_AA, SUBPIXEL)
-            cv2.circle(picture, centre, (radius + 1) << SUBPIXEL, side_color(name), -1, cv2.LINE_AA, SUBPIXEL)
+            cv2.circle(picture, centre, (radius + 1) << SUBPIXEL, color or side_color(name), -1, cv2.LINE_AA, SUBPIXEL)
             cv2.circle(picture, centre, (radius - 1) << SUBPIXEL, INK, -1, cv2.LINE_AA, SUBPIXEL)

@@ -35,3 +35,14 @@ def point(pixel: npt.NDArray[np.floating]) -> tuple[int, int]:
 def side_color(name: str) -> Color:
     """Blue for the person's left, orange for the right, grey for the middle."""
     return LEFT if name.startswith("l_") else RIGHT if name.startswith("r_") else MIDDLE
+
+
+_PERSONS: tuple[Color, ...] = (
+    (80, 190, 255), (255, 170, 60), (110, 220, 90), (220, 110, 230),
+    (90, 100, 250), (220, 220, 80), (140, 170, 250), (200, 140, 140),
+)  # fmt: skip
+
+
+def person_color(person: int) -> Color:
+    """The colour of a person, from 1; the same in all pictures."""
+    return _PERSONS[(person - 1) % len(_PERSONS)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
 import cv2
@@ -14,6 +14,7 @@ from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import Axes, CameraView, TopView
 from voodoo.names import SEARCHING
+from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
@@ -21,7 +22,8 @@ from voodoo.sensors.adapters import Memory, adapter_of
 from voodoo.sensors.adapters.drawing import Pictured
 from voodoo.visualization.body_drawing import draw_body
 from voodoo.visualization.canvas import OverlayCanvas, same_place
-from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Picture, point
+from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, Picture, person_color, point
+from voodoo.visualization.people_drawing import draw_people
 from voodoo.visualization.sheet import contact_sheet, side_by_side
 
 __all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
@@ -73,16 +75,7 @@ class Overlay:
             index: number of the frame, from 0, for the caption.
             front_end: gives the rays and skin regions of the frame.
         """
-        current = {item.sensor: item for item in _pictured(recorded)}
-        pictures: list[Picture] = []
-        for sensor, first in self._panels.items():
-            scale = _scale(first)
-            seen = self._background(current.get(sensor), first)
-            resized = cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
-            item = current.get(sensor, first)
-            view = CameraView(item.camera, item.root_from_sensor, scale)
-            canvas = OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
-            pictures.append(_drawn(canvas, recorded, body, estimate, front_end))
+        pictures = [_drawn(canvas, recorded, body, estimate, front_end) for canvas in self._canvases(recorded)]
         if not pictures:
             if estimate.joints:
                 x, y, z = (float(value) for value in np.median(list(estimate.joints.values()), axis=0))
@@ -90,9 +83,45 @@ class Overlay:
             top = TopView(self._centre, _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
             pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, body, estimate, front_end))
         picture = side_by_side(pictures)
-        self._origin = estimate.stamp if self._origin is None else self._origin
-        caption(picture, f"{index + 1}/{self._frames}   {estimate.stamp - self._origin:.2f} s", estimate)
+        caption(picture, self._when(index, estimate.stamp), estimate)
         return picture
+
+    def draw_people(
+        self, recorded: RecordedFrame, estimate: PeopleEstimate, bodies: Mapping[int, Body], *, index: int
+    ) -> Picture:
+        """Draw everybody in a frame, each in a colour of their own and with their number.
+
+        Args:
+            recorded: the measurements; needs the picture of a camera.
+            estimate: who is there.
+            bodies: of all of them, with the sizes they had in this frame.
+            index: number of the frame, from 0, for the caption.
+        """
+        pictures = []
+        for canvas in self._canvases(recorded):
+            draw_people(canvas.picture, estimate, bodies, canvas.view)
+            canvas.finish()
+            pictures.append(canvas.picture)
+        picture = side_by_side(pictures)
+        told = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
+        write_parts(picture, [(self._when(index, estimate.stamp), INK), *told])
+        return picture
+
+    def _canvases(self, recorded: RecordedFrame) -> Iterator[OverlayCanvas]:
+        """The picture of each camera."""
+        current = {item.sensor: item for item in _pictured(recorded)}
+        for sensor, first in self._panels.items():
+            scale = _scale(first)
+            seen = self._background(current.get(sensor), first)
+            resized = cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+            item = current.get(sensor, first)
+            view = CameraView(item.camera, item.root_from_sensor, scale)
+            yield OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
+
+    def _when(self, index: int, stamp: float) -> str:
+        """Number and time of a frame, from the first one on."""
+        self._origin = stamp if self._origin is None else self._origin
+        return f"{index + 1}/{self._frames}   {stamp - self._origin:.2f} s"
 
     def _background(self, item: Pictured | None, first: Pictured) -> Picture:
         """What the camera saw; dark paper when it saw nothing new, or only its keypoints are known."""
@@ -134,11 +163,16 @@ def _drawn(
 
 def caption(picture: Picture, text: str, estimate: Estimate) -> None:
     """Write frame number, status and, if there is one, residual into the top left corner."""
-    size = picture.shape[0] / 1100.0
     status = str(estimate.status)
     parts = [(text, INK), (status, _STATUS.get(status, INK))]
     if np.isfinite(estimate.residual):
         parts.append((f"{1e3 * estimate.residual:.0f} mm", INK))
+    write_parts(picture, parts)
+
+
+def write_parts(picture: Picture, parts: Sequence[tuple[str, Color]]) -> None:
+    """Write words of several colours into the top left corner."""
+    size = picture.shape[0] / 1100.0
     x, y = round(22 * size), round(42 * size)
     for part, color in parts:
         for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):  # a dark rim keeps it legible over bright depth

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from datetime import timedelta
 from pathlib import Path
 from types import ModuleType, TracebackType
@@ -18,9 +19,12 @@ from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.errors import VoodooError
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
+from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.search import nobody
 from voodoo.sensors.adapters import Memory, adapter_of
 from voodoo.visualization.body_geometry import bands, limb_colours, limb_mesh
+from voodoo.visualization.ink import person_color
 from voodoo.visualization.rerun_log import StepLog, entity
 
 _MOST_POINTS = 40_000
@@ -62,6 +66,7 @@ class Viewer:
         self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._shapes: dict[str, TaperedEllipticCylinder] = {}
+        self._people: set[int] = set()
 
     def _open(self) -> None:
         """Start the viewer; without a screen it would end unseen."""
@@ -108,10 +113,10 @@ class Viewer:
             front_end: gives the rays and skin candidates of the step.
             seconds: time the step took.
         """
-        # Stamps of a robot count from 1970, those of other recordings from their start.
-        clock = "timestamp" if estimate.stamp > _EPOCH_S else "duration"
-        self._stream.set_time("time", **{clock: estimate.stamp})
-        self._log_body(estimate, body)
+        self._set_time(estimate.stamp)
+        colours = limb_colours(body)
+        self._log_classes(body, colours)
+        self._log_body("world/body", estimate, body, colours)
         memory = Memory() if front_end is None else front_end.memory
         log = StepLog(self._rr, self._stream, estimate, body, _MOST_POINTS)
         for item in () if recorded is None else recorded.measurements:
@@ -120,26 +125,77 @@ class Viewer:
             self._log_rays(front_end, estimate)
         self._log_plots(estimate, seconds)
 
-    def _log_body(self, estimate: Estimate, body: Body) -> None:
-        rr, colours = self._rr, limb_colours(body)
+    def log_people(
+        self,
+        estimate: PeopleEstimate,
+        bodies: Mapping[int, Body],
+        *,
+        recorded: RecordedFrame | None = None,
+        seconds: float | None = None,
+    ) -> None:
+        """Show a step of several people: `world/people/<id>/...`, each in a colour of their own and with their number.
+
+        Args:
+            estimate: who is there.
+            bodies: of them, with their current sizes.
+            recorded: the measurements.
+            seconds: time the step took.
+        """
+        rr = self._rr
+        self._set_time(estimate.stamp)
+        if recorded is not None:
+            # Pictures and points belong to nobody in particular.
+            log = StepLog(rr, self._stream, nobody(estimate.stamp), Body.human(), _MOST_POINTS)
+            for item in recorded.measurements:
+                adapter_of(item).log(item, log, Memory())
+        there = {person.id for person in estimate if person.estimate.joints}
+        for gone in self._people - there:
+            self._clear(f"world/people/{gone}")
+        self._people = there
+        for person in estimate:
+            if person.id in there:
+                path, blue_green_red = f"world/people/{person.id}", person_color(person.id)
+                colour = (blue_green_red[2], blue_green_red[1], blue_green_red[0])
+                body = bodies[person.id]
+                self._log_body(path, person.estimate, body, dict.fromkeys(body.limb_names, colour))
+                head = person.estimate.joint_positions[person.estimate.joint_positions[:, 2].argmax()]
+                words = [f"{person.id} {person.status}"]
+                self._stream.log(f"{path}/number", rr.Points3D([head], labels=words, colors=[colour], radii=0.02))
+            self._stream.log(f"plots/status/{person.id}", rr.TextLog(str(person.status)))
+        self._stream.log("plots/people", rr.Scalars(float(len(there))))
+        if seconds is not None:
+            self._stream.log("plots/step_ms", rr.Scalars(1e3 * seconds))
+
+    def _set_time(self, stamp: float) -> None:
+        # Stamps of a robot count from 1970, those of other recordings from their start.
+        clock = "timestamp" if stamp > _EPOCH_S else "duration"
+        self._stream.set_time("time", **{clock: stamp})
+
+    def _clear(self, path: str) -> None:
+        """Nobody is there; the meshes have to be sent again for the next person."""
+        self._stream.log(path, self._rr.Clear(recursive=True))
+        self._shapes = {name: shape for name, shape in self._shapes.items() if not name.startswith(f"{path}/")}
+
+    def _log_classes(self, body: Body, colours: Mapping[str, tuple[int, int, int]]) -> None:
+        """Names and colours of the silhouette's values; 0 is the background."""
         if self._classes != body.limb_names:
-            # Names and colours of the silhouette's values; 0 is the background.
             self._classes = body.limb_names
             rows = [(0, "background", (0, 0, 0, 0))]
             rows += [(index, name, (*colours[name], 255)) for index, name in enumerate(self._classes, start=1)]
-            self._stream.log("world", rr.AnnotationContext(rows), static=True)
+            self._stream.log("world", self._rr.AnnotationContext(rows), static=True)
+
+    def _log_body(self, path: str, estimate: Estimate, body: Body, colours: Mapping[str, tuple[int, int, int]]) -> None:
+        rr = self._rr
         if not estimate.joints:
-            # Nobody is there; the meshes have to be sent again for the next person.
-            self._stream.log("world/body", rr.Clear(recursive=True))
-            self._shapes = {}
+            self._clear(path)
             return
         for limb in body.limbs:
-            path = f"world/body/limbs/{limb.name}"
-            if not _alike(self._shapes.get(limb.name), limb.shape):
-                self._shapes[limb.name] = limb.shape
+            place = f"{path}/limbs/{limb.name}"
+            if not _alike(self._shapes.get(place), limb.shape):
+                self._shapes[place] = limb.shape
                 vertices, triangles, normals = limb_mesh(limb.shape)
                 self._stream.log(
-                    path,
+                    place,
                     rr.Mesh3D(
                         vertex_positions=vertices,
                         triangle_indices=triangles,
@@ -148,12 +204,12 @@ class Viewer:
                     ),
                 )
             pose = estimate.world_from_limb[limb.name]
-            self._stream.log(path, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+            self._stream.log(place, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
         self._stream.log(
-            "world/body/joints",
+            f"{path}/joints",
             rr.Points3D(estimate.joint_positions, radii=0.012, labels=list(estimate.joint_names), show_labels=False),
         )
-        self._stream.log("world/body/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
+        self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
 
     def _log_rays(self, front_end: FrontEnd, estimate: Estimate) -> None:
         strips, colours, labels = [], [], []

@@ -107,11 +107,13 @@ impl ContourSearch {
             match view.at(place) {
                 Pixel::Unknown => return None,
                 Pixel::Foreground(z) if z < place.z - deep => return None,
+                // Where another body begins this one need not end.
+                Pixel::Other(z) if z < place.z + deep => return None,
                 Pixel::Foreground(z) if z <= place.z + deep => {
                     last = Some((place, z));
                     from = r;
                 }
-                Pixel::Foreground(_) | Pixel::Background(_) => {
+                Pixel::Foreground(_) | Pixel::Background(_) | Pixel::Other(_) => {
                     let (last, z) = last?;
                     if stride <= step || r - from <= step {
                         // The edge lies between the two last looks.

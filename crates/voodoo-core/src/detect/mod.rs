@@ -5,6 +5,7 @@ pub mod crop;
 mod floor;
 mod names;
 pub mod network;
+mod product;
 mod rejections;
 pub mod segmentation;
 mod skeleton;
@@ -187,6 +188,13 @@ impl Detector {
     /// has a person's size.
     pub fn first_look(&self) -> Option<(f64, Aabb)> {
         self.nearest
+    }
+
+    /// Nobody asks for a person of the last image: others are looked at before them.
+    pub fn refuse(&mut self, detection: &Detection) {
+        if let Some(candidate) = self.segmentation.candidates().get(detection.candidate) {
+            self.rejections.note(candidate, false);
+        }
     }
 
     /// Indices of the pixels of a detection of the last image.

@@ -3,6 +3,7 @@
 use crate::math::{Aabb, Pose, Vec3};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Ground};
+use crate::observation::share::NOBODY;
 
 /// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 30 wide and 80 high.
 const MOST_PIXELS: usize = 26_000;
@@ -22,6 +23,17 @@ pub struct Surroundings<'a> {
     pub background: &'a [f32],
     /// Boxes of the world that hold nobody.
     pub excluded: &'a [Aabb],
+    /// Who explains each pixel, and who does not matter among them; empty where nobody does.
+    pub owners: &'a [u16],
+    /// Whose pixels may be the person all the same.
+    pub own: Option<u16>,
+}
+
+impl Surroundings<'_> {
+    /// Whether a pixel shows somebody else.
+    fn is_others(&self, index: usize) -> bool {
+        self.owners.get(index).is_some_and(|owner| *owner != NOBODY && Some(*owner) != self.own)
+    }
 }
 
 /// The thinned image. Points are in the camera's optical frame.
@@ -61,7 +73,7 @@ impl View {
                 };
                 let z = image.pixels.get(index) * image.metres_per_unit as f32;
                 let background = around.background.get(index).is_some_and(|depth| Background::holds(*depth, z));
-                let kept = z > RANGE[0] && z < RANGE[1] && !background;
+                let kept = z > RANGE[0] && z < RANGE[1] && !background && !around.is_others(index);
                 self.depth.push(if kept { z } else { 0.0 });
                 self.slopes.push(slope);
             }

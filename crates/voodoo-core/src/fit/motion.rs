@@ -83,6 +83,19 @@ impl Motion {
         }
     }
 
+    /// Poses expected at a time to come, world frame, into `expected`; nothing changes.
+    pub fn expect(&self, body: &Body, stamp: f64, damping: f64, expected: &mut Vec<Pose>) {
+        let ratio = match (self.stamp, self.interval) {
+            (Some(last), Some(interval)) if self.previous.len() == self.poses.len() => {
+                ((stamp - last) / interval).min(LONGEST_PREDICTION)
+            }
+            _ => 0.0,
+        };
+        let before = if ratio > 0.0 { &self.previous } else { &self.poses };
+        predict(body, before, &self.poses, ratio * damping, expected);
+        expected.iter_mut().for_each(|pose| *pose = shifted(pose, -self.origin));
+    }
+
     /// The frame is done.
     pub fn commit(&mut self, stamp: f64) {
         self.interval = self.stamp.map(|last| stamp - last);

@@ -1,4 +1,4 @@
-//! The still scene behind the body, learnt from the depth images of a camera that does not move.
+//! The still scene behind the body, learnt from the depth images of a camera.
 
 use std::ops::Range;
 
@@ -17,19 +17,37 @@ const LEARNING: f32 = 0.1;
 /// One row of this many is learnt in a frame, for speed: the scene stands still.
 const ROW_STEP: usize = 8;
 
+/// A camera that moved by no more than this stands: metres, and radians; the odometry of a robot that stands wavers by less.
+const STANDS: (f64, f64) = (0.003, 0.0015);
+/// Stands for the depth at pixels that show another body: whatever returns there belongs to what is not this one.
+pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
+
 /// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
 #[derive(Clone, Debug, Default)]
 pub struct Background {
-    world_from_sensor: Option<Pose>,
-    width: usize,
-    depth: Vec<f32>,
+    pub(super) world_from_sensor: Option<Pose>,
+    pub(super) width: usize,
+    pub(super) depth: Vec<f32>,
+    /// The ray `(x/z, y/z)` that each depth was seen on; empty while the camera has not moved: through the middle of its pixel.
+    pub(super) rays: Vec<[f32; 2]>,
     row: usize,
 }
 
 /// The backgrounds of all depth images, in the order of the frame.
 #[derive(Clone, Debug, Default)]
 pub struct Backgrounds {
-    images: Vec<Background>,
+    pub(super) images: Vec<Background>,
+}
+
+/// How far apart two poses are: metres, and radians.
+pub(super) fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+    (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
+}
+
+/// Whether a camera stands where it was.
+fn stands(a: &Pose, b: &Pose) -> bool {
+    let (metres, radians) = apart(a, b);
+    a == b || (metres <= STANDS.0 && radians <= STANDS.1)
 }
 
 impl Background {
@@ -44,10 +62,14 @@ impl Background {
         depth > 0.0 && z > depth - SCENE_MARGIN.0 - SCENE_MARGIN.1 * depth
     }
 
-    fn fits(&self, image: &DepthImage) -> bool {
-        self.world_from_sensor == Some(image.world_from_sensor)
-            && self.width == image.width
-            && self.depth.len() == image.pixels.len()
+    /// Whether it is that of this image: of its camera, where it stands.
+    pub(super) fn fits(&self, image: &DepthImage) -> bool {
+        self.is_sized_like(image)
+            && self.world_from_sensor.is_some_and(|known| stands(&known, &image.world_from_sensor))
+    }
+
+    pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
+        self.width == image.width && self.depth.len() == image.pixels.len()
     }
 
     /// Learns from neighbouring pixels, without a branch.
@@ -87,9 +109,34 @@ impl Backgrounds {
     }
 
     /// What was learnt of this image.
-    pub(super) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
+    pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
         let known = self.images.iter_mut().find(|background| background.fits(image));
         known.map(|background| background.depth.as_mut_slice())
+    }
+
+    /// Takes up what is known of another's images, and `change`s it.
+    pub(super) fn adopt(&mut self, frame: &Frame, scene: &Self, mut change: impl FnMut(usize, &mut [f32])) {
+        self.images.resize_with(frame.images.len(), Background::default);
+        for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
+            (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.width);
+            own.depth.clear();
+            match scene.of(image) {
+                Some(known) => own.depth.extend_from_slice(&known.depth),
+                None => own.depth.resize(image.pixels.len(), 0.0),
+            }
+            change(number, &mut own.depth);
+        }
+    }
+
+    /// Makes sure that something is known, if only nothing, of every image of a frame; `moved` gets the numbers of those whose
+    /// cameras are not where they were, and whether what they had learnt was carried along.
+    pub(crate) fn meet(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
+        for (number, image) in frame.images.iter().enumerate() {
+            if self.of(image).is_none() {
+                let (_, carried) = self.carry(image, frame);
+                moved(number, carried);
+            }
+        }
     }
 
     /// Whether no depth image was ever seen.
@@ -114,6 +161,7 @@ impl Backgrounds {
                 world_from_sensor: Some(image.world_from_sensor),
                 width: image.width,
                 depth,
+                rays: Vec::new(),
                 row: 0,
             });
         }
@@ -129,12 +177,12 @@ impl Backgrounds {
         }
     }
 
-    /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. A camera that moved
-    /// starts anew with nothing known; one that is silent in this frame is remembered.
+    /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. What a
+    /// camera learnt that moved since is carried along; one that is silent in this frame is remembered.
     pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> (Range<usize>, Range<usize>)) {
         for image in frame.images {
             let known = self.images.iter().position(|background| background.fits(image));
-            let index = known.unwrap_or_else(|| self.start_anew(image, frame));
+            let index = known.unwrap_or_else(|| self.carry(image, frame).0);
             let background = &mut self.images[index];
             let (columns, rows) = window(image);
             background.row = (background.row + 1) % ROW_STEP;
@@ -148,21 +196,6 @@ impl Backgrounds {
                 }
             }
         }
-    }
-
-    /// Nothing is known behind this image any more; in the place of a background that no image of the frame has.
-    fn start_anew(&mut self, image: &DepthImage, frame: &Frame) -> usize {
-        let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
-        let index = self.images.iter().position(gone).unwrap_or(self.images.len());
-        if index == self.images.len() {
-            self.images.push(Background::default());
-        }
-        let background = &mut self.images[index];
-        background.world_from_sensor = Some(image.world_from_sensor);
-        background.width = image.width;
-        background.depth.clear();
-        background.depth.resize(image.pixels.len(), 0.0);
-        index
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the pixels of a depth image say about a place in space.
 
 use crate::math::{Pose, Vec3, shifted};
-use crate::observation::background::{Background, Backgrounds};
+use crate::observation::background::{Background, Backgrounds, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
 
 /// A depth image as a witness: what lies in a pixel.
@@ -26,6 +26,8 @@ pub enum Pixel {
     Background(f64),
     /// Something that may be the body, at this depth.
     Foreground(f64),
+    /// Another body, at this depth.
+    Other(f64),
 }
 
 /// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
@@ -84,10 +86,15 @@ impl DepthView<'_> {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
         }
         let scene = self.background.and_then(|background| background.depth().get(index));
-        if scene.is_some_and(|depth| Background::holds(*depth, z as f32)) {
-            Pixel::Background(z)
-        } else {
-            Pixel::Foreground(z)
+        match scene {
+            Some(depth) if Background::holds(*depth, z as f32) => {
+                if *depth == OTHERS {
+                    Pixel::Other(z)
+                } else {
+                    Pixel::Background(z)
+                }
+            }
+            _ => Pixel::Foreground(z),
         }
     }
 }

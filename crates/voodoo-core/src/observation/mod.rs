@@ -5,6 +5,7 @@
 //! space, `segments` looks for a lost body, and `registration` brings depths into the picture of another camera.
 
 pub mod background;
+mod background_moved;
 mod background_update;
 pub mod candidates;
 pub(crate) mod clusters;
@@ -14,3 +15,4 @@ pub mod observer;
 pub(crate) mod pixels;
 pub mod registration;
 pub(crate) mod segments;
+pub mod share;

@@ -1,9 +1,10 @@
 //! Turns a frame into an observation of the tracked body: what is background, what may be the body, which images were segmented.
 
-use super::background::Backgrounds;
+use super::background::{Backgrounds, OTHERS};
 use super::candidates::{Candidates, body_box};
 use super::depth_view::{DepthViews, find_segmented};
 use super::frame::Frame;
+use super::share::Share;
 use crate::body::Body;
 use crate::config::Config;
 use crate::math::{Aabb, Pose, Vec3};
@@ -75,6 +76,11 @@ impl Observer {
         self.backgrounds.clear();
     }
 
+    /// Notes which images of a frame are segmented; nothing is learnt.
+    pub fn face(&mut self, frame: &Frame) {
+        find_segmented(frame, &mut self.segmented);
+    }
+
     /// Step 1 (K06 IV-B.1): learns the background, and keeps the points in the enlarged box of the whole body.
     pub fn observe(&mut self, frame: &Frame, expected: Expectation, config: &Config) {
         find_segmented(frame, &mut self.segmented);
@@ -82,6 +88,18 @@ impl Observer {
         if config.background {
             self.backgrounds.learn_around(frame, expected, &bounds);
         }
+        self.gather(frame, expected.origin, &bounds, config);
+    }
+
+    /// The same for one of several persons: the scene is known, and what others explain is theirs.
+    pub fn observe_share(&mut self, frame: &Frame, expected: Expectation, share: Share, config: &Config) {
+        find_segmented(frame, &mut self.segmented);
+        let bounds = body_box(expected.body, expected.poses, config.body_box_margin);
+        self.backgrounds.adopt(frame, share.scene, |image, depth| {
+            for (depth, owner) in depth.iter_mut().zip(share.owners(image)) {
+                *depth = if share.is_others(*owner) { OTHERS } else { *depth };
+            }
+        });
         self.gather(frame, expected.origin, &bounds, config);
     }
 

@@ -4,11 +4,11 @@ use crate::detect::Detection;
 use crate::math::Vec3;
 
 /// From this sum of log odds on it is a person.
-const ENOUGH_ODDS: f64 = 4.0;
+pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 /// What a look counts less than its log odds: looks at a thing that stands still err alike.
-const LOOK_COSTS: f64 = 1.0;
+pub(crate) const LOOK_COSTS: f64 = 1.0;
 /// What is seen within this of the last place is the same, metres.
-const SAME_PERSON: f64 = 0.5;
+pub(crate) const SAME_PERSON: f64 = 0.5;
 /// Share that is left of what was believed after a frame without it.
 const FADES: f64 = 0.5;
 

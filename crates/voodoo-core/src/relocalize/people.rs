@@ -6,6 +6,7 @@ use crate::detect::{Detection, Detector, JOINTS, Surroundings, Wanted, lengths, 
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
+use crate::observation::share::Share;
 
 /// Looks for people, from the first time on that it is asked to; keeps what it last saw.
 #[derive(Debug, Default)]
@@ -46,15 +47,17 @@ impl People {
         (self.seen, self.verdict) = (None, None);
     }
 
-    /// Looks at all depth images of a frame; keeps and returns the surest person.
-    pub(super) fn look(&mut self, frame: &Frame, wanted: Wanted) -> Option<&Detection> {
+    /// Looks at all depth images of a frame, or at its share of them; keeps and returns the surest person.
+    pub(super) fn look(&mut self, frame: &Frame, share: Option<Share>, wanted: Wanted) -> Option<&Detection> {
         self.forget();
         if self.detector.is_none() {
             self.detector = Detector::new().ok();
         }
         let detector = self.detector.as_mut()?;
         for (number, image) in frame.images.iter().enumerate() {
-            let around = Surroundings { ground: frame.ground, excluded: frame.excluded, ..Surroundings::default() };
+            let (owners, own) = share.map_or((&[][..], None), |share| (share.owners(number), Some(share.own)));
+            let around =
+                Surroundings { ground: frame.ground, excluded: frame.excluded, owners, own, ..Surroundings::default() };
             let found = detector.detect(image, &around, wanted).first();
             let surer = |found: &&Detection| self.seen.as_ref().is_none_or(|best| found.person > best.person);
             if let Some(found) = found.filter(surer).cloned() {
@@ -72,7 +75,7 @@ impl People {
 }
 
 /// A body of a detected person's sizes, like on both sides, and the pose that fits the joints best, world frame.
-pub(super) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<Pose>)> {
+pub(crate) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<Pose>)> {
     let body = with_sizes(&model.reference_body, &detection.sizes())?;
     let poses = posed(&body, detection)?;
     Some((body, poses))

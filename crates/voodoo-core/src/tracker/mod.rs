@@ -5,6 +5,7 @@ mod edits;
 pub mod estimate;
 mod queries;
 mod report;
+mod start;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
@@ -15,6 +16,7 @@ use crate::math::{Pose, Vec3, is_rigid};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
+use crate::observation::share::Share;
 use crate::relocalize::{Relocalizer, Sighting};
 use crate::sizes::{Reliance, Sizes, Start};
 use assess::Assessor;
@@ -92,30 +94,16 @@ impl Tracker {
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
         if self.is_started() {
-            self.follow(frame)
+            self.verify_start(frame);
+            self.follow(frame, None)
         } else {
             self.search(frame)
         }
         Ok(&self.estimate)
     }
 
-    /// Looks for a person, and follows the one that is found.
-    fn search(&mut self, frame: &Frame) {
-        if let Some((body, poses)) = self.relocalizer.first(frame, &self.model) {
-            self.restart(body, poses, true);
-            self.assessor.doubt_pose();
-            self.relocalizer.found_itself();
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.follow(frame);
-            if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
-                return;
-            }
-        }
-        self.stop(frame.stamp);
-    }
-
-    /// The pose at the next instant (K06 IV-B).
-    fn follow(&mut self, frame: &Frame) {
+    /// The pose at the next instant (K06 IV-B), by all of a frame or by its `share` of it.
+    fn follow(&mut self, frame: &Frame, share: Option<Share>) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
@@ -125,7 +113,10 @@ impl Tracker {
         let Motion { poses, previous, predicted, origin, .. } = motion;
         let own = relocalizer.own();
         let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched, own };
-        observer.observe(frame, expected, config);
+        match share {
+            None => observer.observe(frame, expected, config),
+            Some(share) => observer.observe_share(frame, expected, share, config),
+        }
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
@@ -135,9 +126,13 @@ impl Tracker {
         sizes.initialise(setting, model, poses, fit);
         steps += fit.run(setting.of(model), predicted, poses);
         // Other configurations of arms and legs.
-        if schedule.whole_body {
+        if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
-            relocalizer.look(frame, &model.body, poses[0].translation + *origin, assessor.doubts(), lost);
+            let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
+            match share {
+                None => relocalizer.look(frame, root, doubtful, lost),
+                Some(share) => relocalizer.look_at_share(frame, share, root, doubtful, lost),
+            }
         }
         if config.hypotheses && schedule.whole_body && known {
             steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection());
@@ -149,8 +144,9 @@ impl Tracker {
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
         motion.commit(frame.stamp);
-        if self.config.relocalization && schedule.whole_body {
-            self.relocalize(frame);
+        let relocalizes = self.config.relocalization && schedule.whole_body;
+        if relocalizes && self.relocalize(frame, known, share.is_some()) {
+            return self.follow(frame, share);
         }
         self.remember();
         self.report(frame.stamp, steps);
@@ -160,11 +156,12 @@ impl Tracker {
         }
     }
 
-    /// There is nobody: from the next frame on somebody is looked for.
-    fn stop(&mut self, stamp: f64) {
-        self.motion.poses.clear();
-        self.motion.stamp = Some(stamp);
-        self.estimate = Estimate { stamp, ..Estimate::default() };
+    /// The pose at the next instant by its share of a frame, which was checked.
+    pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
+        if self.is_started() {
+            self.follow(frame, Some(share));
+        }
+        &self.estimate
     }
 
     /// Refuses what cannot be used, before anything changes.
@@ -175,17 +172,19 @@ impl Tracker {
         frame.check(&self.model.body, self.motion.stamp)
     }
 
-    /// Remembers a tracked body; looks for a lost one, and takes it where it is found.
-    fn relocalize(&mut self, frame: &Frame) {
+    /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found. A track
+    /// that is not `known` for long starts anew instead, in this frame: whether it does.
+    fn relocalize(&mut self, frame: &Frame, known: bool, among: bool) -> bool {
         let lost = self.assessor.status() == Status::Lost;
-        if self.relocalizer.detection().is_some() {
+        if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost) && self.move_to_detection(frame) {
-                return;
+                // What was learnt of sizes and scene was learnt in the wrong place.
+                return self.relocalizer.young(frame.stamp) && self.restart_at_detection();
             }
         }
-        if !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
-            return;
+        if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
+            return false;
         }
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         let seen = observer.seen(frame, motion.origin);
@@ -197,15 +196,17 @@ impl Tracker {
         if self.relocalizer.conclude(found, sighting, &self.motion.poses) {
             self.assessor.give_up();
         }
+        false
     }
 
     /// Moves the body to where a detector sees it; whether it is there now.
     fn move_to_detection(&mut self, frame: &Frame) -> bool {
-        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         let learnt = observer.release(frame, relocalizer.own());
         let seen = observer.seen(frame, motion.origin);
         let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-        let place = relocalizer.detected(setting.of(model), fit, &motion.poses);
+        let lost = assessor.status() == Status::Lost;
+        let place = relocalizer.detected(setting.of(model), fit, &motion.poses, lost);
         let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
         let moved = better && self.move_to_predicted(frame);
         if !moved {

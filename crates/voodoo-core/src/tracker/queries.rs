@@ -5,7 +5,7 @@ use super::estimate::Estimate;
 use crate::body::Body;
 use crate::config::Config;
 use crate::error::TrackError;
-use crate::math::Points;
+use crate::math::{Points, Pose};
 use crate::observation::frame::PointSlice;
 use crate::shape::SurfaceBatch;
 
@@ -23,6 +23,14 @@ impl Tracker {
     /// The last estimate.
     pub fn estimate(&self) -> &Estimate {
         &self.estimate
+    }
+
+    /// The poses expected at a time to come, world frame; none without a pose.
+    pub(crate) fn expect(&self, stamp: f64, expected: &mut Vec<Pose>) {
+        expected.clear();
+        if self.is_started() {
+            self.motion.expect(&self.model.body, stamp, self.config.prediction, expected);
+        }
     }
 
     /// A pose was set.

@@ -110,8 +110,8 @@ fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
     Some(match view.at(point) {
         Pixel::Unknown => return None,
         Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => Sight::FreeSpaceViolation,
-        Pixel::Foreground(z) if z > point.z + SEEN_PAST => Sight::FreeSpaceViolation,
-        Pixel::Background(z) | Pixel::Foreground(z) if z > point.z - SEEN_PAST => Sight::Consistent,
+        Pixel::Foreground(z) | Pixel::Other(z) if z > point.z + SEEN_PAST => Sight::FreeSpaceViolation,
+        Pixel::Background(z) | Pixel::Foreground(z) | Pixel::Other(z) if z > point.z - SEEN_PAST => Sight::Consistent,
         _ => Sight::Occluded,
     })
 }

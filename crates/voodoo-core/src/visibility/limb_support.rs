@@ -109,7 +109,7 @@ fn support_seen_by(
             }
             match pixel {
                 Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => count(&mut support.free_space),
-                Pixel::Foreground(z) if z > point.z + SEEN_PAST => count(&mut support.free_space),
+                Pixel::Foreground(z) | Pixel::Other(z) if z > point.z + SEEN_PAST => count(&mut support.free_space),
                 Pixel::Foreground(z) if (z - point.z).abs() < SAME_DEPTH => {
                     let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
                     if !strangers.any(|(_, other)| (depth(other) - z).abs() < SAME_DEPTH) {

@@ -50,18 +50,57 @@ class CamerasStart(StartFinder):
             if isinstance(item, KeypointImage):
                 self._latest[item.sensor] = item
         images = [item for item in self._latest.values() if abs(seen.stamp - item.stamp) <= _TOGETHER_S]
-        views = [[person for rows in item.people if (person := _person(item, rows, seen))] for item in images]
-        best: tuple[float, dict[str, Place]] | None = None
-        for one, other in combinations([view for view in views if view], 2):
-            for pair in ((first, second) for first in one for second in other):
-                places = _together(pair, views)
-                score = sum(float(place.trust.sum()) for place in places.values())
-                if places and (best is None or score > best[0]) and _stands(places, seen):
-                    best = score, places
-        if best is None:
-            return None
-        joints = _joints(best[1])
-        return Found(joints, {name: best[1][name].sigma for name in joints}, self.name)
+        best = _best(_views(images, seen), seen)
+        return None if best is None else _found(best)
+
+
+def everybody(seen: Seen, *, cameras: int) -> list[Found]:
+    """All persons of whom so many cameras show the keypoints in one frame, the one seen best first.
+
+    Who is seen by fewer is left out: in the background of one or two pictures stand others, and what is wrong agrees by chance.
+    """
+    views = _views([item for item in seen.measurements if isinstance(item, KeypointImage)], seen)
+    found = []
+    while (best := _best(views, seen)) is not None:
+        if len(best.persons) >= cameras:
+            found.append(_found(best))
+        taken = {id(person) for person in best.persons}
+        views = [[person for person in view if id(person) not in taken] for view in views]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """One person in several cameras, and where their sites are."""
+
+    persons: Sequence[_Person]
+    places: dict[str, Place]
+
+    @property
+    def score(self) -> float:
+        """How many rays agree."""
+        return sum(float(place.trust.sum()) for place in self.places.values())
+
+
+def _views(images: Sequence[KeypointImage], seen: Seen) -> list[list[_Person]]:
+    """Who is seen in each camera."""
+    return [[person for rows in item.people if (person := _person(item, rows, seen))] for item in images]
+
+
+def _best(views: Sequence[Sequence[_Person]], seen: Seen) -> _Group | None:
+    """The person on whom most rays agree."""
+    best: _Group | None = None
+    for one, other in combinations([view for view in views if view], 2):
+        for pair in ((first, second) for first in one for second in other):
+            group = _together(pair, views)
+            if group is not None and (best is None or group.score > best.score) and _stands(group.places, seen):
+                best = group
+    return best
+
+
+def _found(group: _Group) -> Found:
+    joints = _joints(group.places)
+    return Found(joints, {name: group.places[name].sigma for name in joints}, CamerasStart.name)
 
 
 def _joints(places: dict[str, Place]) -> dict[str, FloatArray]:
@@ -91,18 +130,18 @@ def _person(item: KeypointImage, rows: FloatArray, seen: Seen) -> _Person | None
     return _Person(item.sensor, rays) if len(rays) >= _LEAST_SITES else None
 
 
-def _together(pair: Sequence[_Person], views: Sequence[Sequence[_Person]]) -> dict[str, Place]:
-    """The places of a person seen in two cameras, with the rays of those in other cameras that are the same person."""
-    group = list(pair)
-    places = _places(group) if _gap(*pair) < 2.0 * _SAME_PERSON_M else {}
+def _together(pair: Sequence[_Person], views: Sequence[Sequence[_Person]]) -> _Group | None:
+    """A person seen in two cameras, with those in other cameras that are the same person."""
+    persons = list(pair)
+    places = _places(persons) if _gap(*pair) < 2.0 * _SAME_PERSON_M else {}
     if len(places) < _LEAST_SITES:
-        return {}
+        return None
     for view in views:
-        if view and view[0].camera not in {person.camera for person in group}:
+        if view and view[0].camera not in {person.camera for person in persons}:
             away, nearest = min(((_away(person, places), person) for person in view), key=lambda each: each[0])
             if away < _SAME_PERSON_M:
-                group.append(nearest)
-    return places if len(group) == len(pair) else _places(group)
+                persons.append(nearest)
+    return _Group(persons, places if len(persons) == len(pair) else _places(persons))
 
 
 def _gap(one: _Person, other: _Person) -> float:

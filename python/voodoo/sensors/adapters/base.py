@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
 from voodoo.measurements import DepthImage
+from voodoo.people import Followed
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import RangeNoise
@@ -84,7 +85,7 @@ class Context:
     measurements: Sequence[Any]
     predicted: Mapping[str, FloatArray]
     settings: FrontEndSettings
-    tracker: Tracker
+    tracker: Tracker | Followed
     predictor: SitePredictor
     motion: LimbMotion
     gate: SiteGate

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
 from voodoo.measurements import ColorImage
+from voodoo.people import Followed
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
@@ -114,18 +115,18 @@ def _body_view(item: ColorImage, then: dict[str, FloatArray], context: Context) 
     )
 
 
-def _hands(tracker: Tracker, sites: Iterable[str], limb: str, *, measured: bool) -> set[str]:
+def _hands(tracker: Tracker | Followed, sites: Iterable[str], limb: str, *, measured: bool) -> set[str]:
     """Hands whose forearm or upper arm was, or was not, measured in the last frame."""
     status = tracker.estimate.limb_status
     known = {site: status.get(f"{site[:2]}{limb}") for site in sites}
     return {site for site, value in known.items() if value is not None and (value == "measured") == measured}
 
 
-def _heads(tracker: Tracker, sites: Iterable[str]) -> set[str]:
+def _heads(tracker: Tracker | Followed, sites: Iterable[str]) -> set[str]:
     """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
     measured = tracker.estimate.limb_status.get("head") == "measured"
     return {site for site in sites if measured and site.startswith("head")}
 
 
-def _limb_distances(tracker: Tracker, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
+def _limb_distances(tracker: Tracker | Followed, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
     return dict(zip(tracker.estimate.limb_names, tracker.limb_distances(places), strict=True))

@@ -1,0 +1,196 @@
+//! A scene that was learnt by a camera which has moved since: its surfaces stay where they are in the world.
+
+use super::background::{Background, Backgrounds, apart};
+use super::frame::{DepthImage, Frame};
+use crate::math::Pose;
+
+/// A camera that moved by more than this from one image to the next is another one: metres, and radians.
+const LEAPS: (f64, f64) = (0.5, 0.5);
+/// Surfaces nearer to the camera plane are not carried along, metres: no sensor measures there.
+const NEAREST_CARRIED: f32 = 0.1;
+/// Two sides of a crack that differ by less, metres, belong to one surface.
+const CRACK_STEP: f32 = 0.15;
+
+impl Backgrounds {
+    /// The number of a background for an image that has none, and whether anything is known there: what the same camera has learnt elsewhere is carried to where it is
+    /// now, else nothing is known; in the place of a background that no image of the frame has.
+    pub(super) fn carry(&mut self, image: &DepthImage, frame: &Frame) -> (usize, bool) {
+        let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
+        let from = |background: &Background| background.world_from_sensor.filter(|_| background.is_sized_like(image));
+        let leap = |background: &Background| {
+            let (metres, radians) = apart(&from(background)?, &image.world_from_sensor);
+            (metres <= LEAPS.0 && radians <= LEAPS.1).then_some(metres / LEAPS.0 + radians / LEAPS.1)
+        };
+        let left = (0..self.images.len()).filter(|index| gone(&self.images[*index]));
+        let nearest = left
+            .clone()
+            .filter_map(|index| Some((leap(&self.images[index])?, index)))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, index)| index);
+        let index = nearest.or(left.clone().next()).unwrap_or(self.images.len());
+        if index == self.images.len() {
+            self.images.push(Background::default());
+        }
+        let background = &mut self.images[index];
+        let before = background.world_from_sensor.filter(|_| nearest.is_some() && image.rays.is_none());
+        match &before {
+            Some(before) => background.move_to(image, before),
+            None => background.forget(image),
+        }
+        background.world_from_sensor = Some(image.world_from_sensor);
+        background.width = image.width;
+        (index, before.is_some())
+    }
+}
+
+impl Background {
+    /// Nothing is known behind this image.
+    fn forget(&mut self, image: &DepthImage) {
+        self.depth.clear();
+        self.depth.resize(image.pixels.len(), 0.0);
+        self.rays.clear();
+    }
+
+    /// Looks at the learnt surfaces from where the camera is now; the nearest that falls into a pixel is what is known there.
+    ///
+    /// A surface is kept on the ray it was seen on, not in the middle of its pixel: errors of rounding do not add up.
+    fn move_to(&mut self, image: &DepthImage, before: &Pose) {
+        let moved = image.world_from_sensor.inverse() * *before;
+        let turn = glam_columns(&moved);
+        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
+        let (width, height) = (image.width as f32, image.height as f32);
+        let (old, old_rays) = (std::mem::take(&mut self.depth), std::mem::take(&mut self.rays));
+        self.depth.resize(old.len(), 0.0);
+        self.rays.resize(old.len(), NO_RAY);
+        for (index, z) in old.iter().enumerate().filter(|(_, z)| **z > 0.0) {
+            let centre = || [((index % image.width) as f32 - cx) / fx, ((index / image.width) as f32 - cy) / fy];
+            let [x, y] = old_rays.get(index).copied().filter(|ray| *ray != NO_RAY).unwrap_or_else(centre);
+            let place =
+                [0, 1, 2].map(|axis| z * (turn[0][axis] * x + turn[1][axis] * y + turn[2][axis]) + turn[3][axis]);
+            if place[2] < NEAREST_CARRIED {
+                continue;
+            }
+            let ray = [place[0] / place[2], place[1] / place[2]];
+            let (column, row) = ((fx * ray[0] + cx).round(), (fy * ray[1] + cy).round());
+            if !(column >= 0.0 && column < width && row >= 0.0 && row < height) {
+                continue;
+            }
+            let target = row as usize * image.width + column as usize;
+            if self.depth[target] == 0.0 || place[2] < self.depth[target] {
+                (self.depth[target], self.rays[target]) = (place[2], ray);
+            }
+        }
+        for step in [1, image.width] {
+            self.close_cracks(step);
+        }
+    }
+
+    /// Closes cracks one pixel wide between neighbours `step` apart, which open where a surface comes nearer.
+    fn close_cracks(&mut self, step: usize) {
+        for index in step..self.depth.len().saturating_sub(step) {
+            let (a, b) = (self.depth[index - step], self.depth[index + step]);
+            if self.depth[index] == 0.0 && a > 0.0 && b > 0.0 && (a - b).abs() < CRACK_STEP {
+                self.depth[index] = 0.5 * (a + b);
+            }
+        }
+    }
+}
+
+/// Stands for the ray through the middle of a pixel.
+pub(super) const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
+
+/// Columns of the rotation, then the translation.
+fn glam_columns(pose: &Pose) -> [[f32; 3]; 4] {
+    let axes = [crate::math::Vec3::X, crate::math::Vec3::Y, crate::math::Vec3::Z].map(|axis| pose.rotation * axis);
+    [axes[0], axes[1], axes[2], pose.translation].map(|column| column.to_array().map(|value| value as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Quat, Vec3};
+    use crate::observation::frame::DepthPixels;
+
+    const SIZE: (usize, usize) = (64, 48);
+
+    fn image(pixels: &[f32], world_from_sensor: Pose) -> DepthImage<'_> {
+        DepthImage {
+            pixels: DepthPixels::F32(pixels),
+            width: SIZE.0,
+            height: SIZE.1,
+            metres_per_unit: 1.0,
+            intrinsics: [60.0, 60.0, 31.5, 23.5],
+            rays: None,
+            world_from_sensor,
+            weight: 1.0,
+            source: 0,
+        }
+    }
+
+    /// A wall at z = 3 with a step to 4 on the right of x = 0.2.
+    fn seen(world_from_sensor: &Pose) -> Vec<f32> {
+        (0..SIZE.0 * SIZE.1)
+            .map(|index| {
+                let ray =
+                    Vec3::new(((index % SIZE.0) as f64 - 31.5) / 60.0, ((index / SIZE.0) as f64 - 23.5) / 60.0, 1.0);
+                let (from, along) = (world_from_sensor.translation, world_from_sensor.rotation * ray);
+                let near = (3.0 - from.z) / along.z;
+                let far = (4.0 - from.z) / along.z;
+                if from.x + near * along.x < 0.2 { near as f32 } else { far as f32 }
+            })
+            .collect()
+    }
+
+    fn pose(x: f64, turn: f64) -> Pose {
+        Pose { rotation: Quat::from_rotation_y(turn), translation: Vec3::new(x, 0.0, 0.0) }
+    }
+
+    #[test]
+    fn what_was_learnt_stays_where_it_is_while_the_camera_moves_on() {
+        let mut backgrounds = Backgrounds::default();
+        let first = seen(&pose(0.0, 0.0));
+        backgrounds.start(&Frame { images: &[image(&first, pose(0.0, 0.0))], ..Frame::empty(0.0) }, |_, _| {});
+        let mut known = 0;
+        for step in 1..=80 {
+            // A sixth of a pixel at a time: rounding alone would leave everything where it was in the image.
+            let now = pose(0.002 * f64::from(step), 0.0025 * f64::from(step));
+            let pixels = seen(&now);
+            let frame = [image(&pixels, now)];
+            let frame = Frame { images: &frame, ..Frame::empty(f64::from(step)) };
+            backgrounds.meet(&frame, |_, _| {});
+            let depth = backgrounds.of(&frame.images[0]).map(Background::depth).unwrap_or_default();
+            known = depth.iter().filter(|z| **z > 0.0).count();
+            // Within a pixel: the step falls between two of them.
+            let beside = |index: usize| pixels[index.saturating_sub(1)..(index + 2).min(pixels.len())].iter();
+            let seen = || depth.iter().enumerate().filter(|(_, z)| **z > 0.0);
+            let near = seen().filter(|(index, z)| beside(*index).all(|seen| **z < seen - 0.1)).count();
+            let deep = seen().filter(|(index, z)| beside(*index).all(|seen| **z > seen + 0.1)).count();
+            // Too near would hide a body; too deep, where the far wall is seen through cracks of the near one, does not.
+            assert!(near == 0 && deep * 20 <= known, "step {step}: {near} too near, {deep} too deep of {known}");
+        }
+        // A turn of 0.2 rad leaves most of the view, of which surfaces that fall into one pixel are lost.
+        assert!(known * 2 > first.len(), "{known} pixels are left");
+    }
+
+    #[test]
+    fn a_camera_that_wavers_stands_and_one_that_leaps_is_another() {
+        let pixels = seen(&pose(0.0, 0.0));
+        let mut backgrounds = Backgrounds::default();
+        let mut known = |now: Pose| {
+            let frame = [image(&pixels, now)];
+            let frame = Frame { images: &frame, ..Frame::empty(0.0) };
+            backgrounds.meet(&frame, |_, _| {});
+            if now == pose(0.0, 0.0) {
+                backgrounds.start(&frame, |_, _| {});
+            }
+            backgrounds
+                .of(&frame.images[0])
+                .map_or(0, |background| background.depth().iter().filter(|z| **z > 0.0).count())
+        };
+        assert_eq!(known(pose(0.0, 0.0)), pixels.len());
+        assert_eq!(known(pose(0.002, 0.001)), pixels.len());
+        let carried = known(pose(0.1, 0.0));
+        assert!(carried < pixels.len() && carried > pixels.len() / 2, "{carried}");
+        assert_eq!(known(pose(1.0, 0.0)), 0);
+    }
+}

@@ -1,0 +1,134 @@
+//! The colour of somebody's clothes, above and below the waist.
+
+use crate::body::Body;
+use crate::math::{Pose, Vec3};
+use crate::observation::frame::{ColorImage, DepthImage, Frame};
+use crate::visibility::ALONG_LIMB;
+
+/// Limbs that show what is worn above the waist, and below it, by what their names hold.
+const WORN: [&[&str]; 2] = [&["thorax", "upperarm", "torso"], &["thigh", "calf"]];
+/// Where across a limb colours are taken, in shares of its radius from the middle: the rim may show what is behind.
+const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
+/// A depth pixel shows the limb when it lies within this of where the limb's surface is, metres: clothes are thick.
+const SHOWS: f64 = 0.08;
+/// Bins of brightness and of the two colour differences.
+const BINS: [usize; 3] = [5, 9, 9];
+/// Range of the colour differences that the bins cover: clothes are seldom more colourful.
+const COLORFUL: f32 = 80.0;
+/// A look at fewer places than this tells nothing.
+const FEWEST_PLACES: usize = 15;
+/// Share of a new look in what is remembered, at least.
+const NEW_LOOK: f32 = 0.1;
+
+/// How often each colour was seen; sums to one.
+#[derive(Clone, Debug, Default)]
+struct Histogram {
+    shares: Vec<f32>,
+    looks: f32,
+}
+
+/// What somebody wears, as far as it was seen.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Clothes {
+    worn: [Histogram; 2],
+    counts: Vec<f32>,
+}
+
+impl Clothes {
+    /// Looks at a posed body, world frame; `own` says of a depth image's number and pixel whether it may be the body's.
+    pub(super) fn look(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
+        let Self { worn, counts } = self;
+        for (names, histogram) in WORN.iter().zip(worn) {
+            counts.clear();
+            counts.resize(BINS.iter().product(), 0.0);
+            let mut seen = 0;
+            for (limb, pose) in body.limbs().iter().zip(poses) {
+                if !names.iter().any(|name| limb.name.contains(name)) {
+                    continue;
+                }
+                for (number, image) in frame.images.iter().enumerate() {
+                    let camera_from_limb = image.world_from_sensor.inverse() * *pose;
+                    for t in ALONG_LIMB {
+                        let Some(facing) = limb.shape.section(t).facing(&camera_from_limb) else { continue };
+                        for place in ACROSS.map(|s| camera_from_limb * facing.point(s)) {
+                            let Some(point) = surface(image, place, |pixel| own(number, pixel)) else { continue };
+                            let world = image.world_from_sensor * point;
+                            if let Some(color) = frame.colors.iter().find_map(|picture| color_at(picture, world)) {
+                                add(counts, color);
+                                seen += 1;
+                            }
+                        }
+                    }
+                }
+            }
+            if seen >= FEWEST_PLACES {
+                histogram.take(counts, seen as f32);
+            }
+        }
+    }
+
+    /// How unlike two persons' clothes are, from 0 to 1, the mean of what was seen of both; none when nothing was.
+    pub(super) fn unlike(&self, other: &Self) -> Option<f64> {
+        let pairs = self.worn.iter().zip(&other.worn).filter(|(a, b)| a.looks > 0.0 && b.looks > 0.0);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (a, b) in pairs {
+            let alike: f32 = a.shares.iter().zip(&b.shares).map(|(a, b)| (a * b).sqrt()).sum();
+            sum += 1.0 - f64::from(alike);
+            count += 1.0;
+        }
+        (count > 0.0).then(|| sum / count)
+    }
+}
+
+impl Histogram {
+    fn take(&mut self, counts: &[f32], total: f32) {
+        self.shares.resize(counts.len(), 0.0);
+        self.looks += 1.0;
+        let new = NEW_LOOK.max(1.0 / self.looks);
+        for (share, count) in self.shares.iter_mut().zip(counts) {
+            *share += new * (count / total - *share);
+        }
+    }
+}
+
+/// The point that a depth image shows where a limb's surface is expected, camera frame.
+fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Option<Vec3> {
+    let pixel = pixel_of(image.intrinsics, [image.width, image.height], place)?;
+    let z = f64::from(image.pixels.get(pixel)) * image.metres_per_unit;
+    ((z - place.z).abs() < SHOWS && own(pixel)).then(|| place * (z / place.z))
+}
+
+/// The colour of a place of the world in a picture.
+fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
+    let place = picture.world_from_sensor.inverse_transform_point(world);
+    let pixel = pixel_of(picture.intrinsics, [picture.width, picture.height], place)?;
+    picture.pixels.get(pixel).copied()
+}
+
+/// The pixel in which a point of the camera's frame is seen.
+fn pixel_of([fx, fy, cx, cy]: [f64; 4], [width, height]: [usize; 2], point: Vec3) -> Option<usize> {
+    let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
+    let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
+    inside.then(|| v as usize * width + u as usize)
+}
+
+/// Counts a colour in the bins about it, by how near it is to their middles.
+fn add(counts: &mut [f32], [first, green, last]: [u8; 3]) {
+    let [x, y, z] = [first, green, last].map(f32::from);
+    // Brightness and colour differences; which end is red does not matter as long as it is always the same.
+    let brightness = 0.2 * x + 0.6 * y + 0.2 * z;
+    let place = |value: f32, bins: usize| (value * (bins - 1) as f32).clamp(0.0, (bins - 1) as f32);
+    let difference = |value: f32| (value - brightness) / (2.0 * COLORFUL) + 0.5;
+    let at = [place(brightness / 255.0, BINS[0]), place(difference(x), BINS[1]), place(difference(z), BINS[2])];
+    for corner in 0..8_usize {
+        let (mut index, mut share) = (0, 1.0);
+        for axis in 0..3 {
+            let low = at[axis].floor().min((BINS[axis] - 2) as f32);
+            let part = at[axis] - low;
+            let high = (corner >> axis) & 1;
+            share *= if high == 1 { part } else { 1.0 - part };
+            index = index * BINS[axis] + low as usize + high;
+        }
+        counts[index] += share;
+    }
+}

@@ -1,0 +1,122 @@
+//! One of several persons: their tracker, and what is remembered of them while they are away.
+
+use super::clothes::Clothes;
+use crate::config::Config;
+use crate::detect::{Detection, LENGTHS};
+use crate::error::TrackError;
+use crate::math::{Pose, Vec3};
+use crate::observation::frame::Frame;
+use crate::observation::share::Share;
+use crate::tracker::estimate::Status;
+use crate::{Body, Tracker};
+
+/// A lost person of whom nothing hides the place, or who left the images, is gone after this, seconds.
+const LEAVES: f64 = 0.3;
+/// Who is hidden is waited for so long, seconds.
+const HIDDEN: f64 = 2.0;
+/// Number of the stature among a detection's sizes.
+const STATURE: usize = LENGTHS.len() - 1;
+/// Clothes are looked at this often at most, seconds.
+const CLOTHES_EVERY: f64 = 0.3;
+/// What is measured so much nearer than a place hides it, and so much farther shows that it is free, metres.
+const HIDES: f64 = 0.08;
+
+/// A person, there or away.
+#[derive(Debug)]
+pub(super) struct Person {
+    pub(super) id: usize,
+    pub(super) tracker: Tracker,
+    pub(super) there: bool,
+    /// When they came the first time, and were last seen, seconds.
+    pub(super) born: f64,
+    pub(super) seen: f64,
+    /// Root where last seen, world frame.
+    pub(super) place: Vec3,
+    /// Sizes as the detector told them, the mean of all looks, and their number.
+    sizes: Vec<f64>,
+    looks: f64,
+    /// What they wear.
+    pub(super) clothes: Clothes,
+    looked: f64,
+    /// Poses expected in this frame, world frame.
+    pub(super) expected: Vec<Pose>,
+}
+
+impl Person {
+    pub(super) fn new(id: usize, body: Body, config: Config, stamp: f64) -> Result<Self, TrackError> {
+        Ok(Self {
+            id,
+            tracker: Tracker::new(body, config)?,
+            there: false,
+            born: stamp,
+            seen: stamp,
+            place: Vec3::ZERO,
+            sizes: Vec::new(),
+            looks: 0.0,
+            clothes: Clothes::default(),
+            looked: f64::NEG_INFINITY,
+            expected: Vec::new(),
+        })
+    }
+
+    /// There, and not lost.
+    pub(super) fn tracked(&self) -> bool {
+        self.there && !matches!(self.tracker.estimate().status, Status::Lost | Status::Searching)
+    }
+
+    /// Takes the sizes of a look in.
+    pub(super) fn measure(&mut self, detection: &Detection) {
+        let sizes = detection.sizes();
+        self.sizes.resize(sizes.len(), 0.0);
+        self.looks += 1.0;
+        for (mean, size) in self.sizes.iter_mut().zip(sizes) {
+            *mean += (size - *mean) / self.looks;
+        }
+    }
+
+    /// By how much a detected person's stature differs, relative: all sizes follow it.
+    pub(super) fn unlike(&self, detection: &Detection) -> f64 {
+        let sizes = detection.sizes();
+        let stature = |sizes: &[f64]| sizes.get(STATURE).copied();
+        stature(&self.sizes).zip(stature(&sizes)).map_or(0.0, |(own, other)| (other / own).ln().abs())
+    }
+
+    /// Notes how they came out of a frame; they are away when they are lost for too long.
+    pub(super) fn note(&mut self, frame: &Frame, share: Share) {
+        let estimate = self.tracker.estimate();
+        if self.tracked() {
+            self.seen = frame.stamp;
+            self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
+            if estimate.status == Status::Tracking
+                && frame.stamp - self.looked >= CLOTHES_EVERY
+                && !frame.colors.is_empty()
+            {
+                let own = |image, pixel: usize| share.owners(image).get(pixel) == Some(&share.own);
+                self.clothes.look(frame, self.tracker.body(), &estimate.world_from_limb, own);
+                self.looked = frame.stamp;
+            }
+            return;
+        }
+        let patience = if self.hidden(frame) { HIDDEN } else { LEAVES };
+        self.there &= estimate.status != Status::Searching && frame.stamp - self.seen < patience;
+    }
+
+    /// Whether something stands before most of where they are thought to be.
+    fn hidden(&self, frame: &Frame) -> bool {
+        let sites = &self.tracker.estimate().sites;
+        let hides = |site: &&Vec3| {
+            frame.images.iter().any(|image| {
+                let point = image.world_from_sensor.inverse_transform_point(**site);
+                let [fx, fy, cx, cy] = image.intrinsics;
+                let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
+                let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < image.width as f64 && v < image.height as f64;
+                if !inside {
+                    return false;
+                }
+                let z = f64::from(image.pixels.get(v as usize * image.width + u as usize)) * image.metres_per_unit;
+                z > 0.0 && z < point.z - HIDES
+            })
+        };
+        2 * sites.iter().filter(hides).count() > sites.len()
+    }
+}

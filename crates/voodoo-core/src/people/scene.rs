@@ -1,0 +1,120 @@
+//! The still scene that all persons stand in, learnt where nobody is.
+
+use crate::observation::background::Backgrounds;
+use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::share::NOBODY;
+
+/// One row of this many is learnt in a frame, for speed: the scene stands still.
+const LEARNT_ROWS: usize = 8;
+/// A deeper return by more than this replaces what was learnt, and a nearer one by less is taken in, metres.
+const DEPTH_STEP: f32 = 0.15;
+/// Share of a new return in what was learnt.
+const NEW_DEPTH: f32 = 0.1;
+/// Where nothing was known, or something deeper, a return is the scene when it was there in so many looks in a row: a person who
+/// was not found yet stands still for less.
+const STILL_LOOKS: [u8; 2] = [4, 60];
+/// What a camera has seen for longer than this was looked at for persons, seconds.
+const OLD: f64 = 3.0;
+/// Looks are alike within this, metres.
+const SAME: f32 = 0.05;
+
+/// What is known of the scene, and what may become so.
+#[derive(Debug, Default)]
+pub(super) struct Scene {
+    known: Backgrounds,
+    images: Vec<Tentative>,
+    row: usize,
+}
+
+/// What was seen lately where the scene is not known, pixel by pixel, and in how many looks in a row.
+#[derive(Debug, Default)]
+struct Tentative {
+    depth: Vec<f32>,
+    looks: Vec<u8>,
+    /// Since when the camera has been there, seconds; none in the first frame.
+    since: Option<f64>,
+    /// What it showed in the second frame was learnt.
+    filled: bool,
+}
+
+impl Scene {
+    /// What is known.
+    pub(super) fn known(&self) -> &Backgrounds {
+        &self.known
+    }
+
+    /// Takes up the images of a frame whose cameras were not there before: nothing is known of them, unless they came from near by.
+    pub(super) fn meet(&mut self, frame: &Frame) {
+        self.images.resize_with(frame.images.len(), Tentative::default);
+        for (image, tentative) in frame.images.iter().zip(&mut self.images) {
+            tentative.depth.resize(image.pixels.len(), 0.0);
+            tentative.looks.resize(image.pixels.len(), 0);
+        }
+        let images = &mut self.images;
+        self.known.meet(frame, |number, carried| {
+            if !carried {
+                (images[number].since, images[number].filled) = (None, false);
+            }
+        });
+    }
+
+    /// Whether the camera of an image has been where it is for long enough: what stood there was looked at.
+    pub(super) fn is_old(&self, image: usize, stamp: f64) -> bool {
+        self.images.get(image).and_then(|image| image.since).is_some_and(|since| stamp - since > OLD)
+    }
+
+    /// Learns some rows where nobody is; all of them where the camera has stood still for the first time.
+    pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
+        self.row = (self.row + 1) % LEARNT_ROWS;
+        for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
+            let Some(known) = self.known.depth_mut(image) else { continue };
+            if tentative.since.is_none() {
+                tentative.since = Some(frame.stamp);
+                continue;
+            }
+            let all = !std::mem::replace(&mut tentative.filled, true);
+            if all {
+                for (known, index) in known.iter_mut().zip(0..).filter(|(_, index)| owners[*index] == NOBODY) {
+                    *known = metres(image, index).unwrap_or(0.0);
+                }
+            }
+            for row in (self.row..image.height).step_by(LEARNT_ROWS) {
+                for index in row * image.width..(row + 1) * image.width {
+                    let Some(z) = metres(image, index).filter(|_| owners[index] == NOBODY) else { continue };
+                    learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.looks[index], z);
+                }
+            }
+        }
+    }
+
+    /// These pixels of an image show a person.
+    pub(super) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
+        let Some(known) = frame.images.get(image).and_then(|image| self.known.depth_mut(image)) else { return };
+        for pixel in pixels {
+            if let Some(depth) = known.get_mut(*pixel) {
+                *depth = 0.0;
+            }
+        }
+    }
+}
+
+fn learn_pixel(known: &mut f32, tentative: &mut f32, looks: &mut u8, z: f32) {
+    if *known > 0.0 && z > *known - DEPTH_STEP {
+        *known = if z > *known + DEPTH_STEP { z } else { *known + NEW_DEPTH * (z - *known) };
+        *looks = 0;
+        return;
+    }
+    if (z - *tentative).abs() > SAME {
+        (*tentative, *looks) = (z, 0);
+    }
+    *looks = looks.saturating_add(1);
+    if *looks >= STILL_LOOKS[usize::from(*known > 0.0)] {
+        (*known, *looks) = (z, 0);
+    }
+}
+
+/// Depth of a pixel, if anything returned.
+fn metres(image: &DepthImage, index: usize) -> Option<f32> {
+    let z = image.pixels.get(index) * image.metres_per_unit as f32;
+    (z > 0.0 && z.is_finite()).then_some(z)
+}

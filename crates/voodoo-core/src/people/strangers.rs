@@ -1,0 +1,61 @@
+//! Who was seen by a detector and is not tracked yet.
+
+use crate::detect::Detection;
+use crate::math::Vec3;
+use crate::relocalize::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
+
+/// Who was not seen for so long is forgotten, seconds.
+const FORGOTTEN: f64 = 0.5;
+
+/// Somebody at a place.
+#[derive(Debug)]
+pub(super) struct Stranger {
+    pub(super) place: Vec3,
+    pub(super) detection: Detection,
+    /// The image that shows it, and the pixels there.
+    pub(super) image: usize,
+    pub(super) pixels: Vec<usize>,
+    sum: f64,
+    stamp: f64,
+}
+
+/// All of them.
+#[derive(Debug, Default)]
+pub(super) struct Strangers {
+    seen: Vec<Stranger>,
+}
+
+impl Strangers {
+    /// Forgets who was not seen lately.
+    pub(super) fn fade(&mut self, stamp: f64) {
+        self.seen.retain(|stranger| stamp - stranger.stamp < FORGOTTEN);
+    }
+
+    /// Takes a look in.
+    pub(super) fn note(&mut self, stamp: f64, detection: Detection, image: usize, pixels: Vec<usize>) {
+        let Some(place) = detection.joint("humanoid_root").map(|root| root.position) else { return };
+        let gain = detection.person - LOOK_COSTS;
+        let near = |stranger: &&mut Stranger| stranger.place.distance(place) < SAME_PERSON;
+        let before = self.seen.iter_mut().find(near).map(|stranger| stranger.sum);
+        self.seen.retain(|stranger| stranger.place.distance(place) >= SAME_PERSON);
+        let sum = (before.unwrap_or(0.0) + gain).max(0.0);
+        self.seen.push(Stranger { place, detection, image, pixels, sum, stamp });
+    }
+
+    /// Those seen in the frame of this time.
+    pub(super) fn seen_at(&self, stamp: f64) -> impl Iterator<Item = &Stranger> {
+        self.seen.iter().filter(move |stranger| stranger.stamp == stamp)
+    }
+
+    /// Forgets those who are somebody else of these.
+    pub(super) fn leave_out(&mut self, others: &[Stranger]) {
+        let same = |a: &Stranger, b: &Stranger| a.place.distance(b.place) < SAME_PERSON;
+        self.seen.retain(|stranger| !others.iter().any(|other| same(stranger, other)));
+    }
+
+    /// Takes out those seen in the frame of this time who are persons for sure.
+    pub(super) fn believed(&mut self, stamp: f64) -> Vec<Stranger> {
+        let sure = |stranger: &mut Stranger| stranger.stamp == stamp && stranger.sum >= ENOUGH_ODDS;
+        self.seen.extract_if(.., sure).collect()
+    }
+}

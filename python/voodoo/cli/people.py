@@ -1,0 +1,165 @@
+"""`voodoo track --people` and `voodoo eval` of several people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import typer
+
+from voodoo.cli.common import INTERRUPTED, progressing
+from voodoo.errors import VoodooError
+
+if TYPE_CHECKING:
+    from voodoo.evaluation.people import PeopleScore
+    from voodoo.evaluation.score import Score
+    from voodoo.export.people import PeopleTrack
+    from voodoo.model.body import Body
+    from voodoo.names import HumanModel
+    from voodoo.people import People
+    from voodoo.pipeline.start import Automatic
+    from voodoo.recordings.recording import Recording
+    from voodoo.sensors.settings import FrontEndSettings
+    from voodoo.visualization.rerun_viewer import Viewer
+
+ANY = "any"
+
+
+def limit_of(word: str) -> tuple[bool, int | None]:
+    """Whether several people are followed, and how many at most (None: any number), of "any" or a number from 1.
+
+    Raises:
+        VoodooError: another word.
+    """
+    if word == ANY:
+        return True, None
+    if not word.isdecimal() or int(word) < 1:
+        raise VoodooError(f"people: expected any or a whole number from 1, found {word!r}")
+    return int(word) > 1, int(word)
+
+
+def no_starts(init: str | None) -> Automatic:
+    """Several people are always looked for.
+
+    Raises:
+        VoodooError: a start was given.
+    """
+    from voodoo.pipeline.start import AUTO
+
+    if init not in (None, AUTO):
+        raise VoodooError(f"init: expected none with --people any or N, where everybody is looked for, found {init}")
+    return AUTO
+
+
+def body_of(body: Path | None, *, height: float | None, model: HumanModel | None) -> Body | None:
+    """What every new person gets a copy of: a file's, a human of a stature, or None, the default."""
+    from voodoo.model.body import Body
+
+    if body is not None:
+        return Body.load(body)
+    if height is None and model is None:
+        return None
+    return Body.human(1.75 if height is None else height, model=model or "measured")
+
+
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """Where a result goes: files, pictures, Rerun."""
+
+    targets: Sequence[Path]
+    overlay: Path | None
+    save: Path | None
+    viewer: Viewer | None
+
+
+def follow_people(source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs) -> None:
+    """Track everybody in a recording, and write what was asked for."""
+    from voodoo.export.people_files import save_people
+
+    result, bodies, interrupted = _run(source, people, settings, outputs)
+    written = [
+        file
+        for target in outputs.targets
+        for file in save_people(result, target, bodies=bodies, root_frame=source.root_frame)
+    ]
+    written += [path for path in (outputs.overlay, outputs.save) if path is not None]
+    rows = sum(len(track) for track in result.tracks.values())
+    told = f"{len(result)} frames, {len(result.tracks)} persons in {rows} rows"
+    if written:
+        told += f"; wrote {' and '.join(str(path) for path in written)}"
+    if interrupted:
+        typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {told}", err=True)
+        raise typer.Exit(INTERRUPTED)
+    typer.echo(told)
+    if not result.tracks:
+        typer.echo(f"voodoo: {source.name}: nobody was found in {len(result)} frames", err=True)
+
+
+class _Followed(NamedTuple):
+    track: PeopleTrack
+    bodies: dict[int, Body]
+    interrupted: bool
+
+
+def _run(source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs) -> _Followed:
+    """Track and draw. Ctrl-C ends it with the frames up to there, if any."""
+    from voodoo.export.people import PeopleTrack
+    from voodoo.pipeline.people import track_people
+    from voodoo.visualization.image_writer import PictureWriter
+    from voodoo.visualization.overlay import Overlay
+
+    estimates, interrupted = [], False
+    bodies: dict[int, Body] = {}
+    rate = source.info().rate_hz
+    drawing = None if outputs.overlay is None else Overlay(source)
+    writer = (
+        None if outputs.overlay is None else PictureWriter(outputs.overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
+    )
+    with writer or nullcontext():
+        try:
+            steps = track_people(source, people, settings=settings)
+            for step in progressing(steps, source.name, len(source)):
+                estimates.append(step.estimate)
+                bodies |= {person.id: people.body(person.id) for person in step.estimate}
+                if outputs.viewer is not None:
+                    outputs.viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
+                if writer is not None and drawing is not None:
+                    writer.write(drawing.draw_people(step.recorded, step.estimate, bodies, index=step.index))
+        except KeyboardInterrupt:
+            if not estimates:
+                raise
+            interrupted = True
+    return _Followed(PeopleTrack.of(estimates, bodies=bodies), bodies, interrupted)
+
+
+def judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:
+    """The score of a result file, which belongs to one recording."""
+    from voodoo.evaluation.people_evaluate import evaluate_result
+
+    if len(paths) != 1:
+        raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
+    return evaluate_result(paths[0], result, loader=loader, root_frame=frame)
+
+
+def show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
+    """Print the table of several people, and write it."""
+    from voodoo.evaluation.people_report import people_markdown, write_people
+
+    typer.echo(people_markdown(scores))
+    if out is not None:
+        typer.echo("wrote " + ", ".join(str(file) for file in write_people(out, scores)))
+
+
+def refuse_failures(scores: Sequence[PeopleScore] | Sequence[Score]) -> None:
+    """End with an error where a recording could not be tracked to its end.
+
+    Raises:
+        VoodooError: names the first.
+    """
+    failures = [score for score in scores if score.failure]
+    if failures:
+        raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")

@@ -1,0 +1,333 @@
+"""Measures of a result of several people against the truth: CLEAR MOT, identities, false bodies, and joints.
+
+A match is a root (humanoid_root) within MATCH_M of a person's; only persons with IN_VIEW of their pixels in view are expected.
+Who is less in view may be followed or not: neither counts. MOTA, IDF1 and switches of identity are those of py-motmetrics
+(Bernardin and Stiefelhagen 2008; Ristani et al. 2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
+
+from voodoo.errors import VoodooError
+from voodoo.evaluation import metrics
+from voodoo.evaluation.metrics import FloatArray
+from voodoo.export.people_rows import PeopleRows
+from voodoo.recordings.people_truth import PeopleTruth
+
+MATCH_M = 0.5
+"""A root is a person's within this [m]."""
+IN_VIEW = 0.3
+"""Persons are expected from this share of their pixels on."""
+JOINTS_IN_VIEW = 0.8
+"""Joints count from this share on; who was so much in view has come."""
+ABSENT_S = 2.0
+"""Who was not in view at all for longer than this [s] has left."""
+SAME_TIME_S = 0.01
+"""Stamps of truth and result that differ by less [s] are one frame."""
+ROOT = "humanoid_root"
+_NEVER = 1e6
+_LAST = 10.0
+
+
+@dataclass(frozen=True)
+class PeopleScore:
+    """How the people of one recording, or of several together, were followed; metres, seconds, NaN where not known.
+
+    Args:
+        name, path: of the recording.
+        failure: why it could not be tracked or judged; "" when it was.
+        seconds: duration.
+        persons: how many the truth has.
+        ids: how many the result has.
+        expected: persons in frames, of those with enough in view.
+        missed, extra: of these without a match, and rows of the result that match nobody.
+        switches: of identity: a person is matched with another id than before, however long ago.
+        id_true, id_false, id_missed: rows that belong together, rows too many and too few, see `idf1`.
+        returns, returned: persons who came back after they had left, and how often with the id they had.
+        visits, seen: persons who came, and how many of these visits were ever matched.
+        first_pose_s: time from JOINTS_IN_VIEW of a person to the first match, mean over the visits that had one.
+        worst_first_pose_s: the longest of them.
+        false_bodies: stretches of an id that match nobody and do not follow on a match of this id.
+        left_behind: those that do: a body that stays, or drifts, where its person is not.
+        joint_error_m: mean over `joints` distances of metrics.JOINTS.
+        joints: how many.
+        step_s: mean time of a frame; NaN of a result that was read.
+    """
+
+    name: str
+    path: Path
+    failure: str = ""
+    seconds: float = 0.0
+    persons: int = 0
+    ids: int = 0
+    expected: int = 0
+    missed: int = 0
+    extra: int = 0
+    switches: int = 0
+    id_true: float = 0.0
+    id_false: float = 0.0
+    id_missed: float = 0.0
+    returns: int = 0
+    returned: int = 0
+    visits: int = 0
+    seen: int = 0
+    first_pose_s: float = np.nan
+    worst_first_pose_s: float = np.nan
+    false_bodies: int = 0
+    left_behind: int = 0
+    joint_error_m: float = np.nan
+    joints: int = 0
+    step_s: float = np.nan
+
+    @property
+    def mota(self) -> float:
+        """1 - (missed + extra + switches) / expected; NaN without anybody."""
+        return 1.0 - (self.missed + self.extra + self.switches) / self.expected if self.expected else float("nan")
+
+    @property
+    def idf1(self) -> float:
+        """2 IDTP / (2 IDTP + IDFP + IDFN) under the best pairing of persons and ids; NaN without anybody."""
+        total = 2.0 * self.id_true + self.id_false + self.id_missed
+        return 2.0 * self.id_true / total if total else float("nan")
+
+    @property
+    def false_a_minute(self) -> float:
+        """False bodies a minute."""
+        return 60.0 * self.false_bodies / self.seconds if self.seconds else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Who is whom in each of F frames.
+
+    Args:
+        stamps: (F,) [s].
+        ids: I ids of the result, rising.
+        of_person: (F, P) index of the id matched with a person, -1 without.
+        of_id: (F, I) index of the person, -1 where the id matches nobody, -2 where it has no pose, -3 where it is at somebody who
+            is not expected.
+        counts: of py-motmetrics.
+    """
+
+    stamps: FloatArray
+    ids: npt.NDArray[np.int64]
+    of_person: npt.NDArray[np.int64]
+    of_id: npt.NDArray[np.int64]
+    counts: dict[str, float]
+
+
+NOBODY, NO_POSE, ASIDE = -1, -2, -3
+"""See Matches."""
+
+
+def score(
+    name: str, path: Path, truth: PeopleTruth, rows: PeopleRows, *, seconds: float | None = None, step_s: float = np.nan
+) -> PeopleScore:
+    """Measure a result.
+
+    Args:
+        name, path: of the recording.
+        truth: in the result's root frame.
+        rows: the result.
+        seconds: how long the recording is; None: from the first to the last stamp of truth and result.
+        step_s: mean time of a frame.
+
+    Raises:
+        VoodooError: no stamp of the result is one of the truth's, or py-motmetrics is not installed.
+    """
+    frames = _frames(truth, rows)
+    found = match(truth, rows, frames)
+    waits, visits, returns, returned = _visits(truth, found)
+    false_bodies, left_behind = _false_bodies(found)
+    errors = _joint_errors(truth, rows, frames, found)
+    span = float(frames.stamps[-1] - frames.stamps[0]) if len(frames.stamps) else 0.0
+    return PeopleScore(
+        name,
+        path,
+        seconds=span if seconds is None else seconds,
+        persons=len(truth.persons),
+        ids=len(found.ids),
+        expected=int(found.counts["num_objects"]),
+        missed=int(found.counts["num_misses"]),
+        extra=int(found.counts["num_false_positives"]),
+        switches=int(found.counts["num_switches"]),
+        id_true=found.counts["idtp"],
+        id_false=found.counts["idfp"],
+        id_missed=found.counts["idfn"],
+        returns=returns,
+        returned=returned,
+        visits=visits,
+        seen=len(waits),
+        first_pose_s=float(np.mean(waits)) if waits else np.nan,
+        worst_first_pose_s=max(waits) if waits else np.nan,
+        false_bodies=false_bodies,
+        left_behind=left_behind,
+        joint_error_m=metrics.mean_or_nan(errors),
+        joints=int(np.isfinite(errors).sum()),
+        step_s=step_s,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Frames:
+    """F frames of truth and result: stamps (F,), the truth's row of each (-1 without), the result's rows of each."""
+
+    stamps: FloatArray
+    truth: npt.NDArray[np.int64]
+    rows: list[npt.NDArray[np.int64]]
+
+
+def _frames(truth: PeopleTruth, rows: PeopleRows) -> _Frames:
+    own = np.unique(rows.stamps)
+    near = np.clip(np.searchsorted(truth.stamps, own - SAME_TIME_S), 0, len(truth.stamps) - 1)
+    same = np.abs(truth.stamps[near] - own) <= SAME_TIME_S
+    if len(own) and not same.any():
+        raise VoodooError(
+            f"result: expected stamps of the truth, {truth.stamps[0]:.6f} to {truth.stamps[-1]:.6f} s, found "
+            f"{own[0]:.6f} to {own[-1]:.6f} s and none in common"
+        )
+    # Frames of the result without anybody in the scene are frames, too.
+    stamps = np.concatenate([truth.stamps, own[~same]])
+    of_truth = np.concatenate([np.arange(len(truth.stamps)), np.full(int((~same).sum()), -1)])
+    frame_of = np.full(len(own), -1)
+    frame_of[same] = near[same]
+    frame_of[~same] = len(truth.stamps) + np.arange(int((~same).sum()))
+    order = np.argsort(stamps, kind="stable")
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    row_frame = place[frame_of[np.searchsorted(own, rows.stamps)]] if len(own) else np.empty(0, dtype=np.int64)
+    return _Frames(stamps[order], of_truth[order], [np.flatnonzero(row_frame == index) for index in range(len(stamps))])
+
+
+def match(truth: PeopleTruth, rows: PeopleRows, frames: _Frames) -> Matches:
+    """Who is whom, frame by frame, over all persons at once and keeping the pairs of the frame before."""
+    mm = _motmetrics()
+    roots, own = truth.of(ROOT), rows.of(ROOT)
+    posed = np.asarray(np.isfinite(own).all(axis=1))
+    ids = np.unique(rows.persons)
+    of_person = np.full((len(frames.stamps), len(truth.persons)), NOBODY, dtype=np.int64)
+    of_id = np.full((len(frames.stamps), len(ids)), NO_POSE, dtype=np.int64)
+    judge = mm.MOTAccumulator()
+    for index, (place, there) in enumerate(zip(frames.truth, frames.rows, strict=True)):
+        there = there[posed[there]]
+        in_view = np.zeros(len(truth.persons)) if place < 0 else truth.in_view[place]
+        away = np.full((len(truth.persons), len(there)), np.nan)
+        if place >= 0:
+            away = np.linalg.norm(roots[place][:, None] - own[there][None], axis=2)
+        away[~(away <= MATCH_M)] = np.nan
+        expected = np.flatnonzero(in_view >= IN_VIEW)
+        aside = _at_others(away, in_view >= IN_VIEW)
+        columns = np.searchsorted(ids, rows.persons[there])
+        of_id[index, columns] = np.where(aside, ASIDE, NOBODY)
+        judge.update(expected, columns[~aside], away[expected][:, ~aside], frameid=index)
+    events = judge.mot_events
+    pairs = events[events.Type.isin(("MATCH", "SWITCH"))]
+    which = pairs.index.get_level_values("FrameId").to_numpy(dtype=np.int64)
+    persons, columns = pairs.OId.to_numpy(dtype=np.int64), pairs.HId.to_numpy(dtype=np.int64)
+    of_person[which, persons], of_id[which, columns] = columns, persons
+    names = ["num_objects", "num_misses", "num_false_positives", "num_switches", "idtp", "idfp", "idfn"]
+    found = mm.metrics.create().compute(judge, metrics=names, return_dataframe=False)
+    counts = {name: 0.0 if np.isnan(found[name]) else float(found[name]) for name in names}
+    return Matches(frames.stamps, ids, of_person, of_id, counts)
+
+
+def _at_others(away: FloatArray, expected: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Which bodies (N,) are those of persons who are not expected, by distances (P, N) [m], NaN where too far."""
+    cost = np.where(np.isnan(away), _NEVER, away + np.where(expected, 0.0, _LAST)[:, None])
+    persons, columns = linear_sum_assignment(cost)
+    other = ~expected[persons] & (cost[persons, columns] < _NEVER)
+    return np.isin(np.arange(away.shape[1]), columns[other])
+
+
+def _visits(truth: PeopleTruth, found: Matches) -> tuple[list[float], int, int, int]:
+    """Times [s] to the first match of the visits that have one; how many visits and returns, and returns with the same id."""
+    place = np.searchsorted(found.stamps, truth.stamps)
+    waits: list[float] = []
+    visits = returns = returned = 0
+    for column in range(len(truth.persons)):
+        last: int | None = None
+        there = np.flatnonzero(truth.in_view[:, column] > 0.0)
+        parts = np.split(there, np.flatnonzero(np.diff(truth.stamps[there]) > ABSENT_S) + 1) if len(there) else []
+        for part in parts:
+            clear = part[truth.in_view[part, column] >= JOINTS_IN_VIEW]
+            if not len(clear):
+                continue
+            visits += 1
+            ids = found.of_person[place[part], column]
+            if last is not None:
+                returns += 1
+            if (ids >= 0).any():
+                first = truth.stamps[part[int((ids >= 0).argmax())]]
+                waits.append(max(float(first - truth.stamps[clear[0]]), 0.0))
+                most = int(np.bincount(ids[ids >= 0]).argmax())
+                returned += last == most
+                last = most if last is None else last
+    return waits, visits, returns, returned
+
+
+def _false_bodies(found: Matches) -> tuple[int, int]:
+    """Stretches of ids that match nobody: those that begin so, and those that follow on a match."""
+    born = left = 0
+    for column in range(len(found.ids)):
+        before = NO_POSE
+        for state, _ in groupby(found.of_id[:, column].tolist()):
+            if state == NOBODY:
+                born += before == NO_POSE
+                left += before != NO_POSE
+            before = state
+    return born, left
+
+
+def _joint_errors(truth: PeopleTruth, rows: PeopleRows, frames: _Frames, found: Matches) -> FloatArray:
+    """Distances (N, 12) [m] of metrics.JOINTS in all matches of persons who are in view."""
+    wanted = np.stack([truth.of(name) for name in metrics.JOINTS], axis=2)
+    own = np.stack([rows.of(name) for name in metrics.JOINTS], axis=1)
+    pairs = []
+    for index, person in np.argwhere(found.of_person >= 0):
+        place = frames.truth[index]
+        if truth.in_view[place, person] >= JOINTS_IN_VIEW:
+            there = frames.rows[index]
+            row = there[rows.persons[there] == found.ids[found.of_person[index, person]]][0]
+            pairs.append(np.linalg.norm(own[row] - wanted[place, person], axis=1))
+    return np.array(pairs) if pairs else np.empty((0, len(metrics.JOINTS)))
+
+
+def _motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
+    try:
+        import motmetrics
+    except ImportError:
+        raise VoodooError("several people are judged by py-motmetrics: pip install 'voodoo[eval]'") from None
+    return motmetrics
+
+
+def together(scores: Sequence[PeopleScore]) -> PeopleScore:
+    """Those that did not fail as one: counts added up, means weighted by what they are means of."""
+    good = [one for one in scores if not one.failure]
+    added = ["seconds", "persons", "ids", "expected", "missed", "extra", "switches", "id_true", "id_false", "id_missed"]
+    added += ["returns", "returned", "visits", "seen", "false_bodies", "left_behind", "joints"]
+    sums = {name: sum(getattr(one, name) for one in good) for name in added}
+
+    def mean(name: str, weight: str) -> float:
+        parts = [(getattr(one, name), getattr(one, weight)) for one in good if np.isfinite(getattr(one, name))]
+        total = sum(part[1] for part in parts)
+        return float(sum(value * count for value, count in parts) / total) if total else float("nan")
+
+    worst = [one.worst_first_pose_s for one in good if np.isfinite(one.worst_first_pose_s)]
+    return PeopleScore(
+        "together",
+        Path(),
+        **sums,
+        first_pose_s=mean("first_pose_s", "seen"),
+        worst_first_pose_s=max(worst, default=np.nan),
+        joint_error_m=mean("joint_error_m", "joints"),
+        step_s=mean("step_s", "seconds"),
+    )

@@ -1,0 +1,125 @@
+"""Judging several people: the result of a recording, by whatever program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from voodoo.config import Config
+from voodoo.errors import RecordingError, VoodooError
+from voodoo.evaluation.people import PeopleScore, score
+from voodoo.export.people import PeopleTrack
+from voodoo.export.people_rows import read_rows
+from voodoo.model.body import Body
+from voodoo.names import HumanModel
+from voodoo.people import People
+from voodoo.pipeline.people import track_people
+from voodoo.recordings.loaders import open_recording
+from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, PeopleTruth
+from voodoo.recordings.recording import Recording
+from voodoo.recordings.truth import find_beside
+from voodoo.sensors.settings import FrontEndSettings
+
+
+def has_people(path: Path) -> bool:
+    """Whether a recording comes with the truth of several people, without opening it."""
+    return find_beside(path, PEOPLE_TRUTH_FILE) is not None
+
+
+def evaluate_result(
+    path: Path, result: Path, *, loader: str | None = None, root_frame: str | None = None
+) -> PeopleScore:
+    """Judge a result file of several people, see voodoo.export.people_rows.
+
+    Args:
+        path: of the recording, with truth_people.csv beside it.
+        result: .csv in the recording's root frame.
+        loader: see open_recording.
+        root_frame: of the result; None: the recording's own.
+
+    Raises:
+        VoodooError: one of them cannot be read, or they do not belong together.
+    """
+    options: dict[str, Any] = {} if root_frame is None else {"root_frame": root_frame}
+    recording = open_recording(path, loader=loader, **options)
+    truth = truth_of(recording)
+    rows = read_rows(result)
+    about = recording.info()
+    late = about.start_stamp + about.duration
+    outside = (rows.stamps < about.start_stamp - 0.5) | (rows.stamps > late + 0.5)
+    if outside.any():
+        raise VoodooError(
+            f"{result}: expected stamps from {about.start_stamp:.6f} to {late:.6f} s as in {recording.name}, found "
+            f"{rows.stamps[outside][0]:.6f}"
+        )
+    return score(recording.name, path, truth, rows, seconds=about.duration)
+
+
+def evaluate_people(
+    path: Path,
+    *,
+    config: Config | None = None,
+    loader: str | None = None,
+    model: HumanModel | None = None,
+    use: Sequence[str] | None = None,
+) -> PeopleScore:
+    """Track everybody in a recording, without a start, and judge the result.
+
+    Args:
+        path: of the recording, with truth_people.csv beside it.
+        config: None means the defaults.
+        loader: see open_recording.
+        model: which human; None: that of `voodoo.People`.
+        use: from which of its inputs; None: all.
+
+    Raises:
+        VoodooError: it cannot be read, or a frame was refused.
+    """
+    recording = open_recording(path, loader=loader)
+    people = People(None if model is None else Body.human(model=model), config=config)
+    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
+
+
+def judge(recording: Recording, people: People, *, settings: FrontEndSettings | None = None) -> PeopleScore:
+    """Track everybody in a recording, and judge the result.
+
+    Raises:
+        VoodooError: the recording has no truth of several people, or a frame was refused.
+    """
+    truth = truth_of(recording)
+    steps = list(track_people(recording, people, settings=settings))
+    rows = PeopleTrack.of([step.estimate for step in steps]).rows()
+    seconds = float(np.mean([step.seconds for step in steps])) if steps else np.nan
+    about = recording.info()
+    return score(recording.name, recording.path, truth, rows, seconds=about.duration, step_s=seconds)
+
+
+def evaluate_all_people(
+    paths: Sequence[Path],
+    *,
+    config_file: Path | None = None,
+    loader: str | None = None,
+    model: HumanModel | None = None,
+    use: Sequence[str] | None = None,
+) -> Iterator[PeopleScore]:
+    """Evaluate recordings one after the other; one that fails yields a score with `failure` set."""
+    for path in paths:
+        try:
+            config = None if config_file is None else Config.load(config_file)
+            yield evaluate_people(path, config=config, loader=loader, model=model, use=use)
+        except (VoodooError, OSError) as error:
+            yield PeopleScore(path.name, path, failure=str(error))
+
+
+def truth_of(recording: Recording) -> PeopleTruth:
+    """The truth of several people.
+
+    Raises:
+        RecordingError: it has none.
+    """
+    if recording.people is None:
+        raise RecordingError(f"{recording.path}: expected {PEOPLE_TRUTH_FILE} beside the recording, found none")
+    return recording.people

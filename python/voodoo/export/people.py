@@ -1,0 +1,156 @@
+"""The result of a recording of several people: a track for each of them, and its files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import VoodooError, reading
+from voodoo.export.people_rows import PeopleRows, read_rows, write_rows
+from voodoo.export.track import Track, arrays_of, check_suffix, track_of_rows, tracks_of
+from voodoo.model.body import Body
+from voodoo.names import SEARCHING
+from voodoo.people import PeopleEstimate
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PeopleTrack:
+    """Everybody who was there in F frames.
+
+    Args:
+        stamps: (F,) [s] of all frames, with and without anybody.
+        tracks: person, from 1, to the frames in which they were there, with the same joints for all.
+    """
+
+    stamps: FloatArray
+    tracks: Mapping[int, Track]
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.stamps)
+
+    def __repr__(self) -> str:
+        """One line with the counts."""
+        return f"PeopleTrack({len(self)} frames, {len(self.tracks)} persons)"
+
+    @classmethod
+    def of(cls, estimates: Sequence[PeopleEstimate], *, bodies: Mapping[int, Body] | None = None) -> PeopleTrack:
+        """Collect the estimates of a recording.
+
+        Args:
+            estimates: of all frames.
+            bodies: of the persons, with their last sizes; with them the joint angles are known.
+        """
+        known = bodies or {}
+        persons = sorted({person.id for estimate in estimates for person in estimate})
+        tracks = {
+            one: Track.of(
+                [person.estimate for estimate in estimates for person in estimate if person.id == one],
+                body=known.get(one),
+            )
+            for one in persons
+        }
+        return cls(np.array([estimate.stamp for estimate in estimates], dtype=np.float64), tracks)
+
+    def rows(self) -> PeopleRows:
+        """A row for every person who is there in a frame, in the order of time and number."""
+        if not self.tracks:
+            none = np.empty((0, 0))
+            return PeopleRows(np.empty(0), np.empty(0, dtype=np.int64), (), np.empty(0), (), none[..., None], (), none)
+        persons = np.concatenate([np.full(len(track), one) for one, track in self.tracks.items()])
+        stamps = np.concatenate([track.stamps for track in self.tracks.values()])
+        order = np.lexsort((persons, stamps))
+        status = [word for track in self.tracks.values() for word in track.status]
+        first = next(iter(self.tracks.values()))
+        joined = {
+            name: np.concatenate([getattr(track, name) for track in self.tracks.values()])[order]
+            for name in ("residual", "joints", "angles")
+        }
+        return PeopleRows(
+            stamps=stamps[order],
+            persons=persons[order],
+            status=tuple(status[index] for index in order),
+            joint_names=first.joint_names,
+            angle_names=first.angle_names,
+            **joined,
+        )
+
+    def unbroken(self, person: int, *, to_the_end: bool = False) -> Track:
+        """The track of a person from their first to their last frame (or the recording's); `searching` while they are away."""
+        track = self.tracks[person]
+        place = np.searchsorted(self.stamps, track.stamps)
+        first, end = int(place[0]), len(self) if to_the_end else int(place[-1]) + 1
+        status = [SEARCHING] * (end - first)
+        for index, word in zip(place - first, track.status, strict=True):
+            status[index] = word
+
+        def spread(values: FloatArray) -> FloatArray:
+            wide = np.full((end - first, *values.shape[1:]), np.nan)
+            wide[place - first] = values
+            return wide
+
+        return replace(
+            track,
+            stamps=self.stamps[first:end],
+            status=tuple(status),
+            residual=spread(track.residual),
+            joints=spread(track.joints),
+            world_from_limb=spread(track.world_from_limb),
+            angles=spread(track.angles),
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write .csv (a row for every person who is there) or .npz (by person, exactly); it appears when it is complete.
+
+        The .npz holds `stamps` (F,), `persons` (P,), and `person_<id>/...` with the arrays of a result of one person.
+
+        Raises:
+            VoodooError: another suffix.
+            OSError: the file cannot be written.
+        """
+        path = Path(path)
+        check_suffix(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(f".{path.name}.part")
+        try:
+            if path.suffix == ".csv":
+                write_rows(part, self.rows())
+            else:
+                arrays = {
+                    f"person_{one}/{name}": array
+                    for one, track in self.tracks.items()
+                    for name, array in arrays_of(track).items()
+                }
+                with part.open("wb") as file:
+                    np.savez_compressed(
+                        file, allow_pickle=False, stamps=self.stamps, persons=np.array(sorted(self.tracks)), **arrays
+                    )
+            os.replace(part, path)  # noqa: PTH105 - the replacement must be atomic
+        finally:
+            part.unlink(missing_ok=True)
+
+    @classmethod
+    def load(cls, path: str | Path) -> PeopleTrack:
+        """Read what save() wrote; of a .csv the frames without anybody are not known.
+
+        Raises:
+            VoodooError: another suffix, damage, or a file of another kind.
+        """
+        path = Path(path)
+        check_suffix(path)
+        if path.suffix == ".csv":
+            rows = read_rows(path)
+            persons = np.unique(rows.persons).tolist()
+            return cls(np.unique(rows.stamps), {one: track_of_rows(rows, one) for one in persons})
+        with reading(path, "a result of voodoo track --people"), np.load(path, allow_pickle=False) as content:
+            if "persons" not in content:
+                raise VoodooError(f"{path}: expected a result of several people, found one of another kind")
+            return cls(content["stamps"], tracks_of(content))

@@ -1,0 +1,58 @@
+"""One call for every format of a result of several people: the suffix says which."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from voodoo.export.bvh import write_bvh
+from voodoo.export.files import check_target, is_folder
+from voodoo.export.people import PeopleTrack
+from voodoo.export.ros2 import write_people_bag
+from voodoo.export.trc import write_trc
+from voodoo.model.body import Body
+
+
+def save_people(result: PeopleTrack, path: Path, *, bodies: Mapping[int, Body], root_frame: str) -> list[Path]:
+    """Write a result of several people; the files that were written.
+
+    .csv, .npz and bags hold everybody. .bvh and .trc hold one person: NAME.bvh becomes NAME_1.bvh, NAME_2.bvh, ..., from the
+    first to the last frame of each; of nobody there is none.
+
+    Args:
+        result: with limb poses.
+        path: see `voodoo.export.files.FORMATS`.
+        bodies: of all persons, in the sizes they were tracked with.
+        root_frame: frame of the tracks, for bags.
+
+    Raises:
+        VoodooError: another suffix, or what the format needs is missing.
+        OSError: a file cannot be written.
+    """
+    check_target(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix in (".bvh", ".trc"):
+        written = []
+        for one in result.tracks:
+            own = path.with_name(f"{path.stem}_{one}{path.suffix}")
+            track = result.unbroken(one)
+            if path.suffix == ".bvh":
+                write_bvh(own, track, bodies[one])
+            else:
+                write_trc(own, track)
+            written.append(own)
+        return written
+    if path.suffix == ".mcap" or is_folder(path):
+        people = {str(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
+        if path.suffix != ".mcap":
+            write_people_bag(path, people, root_frame=root_frame)
+            return [path]
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            bag = Path(folder) / path.stem
+            write_people_bag(bag, people, root_frame=root_frame)
+            shutil.move(next(bag.glob("*.mcap")), path)
+        return [path]
+    result.save(path)
+    return [path]

@@ -1,0 +1,136 @@
+"""From a recording to everybody in it: the loop of several people."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from copy import copy
+from dataclasses import dataclass
+
+from voodoo._core import Frame
+from voodoo.errors import MeasurementError, VoodooError
+from voodoo.measurements import ColorImage, RecordedFrame
+from voodoo.model.body import Body
+from voodoo.people import People, PeopleEstimate
+from voodoo.pipeline.frozen import FrozenSensors
+from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.people_keypoints import PeopleKeypoints
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.adapters import Context, Memory, adapter_of
+from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.kinds import input_of
+from voodoo.sensors.motion import LimbMotion
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.tracker import Tracker
+
+
+class PeopleFrontEnd:
+    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose, pictures in colour, keypoints.
+
+    Args:
+        people: who is followed.
+        settings: see FrontEndSettings.
+    """
+
+    def __init__(self, people: People, *, settings: FrontEndSettings | None = None) -> None:
+        """Nothing was measured yet."""
+        self.people = people
+        self.settings = settings or FrontEndSettings()
+        self.memory = Memory()
+        self.keypoints = PeopleKeypoints(people, self.settings)
+        self._frozen = FrozenSensors()
+        # Adapters ask who is tracked; nobody in particular is.
+        self._nobody = Tracker(Body.human())
+
+    def step(self, recorded: RecordedFrame) -> PeopleEstimate:
+        """Make the frame and step everybody.
+
+        Raises:
+            MeasurementError: a measurement that cannot be used; all is as it was.
+        """
+        memory, frozen, keypoints = copy(self.memory), copy(self._frozen), copy(self.keypoints)
+        try:
+            frame = self.frame(recorded)
+            own = self.keypoints.frames(recorded.stamp, self._alive)
+            estimate = self.people.step(frame, own=own)
+        except BaseException:
+            self.memory, self._frozen, self.keypoints = memory, frozen, keypoints
+            raise
+        self.keypoints.learn(estimate)
+        return estimate
+
+    def frame(self, recorded: RecordedFrame) -> Frame:
+        """The frame of all persons, without stepping."""
+        chosen = self.settings
+        alive = self._alive = self._frozen.without(recorded.measurements, use=chosen.use)
+        frame = Frame(stamp=recorded.stamp)
+        for low, high in chosen.exclude:
+            frame.exclude(low, high)
+        if chosen.ground_z is not None:
+            frame.set_ground(normal=(0.0, 0.0, 1.0), offset=chosen.ground_z)
+        context = Context(
+            stamp=recorded.stamp,
+            measurements=alive,
+            predicted={},
+            settings=chosen,
+            tracker=self._nobody,
+            predictor=SitePredictor(),
+            motion=LimbMotion(),
+            gate=SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest),
+            memory=self.memory,
+        )
+        for item in alive:
+            adapter = adapter_of(item)
+            if adapter.kind in chosen.use and adapter.while_searching:
+                adapter.add(frame, item, context)
+            elif isinstance(item, ColorImage) and adapter.kind in chosen.use:
+                # Clothes tell persons apart.
+                frame.add_color(item.image, camera=item.camera, world_from_sensor=item.root_from_sensor)
+        return frame
+
+
+@dataclass(frozen=True)
+class TrackedPeople:
+    """One frame with everybody in it.
+
+    Args:
+        index: number in the recording, from 0.
+        recorded: the measurements.
+        estimate: who is there, and how.
+        seconds: wall-clock time from measurements in memory to the estimate [s].
+    """
+
+    index: int
+    recorded: RecordedFrame
+    estimate: PeopleEstimate
+    seconds: float
+
+
+def track_people(
+    recording: Recording, people: People, *, settings: FrontEndSettings | None = None
+) -> Iterator[TrackedPeople]:
+    """Step through a recording; between two yields `people` holds the bodies of the frame yielded last.
+
+    Args:
+        recording: read while iterating.
+        people: who is followed; somebody new is found in depth images, and in keypoints of several cameras.
+        settings: what is used and how; None means all there is, see FrontEndSettings.of.
+
+    Raises:
+        VoodooError: a recording without depth images, damage in it, or a frame that is refused; names the frame.
+    """
+    chosen = settings or FrontEndSettings.of(recording)
+    has = {kind for sensor in recording.info().sensors if (kind := input_of(sensor.kind)) is not None}
+    if not {"depth", "keypoints"} & has & set(chosen.use):
+        raise MeasurementError(
+            f"{recording.name}: several people are found in depth images or keypoints, expected some, found "
+            f"{', '.join(sorted(has & set(chosen.use))) or 'none'}"
+        )
+    front_end = PeopleFrontEnd(people, settings=chosen)
+    for index, recorded in enumerate(paired(recording)):
+        began = time.perf_counter()
+        try:
+            estimate = front_end.step(recorded)
+        except VoodooError as error:
+            raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
+        yield TrackedPeople(index, recorded, estimate, time.perf_counter() - began)

@@ -1,0 +1,141 @@
+"""Keypoints of several people in several cameras: whose they are, and who is new."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from voodoo._core import Frame
+from voodoo.errors import MeasurementError
+from voodoo.measurements import KeypointImage
+from voodoo.people import Followed, People, PeopleEstimate
+from voodoo.pipeline.starts.base import Seen
+from voodoo.pipeline.starts.cameras import everybody
+from voodoo.sensors.adapters import Context, Memory, adapter_of
+from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.keypoints.people import shared_out
+from voodoo.sensors.motion import LimbMotion
+from voodoo.sensors.pixels import FloatArray
+from voodoo.sensors.rays import add_rays, agreed
+from voodoo.sensors.settings import FrontEndSettings
+
+_SAME_M = 0.4
+"""Who is found within this of somebody who is followed is the same person."""
+_ROOT = "humanoid_root"
+
+
+@dataclass
+class _Person:
+    """What is kept of one person between frames."""
+
+    gate: SiteGate
+    predictor: SitePredictor = field(default_factory=SitePredictor)
+    motion: LimbMotion = field(default_factory=LimbMotion)
+
+    def __copy__(self) -> _Person:
+        return replace(self, gate=copy(self.gate), predictor=copy(self.predictor), motion=copy(self.motion))
+
+
+class PeopleKeypoints:
+    """Gives the keypoints of every picture to persons, and lets somebody in whom most of the cameras show.
+
+    Args:
+        people: who is followed.
+        settings: what is used, and how much it is believed.
+    """
+
+    def __init__(self, people: People, settings: FrontEndSettings) -> None:
+        """Nobody is there."""
+        self._people = people
+        self._settings = settings
+        self._persons: dict[int, _Person] = {}
+        self._cameras: set[str] = set()
+
+    def __copy__(self) -> PeopleKeypoints:
+        """The same, with a memory of its own."""
+        twin = PeopleKeypoints(self._people, self._settings)
+        twin._persons = {number: copy(person) for number, person in self._persons.items()}
+        twin._cameras = set(self._cameras)
+        return twin
+
+    def frames(self, stamp: float, measurements: Iterable[object]) -> dict[int, Frame]:
+        """Number of a person -> their keypoints as rays; somebody new is followed from this frame on.
+
+        Raises:
+            MeasurementError: keypoints that cannot be used.
+        """
+        if "keypoints" not in self._settings.use:
+            return {}
+        images = [item for item in measurements if isinstance(item, KeypointImage)]
+        self._cameras.update(item.sensor for item in images)
+        predicted = {number: person.predictor.predict(stamp) for number, person in self._persons.items()}
+        shared = [shared_out(item, predicted) for item in images]
+        pictures = {number: [each.of[number] for each in shared if number in each.of] for number in predicted}
+        for number, joints in self._come(stamp, [each.rest for each in shared], predicted).items():
+            predicted[number] = dict(joints)
+            rest = [shared_out(each.rest, {number: joints}).of for each in shared]
+            pictures[number] = [of[number] for of in rest if number in of]
+        return {
+            number: self._frame(stamp, number, predicted[number], items) for number, items in pictures.items() if items
+        }
+
+    def learn(self, estimate: PeopleEstimate) -> None:
+        """Take up where everybody is."""
+        there = {person.id: person.estimate for person in estimate}
+        self._persons = {number: kept for number, kept in self._persons.items() if number in there}
+        for number, found in there.items():
+            person = self._persons.setdefault(number, self._new())
+            person.predictor.update(estimate.stamp, found.joints)
+            person.motion.update(estimate.stamp, found.world_from_limb)
+
+    def _new(self) -> _Person:
+        chosen = self._settings
+        return _Person(SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest))
+
+    def _come(
+        self, stamp: float, rest: Sequence[KeypointImage], predicted: Mapping[int, Mapping[str, FloatArray]]
+    ) -> dict[int, Mapping[str, FloatArray]]:
+        """Who is new, with their joints."""
+        least = max(2, len(self._cameras) // 2 + 1)
+        if sum(bool(item.people) for item in rest) < least:
+            return {}
+        come: dict[int, Mapping[str, FloatArray]] = {}
+        for found in everybody(Seen(stamp, rest, self._people.prototype, self._settings), cameras=least):
+            middle = np.mean(list(found.joints.values()), axis=0)
+            roots = [joints[_ROOT] for joints in [*predicted.values(), *come.values()] if _ROOT in joints]
+            if any(np.linalg.norm((middle - root)[:2]) < _SAME_M for root in roots):
+                continue
+            try:
+                number = self._people.add({name: tuple(place) for name, place in found.joints.items()})
+            except MeasurementError:
+                continue
+            come[number] = found.joints
+        return come
+
+    def _frame(
+        self, stamp: float, number: int, predicted: Mapping[str, FloatArray], items: Sequence[KeypointImage]
+    ) -> Frame:
+        chosen = self._settings
+        person = self._persons.setdefault(number, self._new())
+        frame = Frame(stamp=stamp)
+        context = Context(
+            stamp=stamp,
+            measurements=items,
+            predicted=predicted,
+            settings=chosen,
+            tracker=Followed(self._people, number),
+            predictor=person.predictor,
+            motion=person.motion,
+            gate=person.gate,
+            memory=Memory(),
+        )
+        for item in items:
+            adapter_of(item).add(frame, item, context)
+        rays = context.rays
+        if chosen.agreement > 0.0:
+            rays = agreed(rays, predicted=predicted, scale=chosen.agreement)
+        add_rays(frame, rays, model=chosen.model)
+        return frame

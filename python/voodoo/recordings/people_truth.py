@@ -1,0 +1,104 @@
+"""truth_people.csv beside a recording: where everybody is, and how much of them the camera sees."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError, reading
+from voodoo.measurements import FloatArray
+
+PEOPLE_TRUTH_FILE = "truth_people.csv"
+_FIRST = ("stamp_s", "person", "in_view")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PeopleTruth:
+    """Exact joints of P persons at F stamps.
+
+    Args:
+        stamps: (F,) [s], rising; those at which anybody is in the scene.
+        persons: (P,) numbers from 1, the same when a person comes back.
+        in_view: (F, P) share of a person's pixels that the depth camera sees, 0..1; 0 for who is not in the scene.
+        names: J site names.
+        positions: (F, P, J, 3) [m] in the recording's root frame; NaN for who is not in the scene.
+    """
+
+    stamps: FloatArray
+    persons: npt.NDArray[np.int64]
+    in_view: FloatArray
+    names: tuple[str, ...]
+    positions: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check that the arrays belong together."""
+        frames, persons, joints = len(self.stamps), len(self.persons), len(self.names)
+        expected = {"in_view": (frames, persons), "positions": (frames, persons, joints, 3)}
+        for name, shape in expected.items():
+            if getattr(self, name).shape != shape:
+                raise RecordingError(f"{name}: expected shape {shape}, found {getattr(self, name).shape}")
+
+    def __repr__(self) -> str:
+        """One line with the counts."""
+        return f"PeopleTruth({len(self.persons)} persons, {len(self.stamps)} stamps, {len(self.names)} joints)"
+
+    def of(self, name: str) -> FloatArray:
+        """Positions (F, P, 3) [m] of a site; NaN where the truth has it not."""
+        if name not in self.names:
+            return np.full((*self.in_view.shape, 3), np.nan)
+        return np.asarray(self.positions[:, :, self.names.index(name)])
+
+
+def read_people_truth(path: Path, root_from_truth: Callable[[float], FloatArray]) -> PeopleTruth:
+    """Read a truth_people.csv: stamp_s, person, in_view, then NAME_x,NAME_y,NAME_z [m] in base_link.
+
+    Args:
+        path: the file.
+        root_from_truth: (4, 4) root_from_base_link at a stamp [s].
+
+    Raises:
+        RecordingError: another header, a short row, a cell that is no number, or two rows of a person at one stamp.
+    """
+    with reading(path, "a table of several people"), path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    if len(rows) < 2:
+        raise RecordingError(f"{path}: expected a header and at least one row, found {len(rows)} lines")
+    header = rows[0]
+    names = tuple(cell.removesuffix("_x") for cell in header[3::3])
+    if header != [*_FIRST, *(f"{name}_{axis}" for name in names for axis in "xyz")] or not names:
+        raise RecordingError(f"{path}: expected columns {', '.join(_FIRST)}, NAME_x, NAME_y, ..., found {header[:5]}")
+    table = np.empty((len(rows) - 1, len(header)))
+    for index, row in enumerate(rows[1:]):
+        where = f"{path}, line {index + 2}"
+        if len(row) != len(header):
+            raise RecordingError(f"{where}: expected {len(header)} cells, found {len(row)}")
+        try:
+            table[index] = [float(cell) for cell in row]
+        except ValueError as error:
+            raise RecordingError(f"{where}: expected numbers, found {error}") from error
+    if not np.isfinite(table).all() or (table[:, 1] < 1).any() or (table[:, 1] % 1.0 != 0.0).any():
+        raise RecordingError(f"{path}: expected finite numbers and persons from 1, found others")
+    return _by_person(path, table, names, root_from_truth)
+
+
+def _by_person(
+    path: Path, table: FloatArray, names: tuple[str, ...], root_from_truth: Callable[[float], FloatArray]
+) -> PeopleTruth:
+    """The rows (N, 3 + 3 J) as arrays of stamp and person, in the root frame."""
+    stamps, frame = np.unique(table[:, 0], return_inverse=True)
+    persons, column = np.unique(table[:, 1].astype(np.int64), return_inverse=True)
+    if len(np.unique(frame * len(persons) + column)) != len(table):
+        raise RecordingError(f"{path}: expected one row for a person and stamp, found several")
+    in_view = np.zeros((len(stamps), len(persons)))
+    in_view[frame, column] = table[:, 2]
+    positions = np.full((len(stamps), len(persons), len(names), 3), np.nan)
+    positions[frame, column] = table[:, 3:].reshape(len(table), len(names), 3)
+    for index, stamp in enumerate(stamps):
+        root_from_base = root_from_truth(float(stamp))
+        positions[index] = positions[index] @ root_from_base[:3, :3].T + root_from_base[:3, 3]
+    return PeopleTruth(stamps, persons, in_view, names, positions)

@@ -1,0 +1,196 @@
+"""Made-up recordings by seed: people who come back, cross, pass by, walk about in four, and a robot that moves past one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.model.body import Body
+from voodoo.synthetic.boxes import Box
+from voodoo.synthetic.gait import path
+from voodoo.synthetic.grown import grown
+from voodoo.synthetic.people import Colour, MadeUpRecording, Noise, Scene, Walker
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+Points: TypeAlias = Sequence[tuple[float, float, float]]
+
+CAMERA_HEIGHT_M = 1.1
+AWAY_S = 5.0
+"""How long somebody is out of view in `returning`."""
+MOVES_M, TURNS_RAD = 1.5, math.radians(30.0)
+"""How far the camera of `robot` moves and turns."""
+_CLOTHES: tuple[tuple[Colour, Colour], ...] = (
+    ((40, 40, 190), (60, 50, 40)),
+    ((170, 90, 40), (70, 70, 75)),
+    ((60, 150, 60), (100, 60, 30)),
+    ((200, 200, 205), (40, 40, 120)),
+    ((40, 170, 200), (30, 30, 30)),
+)
+
+
+def returning(seed: int) -> MadeUpRecording:
+    """Somebody comes, stands, is gone for AWAY_S seconds and comes back; meanwhile somebody else may come, and stays.
+
+    Persons are of another stature, girth and clothes. Every other seed has one person only; sides, places and furniture are the
+    seed's.
+    """
+    chance = np.random.default_rng((seed, 1))
+    side, back = (float(chance.choice((-1.0, 1.0))) for _ in range(2))
+    depth, x = float(chance.uniform(2.6, 3.2)), float(chance.uniform(-0.4, 0.4))
+    out = _outside(depth)
+    first = [(1.0, depth, side * out), (1.0 + 2.0, depth, x), (4.5, depth, x), (6.5, depth, back * out)]
+    # Between the last point in view and the first one again lie AWAY_S seconds.
+    again = 6.5 + AWAY_S - 0.5
+    first += [(again, depth, back * out), (again + 2.0, depth, x), (again + 3.5, depth, x)]
+    people = [_walker(first, 0, chance)]
+    if seed % 2:
+        place = -math.copysign(float(chance.uniform(0.6, 0.8)), x)
+        far = depth + float(chance.uniform(0.5, 0.8))
+        out = _outside(far)
+        second = [(6.0, far, -back * out), (8.0, far, place), (again + 3.5, far, place)]
+        people.append(_walker(second, 1, chance))
+    return _recorded(f"returning {seed}", people, again + 3.5, chance, seed)
+
+
+def crossing(seed: int) -> MadeUpRecording:
+    """Two people come from both sides, cross, turn, and cross again."""
+    chance = np.random.default_rng((seed, 2))
+    near, far = float(chance.uniform(2.2, 2.6)), float(chance.uniform(3.0, 3.5))
+    paths = []
+    for depth, side in ((near, -1.0), (far, 1.0)):
+        a = side * _outside(depth)
+        b = side * float(chance.uniform(0.5, 0.7))
+        late = float(chance.uniform(0.0, 0.3))
+        places = [(1.0, a), (3.4, -b), (4.4, -b), (6.2, b), (7.0, b), (9.0, -a)]
+        paths.append([(time + late, depth, y) for time, y in places])
+    people = [_walker(points, number, chance) for number, points in enumerate(paths)]
+    return _recorded(f"crossing {seed}", people, 10.0, chance, seed)
+
+
+def passing(seed: int) -> MadeUpRecording:
+    """Somebody stands; somebody else passes by, 0.8 m nearer to the camera, and back again."""
+    chance = np.random.default_rng((seed, 3))
+    depth, x = float(chance.uniform(2.7, 3.2)), float(chance.uniform(-0.3, 0.3))
+    side = float(chance.choice((-1.0, 1.0)))
+    stands = [(0.5, depth, -side * _outside(depth)), (2.5, depth, x), (9.5, depth, x)]
+    near = depth - 0.8
+    a = side * _outside(near)
+    passes = [(4.0, near, a), (6.0, near, -a), (7.0, near, -a), (9.0, near, a)]
+    return _recorded(f"passing {seed}", [_walker(stands, 0, chance), _walker(passes, 1, chance)], 9.5, chance, seed)
+
+
+def four(seed: int, *, seconds: float = 12.0) -> MadeUpRecording:
+    """Four people come one after the other and walk about, to and fro, at four depths."""
+    chance = np.random.default_rng((seed, 4))
+    people = []
+    for number, depth in enumerate(chance.permutation((2.1, 2.8, 3.5, 4.2))):
+        side = (-1.0, 1.0)[number % 2]
+        time = 0.5 + 0.5 * number
+        points = [(time, float(depth), side * _outside(depth))]
+        while time < seconds:
+            side = -side
+            time += float(chance.uniform(1.8, 2.6))
+            y = side * float(chance.uniform(0.2, 0.3)) * depth
+            points.append((time, float(depth + chance.uniform(-0.2, 0.2)), y))
+        people.append(_walker(points, number, chance))
+    return _recorded(f"four {seed}", people, seconds, chance, seed)
+
+
+def robot(seed: int, *, moving: bool = True) -> MadeUpRecording:
+    """Somebody walks before a robot that drives MOVES_M forwards and aside and turns by TURNS_RAD; root frame `odom`.
+
+    With `moving` False the same walk is seen by the same robot standing still.
+    """
+    chance = np.random.default_rng((seed, 5))
+    side = float(chance.choice((-1.0, 1.0)))
+    walk = [
+        (0.5, 3.4, 1.4 * side),
+        (2.5, 3.2, 0.3),
+        (3.5, 3.2, 0.3),
+        (5.5, 3.6, -0.5),
+        (7.5, 3.3, 0.4),
+        (9.0, 3.3, 0.4),
+    ]
+
+    def odom_from_base(time: float) -> FloatArray:
+        share = float(np.clip((time - 2.5) / 5.5, 0.0, 1.0)) if moving else 0.0
+        share = share * share * (3.0 - 2.0 * share)
+        turn = side * TURNS_RAD * share
+        pose = np.eye(4)
+        pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
+        pose[:2, 3] = np.array([0.5, -side * math.sqrt(0.75)]) * MOVES_M * share
+        return pose
+
+    return _recorded(
+        f"robot {seed}, {'moving' if moving else 'standing'}",
+        [_walker(walk, 0, chance)],
+        9.0,
+        chance,
+        seed,
+        odom_from_base=odom_from_base,
+    )
+
+
+def base_from_camera() -> FloatArray:
+    """Pose (4, 4) of the optical frame on the robot: CAMERA_HEIGHT_M above the floor, looking ahead."""
+    return np.array(
+        [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, CAMERA_HEIGHT_M], [0.0, 0.0, 0.0, 1.0]]
+    )
+
+
+def _outside(depth: float) -> float:
+    """How far aside [m] somebody at a depth is well out of the picture."""
+    return float(depth * math.tan(math.radians(30.0)) + 0.7)
+
+
+def _walker(points: Points, number: int, chance: np.random.Generator) -> Walker:
+    """A person of a stature and girth of their own; those with other numbers differ."""
+    stature = (1.62, 1.82, 1.72, 1.90)[number % 4] + float(chance.uniform(-0.03, 0.03))
+    body = grown(Body.human(stature), thicker=(1.0, 1.12, 1.06, 0.97)[number % 4])
+    shirt, trousers = _CLOTHES[(number + int(chance.integers(2)) * 4) % len(_CLOTHES)]
+    return Walker(body=body, stops=path(points), shirt=shirt, trousers=trousers)
+
+
+def _recorded(
+    name: str,
+    people: Sequence[Walker],
+    seconds: float,
+    chance: np.random.Generator,
+    seed: int,
+    *,
+    odom_from_base: Callable[[float], FloatArray] | None = None,
+) -> MadeUpRecording:
+    def root_from_sensor(time: float) -> FloatArray:
+        return (np.eye(4) if odom_from_base is None else odom_from_base(time)) @ base_from_camera()
+
+    return MadeUpRecording(
+        Scene(
+            name=name,
+            people=people,
+            seconds=seconds,
+            furniture=_furniture(chance),
+            root_from_sensor=root_from_sensor,
+            root_frame="base_link" if odom_from_base is None else "odom",
+            noise=Noise(),
+            seed=seed,
+        )
+    )
+
+
+def _furniture(chance: np.random.Generator) -> tuple[Box, ...]:
+    """A wall, a cupboard as high as a person, a table and a chair."""
+    wall = float(chance.uniform(4.9, 5.6))
+    side = float(chance.choice((-1.0, 1.0)))
+
+    def box(x: float, y: float, size: tuple[float, float], low: float, high: float) -> Box:
+        a, b = sorted((side * y - size[1] / 2, side * y + size[1] / 2))
+        return (x - size[0] / 2, a, low), (x + size[0] / 2, b, high)
+
+    cupboard = box(wall - 0.3, float(chance.uniform(0.6, 1.6)), (0.5, 0.9), 0.0, float(chance.uniform(1.6, 2.0)))
+    table = box(wall - 0.6, float(chance.uniform(-1.8, -0.8)), (0.8, 1.2), 0.70, 0.75)
+    chair = box(wall - 0.6, float(chance.uniform(-0.4, 0.2)), (0.45, 0.45), 0.0, float(chance.uniform(0.45, 0.95)))
+    return ((wall, -6.0, 0.0), (wall + 0.2, 6.0, 3.0)), cupboard, table, chair

@@ -1,0 +1,214 @@
+"""voodoo track --people: rows, files of every kind, pictures; and recordings of made-up people."""
+
+import csv
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from typer.testing import CliRunner
+
+import voodoo
+from made_up import places_in, two_people
+from voodoo.cli import app
+from voodoo.errors import VoodooError
+from voodoo.evaluation.people_evaluate import judge
+from voodoo.export.people import PeopleTrack
+from voodoo.export.people_files import save_people
+from voodoo.export.track import Track
+from voodoo.names import SEARCHING
+from voodoo.pipeline.people import track_people
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.synthetic.people import MadeUpRecording
+from voodoo.visualization.ink import person_color
+from voodoo.visualization.overlay import Overlay
+
+
+@pytest.fixture(scope="module")
+def followed():
+    """Estimates of all frames, and the bodies of everybody."""
+    people, bodies, estimates = voodoo.People(), {}, []
+    for step in track_people(two_people(), people):
+        estimates.append(step.estimate)
+        bodies |= {person.id: people.body(person.id) for person in step.estimate}
+    return PeopleTrack.of(estimates, bodies=bodies), bodies
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    opened = {}
+
+    def open_recording(path, **options):
+        opened.update(options)
+        return two_people()
+
+    monkeypatch.setattr("voodoo.cli.running.open_recording", open_recording)
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        result = CliRunner().invoke(app, ["track", "somewhere", *words])
+        result.opened = opened
+        return result
+
+    return call
+
+
+def test_the_made_up_people_are_where_the_truth_says(followed):
+    recording = two_people()
+    truth = recording.people
+    assert truth.persons.tolist() == [1, 2]
+    assert truth.in_view[0].tolist() == [0.0, 0.0]
+    assert truth.in_view[2, 0] == 0.0
+    assert (truth.in_view[3:, 0] > 0.8).all()
+    assert (truth.in_view[-3:] > 0.8).all()
+    points = places_in(recording, 30)
+    for person in range(2):
+        root = truth.of("humanoid_root")[30, person]
+        assert np.linalg.norm(points - root, axis=1).min() < 0.15
+    assert judge(recording, voodoo.People()).mota > 0.8
+
+
+def test_recordings_are_the_same_for_the_same_seed():
+    first, again = two_people(), MadeUpRecording(two_people().scene)
+    for a, b in zip(list(first)[28:], list(again)[28:], strict=True):
+        np.testing.assert_array_equal(a.measurements[1].image, b.measurements[1].image)
+        np.testing.assert_array_equal(a.measurements[0].image, b.measurements[0].image)
+    picture = list(first)[30].measurements[0].image
+    green = (picture[..., 1].astype(int) - picture[..., 2] > 50).sum()
+    assert green > 200, "the shirt of the second"
+
+
+def test_a_row_exists_only_for_who_is_there(followed, run):
+    result, _ = followed
+    told = run("--people", "any", "--out", "all.csv")
+    assert told.exit_code == 0, told.output
+    assert "32 frames, 2 persons in" in told.stdout
+    with Path("all.csv").open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header[:5] == ["stamp_s", "person", "status", "residual_m", "humanoid_root_x"]
+    assert len(rows) == sum(len(track) for track in result.tracks.values()) < 2 * 32
+    assert {row[1] for row in rows} == {"1", "2"}
+    stamps = [float(row[0]) for row in rows]
+    assert stamps == sorted(stamps)
+    assert set(stamps) <= {recorded.stamp for recorded in two_people()}
+    assert told.opened["bare"] is True
+    assert PeopleTrack.load("all.csv").tracks.keys() == {1, 2}
+
+
+def test_at_most_so_many_are_followed(run):
+    assert run("--people", "2", "--use", "depth", "--out", "two.npz").exit_code == 0
+    assert PeopleTrack.load("two.npz").tracks.keys() == {1, 2}
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--people", "0"), "expected any or a whole number from 1, found '0'"),
+        (("--people", "all"), "expected any or a whole number from 1, found 'all'"),
+        (("--people", "any", "--init", "start.json"), "init: expected none with --people"),
+        (("--people", "any", "--use", "skin"), "several people are found in depth images"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(run, words, expected):
+    told = run(*words, "--out", "no.csv")
+    assert told.exit_code == 1
+    assert expected in told.stderr
+
+
+def test_the_npz_holds_everybody_exactly(followed, tmp_path):
+    result, _ = followed
+    result.save(tmp_path / "all.npz")
+    again = PeopleTrack.load(tmp_path / "all.npz")
+    np.testing.assert_array_equal(again.stamps, result.stamps)
+    for one, track in result.tracks.items():
+        for name in ("stamps", "residual", "joints", "world_from_limb", "angles"):
+            np.testing.assert_array_equal(getattr(again.tracks[one], name), getattr(track, name))
+        assert again.tracks[one].status == track.status
+
+
+def test_there_is_a_bvh_and_a_trc_for_every_person(followed, tmp_path):
+    result, bodies = followed
+    for suffix in (".bvh", ".trc"):
+        written = save_people(result, tmp_path / f"all{suffix}", bodies=bodies, root_frame="base_link")
+        assert [path.name for path in written] == [f"all_1{suffix}", f"all_2{suffix}"]
+        assert all(path.is_file() for path in written)
+    frames = [line for line in (tmp_path / "all_2.bvh").read_text().splitlines() if line.startswith("Frames:")]
+    assert frames == [f"Frames: {len(result.unbroken(2))}"]
+
+
+def test_the_bag_has_the_frames_of_everybody(followed, tmp_path):
+    result, bodies = followed
+    save_people(result, tmp_path / "all", bodies=bodies, root_frame="odom")
+    children, stamps = {}, []
+    with AnyReader([tmp_path / "all"]) as bag:
+        topics = {connection.topic for connection in bag.connections}
+        for connection, stamp, raw in bag.messages():
+            stamps.append(stamp)
+            if connection.topic == "/tf":
+                for item in bag.deserialize(raw, connection.msgtype).transforms:
+                    children.setdefault(item.child_frame_id, []).append(item.header.frame_id)
+    assert {f"/humans/bodies/body_{one}/joint_states" for one in (1, 2)} <= topics
+    assert stamps == sorted(stamps)
+    for one in (1, 2):
+        assert set(children[f"body_{one}"]) == {"odom"}
+        assert len(children[f"body_{one}"]) == len(result.tracks[one])
+        assert f"l_elbow_{one}" in children
+
+
+def test_files_of_nobody_are_written_all_the_same(tmp_path):
+    nobody = PeopleTrack(np.array([0.0, 0.1]), {})
+    nobody.save(tmp_path / "nobody.csv")
+    nobody.save(tmp_path / "nobody.npz")
+    assert PeopleTrack.load(tmp_path / "nobody.npz").tracks == {}
+    assert save_people(nobody, tmp_path / "nobody.bvh", bodies={}, root_frame="odom") == []
+    save_people(nobody, tmp_path / "nobody.mcap", bodies={}, root_frame="odom")
+    assert (tmp_path / "nobody.mcap").is_file()
+    assert PeopleTrack.load(tmp_path / "nobody.csv").tracks == {}
+
+
+def test_who_was_away_has_an_unbroken_track_with_a_gap(followed):
+    result, _ = followed
+    track = result.tracks[1]
+    gone = PeopleTrack(result.stamps, {1: track.of_frames(np.r_[0:4, 9 : len(track)])})
+    unbroken = gone.unbroken(1)
+    assert len(unbroken) == len(track)
+    assert unbroken.status[4:9] == (SEARCHING,) * 5
+    np.testing.assert_array_equal(unbroken.of_frames(unbroken.found).joints, gone.tracks[1].joints)
+    assert len(gone.unbroken(1, to_the_end=True)) >= len(unbroken)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_readers_of_one_person_take_the_only_one_and_refuse_several(followed, tmp_path, suffix):
+    result, _ = followed
+    PeopleTrack(result.stamps, {2: result.tracks[2]}).save(tmp_path / f"one{suffix}")
+    assert len(Track.load(tmp_path / f"one{suffix}")) == len(result.tracks[2])
+    result.save(tmp_path / f"two{suffix}")
+    with pytest.raises(VoodooError, match="expected the result of one person, found persons 1, 2"):
+        Track.load(tmp_path / f"two{suffix}")
+
+
+def test_the_overlay_shows_everybody_in_a_colour_of_their_own():
+    people = voodoo.People()
+    *_, last = track_people(two_people(), people)
+    bodies = {person.id: people.body(person.id) for person in last.estimate}
+    picture = Overlay(two_people()).draw_people(last.recorded, last.estimate, bodies, index=last.index)
+    assert sorted(bodies) == [1, 2]
+    for one in bodies:
+        assert (np.abs(picture.astype(int) - person_color(one)).max(axis=2) < 40).sum() > 300
+
+
+def test_the_command_line_draws_every_frame(run, monkeypatch):
+    monkeypatch.setattr(MadeUpRecording, "__len__", lambda _: 2)
+    monkeypatch.setattr(MadeUpRecording, "__iter__", lambda own, every=MadeUpRecording.__iter__: islice(every(own), 2))
+    told = run("--people", "any", "--out", "a.csv", "--overlay", "look")
+    assert told.exit_code == 0, told.output
+    assert len(list(Path("look").iterdir())) == 2
+    assert "nobody was found in 2 frames" in told.stderr
+
+
+def test_boxes_and_the_floor_reach_the_frame():
+    recording = two_people()
+    everywhere = FrontEndSettings(use=("depth",), exclude=(((0.0, -5.0, -1.0), (9.0, 5.0, 3.0)),))
+    steps = list(track_people(recording, voodoo.People(), settings=everywhere))
+    assert all(len(step.estimate) == 0 for step in steps)
