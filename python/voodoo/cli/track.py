@@ -167,6 +167,7 @@ def track_command(
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
             with viewer_of(view, save, source.name) as viewer:
                 follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer))
+            _say_left_out(source, left_out)
             return
         tracker = start_tracker(
             source,
@@ -193,13 +194,17 @@ def track_command(
         _say_doubts(source, result, left_out)
 
 
+def _say_left_out(source: Recording, left_out: LeftOut | None) -> None:
+    if left_out:
+        first = next(iter(left_out.first.values()))
+        say(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
+
+
 def _say_doubts(source: Recording, result: Track, left_out: LeftOut | None) -> None:
     """Say on stderr what was left out, and what may be wrong where nobody was tracked."""
     from voodoo.recordings.depth_range import depth_range
 
-    if left_out:
-        first = next(iter(left_out.first.values()))
-        say(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
+    _say_left_out(source, left_out)
     if not result.found.any():
         say(f"{source.name}: nobody was found in {len(result)} frames")
     if not {"tracking", "degraded"} & set(result.status):
