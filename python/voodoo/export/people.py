@@ -88,9 +88,12 @@ class PeopleTrack:
         track = self.tracks[person]
         place = np.searchsorted(self.stamps, track.stamps)
         first, end = int(place[0]), len(self) if to_the_end else int(place[-1]) + 1
-        status = [SEARCHING] * (end - first)
-        for index, word in zip(place - first, track.status, strict=True):
-            status[index] = word
+
+        def spread_words(words: Sequence[str], otherwise: str) -> tuple[str, ...]:
+            found = [otherwise] * (end - first)
+            for index, word in zip(place - first, words, strict=True):
+                found[index] = word
+            return tuple(found)
 
         def spread(values: FloatArray) -> FloatArray:
             wide = np.full((end - first, *values.shape[1:]), np.nan)
@@ -100,7 +103,8 @@ class PeopleTrack:
         return replace(
             track,
             stamps=self.stamps[first:end],
-            status=tuple(status),
+            status=spread_words(track.status, SEARCHING),
+            limb_status={limb: spread_words(words, "") for limb, words in track.limb_status.items()},
             residual=spread(track.residual),
             joints=spread(track.joints),
             world_from_limb=spread(track.world_from_limb),
