@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 import voodoo
+from made_up import two_people
 from voodoo.errors import VoodooError
+from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.people import track_people
 from voodoo.pipeline.search import nobody
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
@@ -72,6 +75,29 @@ def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):
     counts = {(entity, column): int(count) for count, entity, column in rows}
     assert counts["/world/body", "Clear:is_recursive"] == 1
     assert counts["/world/body/limbs/l_forearm", "Mesh3D:albedo_factor"] == 2
+
+
+def test_everybody_has_a_body_of_their_own_and_is_cleared_when_they_go(tmp_path):
+    pytest.importorskip("rerun", reason="Rerun is not installed (pip install voodoo[view])")
+    people, bodies, steps = voodoo.People(), {}, []
+    for step in track_people(two_people(), people):
+        bodies |= {person.id: people.body(person.id) for person in step.estimate}
+        steps.append(step)
+    path = tmp_path / "people.rrd"
+    with Viewer(save=path) as viewer:
+        for step in steps[-2:]:
+            viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
+        viewer.log_people(PeopleEstimate(9.0, ()), bodies)
+    command = Path(sys.executable).with_name("rerun")
+    shown = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
+    rows = re.findall(r"with (\d+) rows .* - (/world/people\S*) - .*\[(\S+?)[\] ]", shown)
+    counts = {(entity, column): int(count) for count, entity, column in rows}
+    for one in (1, 2):
+        assert counts[f"/world/people/{one}", "Clear:is_recursive"] == 1
+        assert f"/world/people/{one}/limbs/l_forearm" in shown
+        assert f"/world/people/{one}/number" in shown
+    for entity in ("/world/cameras/camera_depth/picture", "/plots/people", "/plots/status/1"):
+        assert entity in shown, entity
 
 
 def test_without_rerun_the_message_says_what_to_install(monkeypatch, tmp_path):
