@@ -157,6 +157,11 @@ class People:
         """Follow these numbers and nobody else from now on; without numbers, everybody again."""
         self._core.only(list(persons) or None)
 
+    @property
+    def wants_color(self) -> bool:
+        """Whether a colour picture would tell something in the next frame; to decode it for nothing costs time."""
+        return self._core.wants_colors()
+
     def body(self, person: int) -> Body:
         """The body of a person who is there, in their sizes.
 

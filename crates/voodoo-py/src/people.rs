@@ -91,6 +91,11 @@ impl PyPeople {
         self.people.add(&positions, fit_sizes).map_err(|error| error.into_py(joints.py()))
     }
 
+    /// Whether colour pictures would tell something in the next frame.
+    fn wants_colors(&self) -> bool {
+        self.people.wants_colors()
+    }
+
     /// Follows these numbers alone; None: everybody.
     fn only(&mut self, ids: Option<Vec<usize>>) {
         self.people.only(ids);

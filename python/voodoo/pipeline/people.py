@@ -83,7 +83,7 @@ class PeopleFrontEnd:
             adapter = adapter_of(item)
             if adapter.kind in chosen.use and adapter.while_searching:
                 adapter.add(frame, item, context)
-            elif isinstance(item, ColorImage) and adapter.kind in chosen.use:
+            elif isinstance(item, ColorImage) and adapter.kind in chosen.use and self.people.wants_color:
                 # Clothes tell persons apart.
                 frame.add_color(item.image, camera=item.camera, world_from_sensor=item.root_from_sensor)
         return frame

@@ -39,6 +39,8 @@ pub enum Wanted {
     All,
     /// Anybody: one candidate is looked at in each image, those first that were not found to be nobody in the images before.
     Anybody,
+    /// Anybody, but nothing that was found to be nobody a few images ago.
+    News,
     /// The person at this place of the world, metres.
     Near(Vec3),
 }
@@ -139,6 +141,7 @@ impl Detector {
         let Self { network, memory, segmentation, found, nearest, rejections } = self;
         found.clear();
         *nearest = None;
+        rejections.next_image();
         segmentation.find(image, around);
         let camera_from_world = image.world_from_sensor.inverse();
         let mut order: Vec<usize> = (0..segmentation.candidates().len()).collect();
@@ -146,6 +149,10 @@ impl Detector {
         match wanted {
             Wanted::All => {}
             Wanted::Anybody => order.sort_by_key(|number| rejections.last(at(*number))),
+            Wanted::News => {
+                order.retain(|number| !rejections.is_old(at(*number)));
+                order.sort_by_key(|number| rejections.last(at(*number)));
+            }
             Wanted::Near(place) => {
                 let place = camera_from_world * place;
                 order.sort_by(|a, b| at(*a).distance(place).total_cmp(&at(*b).distance(place)));

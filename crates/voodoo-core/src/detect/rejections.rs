@@ -8,11 +8,14 @@ const SAME_PLACE: f64 = 0.15;
 const SAME_AREA: f64 = 1.3;
 /// Things that are remembered, the last ones.
 const MOST_REJECTED: usize = 16;
+/// What is nobody is no news for so many images.
+const NO_NEWS: usize = 5;
 
 /// Places in the camera's frame, the last one last.
 #[derive(Debug, Default)]
 pub(super) struct Rejections {
     looks: usize,
+    images: usize,
     places: Vec<Rejected>,
 }
 
@@ -21,9 +24,20 @@ struct Rejected {
     middle: Vec3,
     area: f64,
     look: usize,
+    image: usize,
 }
 
 impl Rejections {
+    /// Another image comes.
+    pub(super) fn next_image(&mut self) {
+        self.images += 1;
+    }
+
+    /// Whether a candidate was found to be nobody not long ago.
+    pub(super) fn is_old(&self, candidate: &Candidate) -> bool {
+        self.places.iter().any(|place| self.images - place.image < NO_NEWS && place.is(candidate))
+    }
+
     /// Number of the look at which a candidate was last found to be nobody; 0 for a new one.
     pub(super) fn last(&self, candidate: &Candidate) -> usize {
         self.places.iter().filter(|place| place.is(candidate)).map(|place| place.look).max().unwrap_or(0)
@@ -37,7 +51,12 @@ impl Rejections {
             if self.places.len() == MOST_REJECTED {
                 self.places.remove(0);
             }
-            self.places.push(Rejected { middle: candidate.middle(), area: candidate.area, look: self.looks });
+            self.places.push(Rejected {
+                middle: candidate.middle(),
+                area: candidate.area,
+                look: self.looks,
+                image: self.images,
+            });
         }
     }
 }

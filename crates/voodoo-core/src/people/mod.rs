@@ -92,6 +92,13 @@ impl People {
         self.persons.iter().filter(|person| person.there).map(|person| (person.id, &person.tracker))
     }
 
+    /// Whether colour pictures would tell something in the next frame: of somebody whose clothes were not looked at for a while,
+    /// or of somebody who may come back.
+    pub fn wants_colors(&self) -> bool {
+        let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
+        self.persons.iter().any(|person| !person.tracked() || person.due(stamp))
+    }
+
     /// Follows these numbers and nobody else from now on; with `None` everybody.
     pub fn only(&mut self, ids: Option<Vec<usize>>) {
         self.options.only = ids;
@@ -185,7 +192,7 @@ impl People {
         }
         self.looked = Some(frame.stamp);
         self.strangers.fade(frame.stamp);
-        self.detect(frame, Wanted::Anybody);
+        self.detect(frame, Wanted::News);
         let believed = self.strangers.believed(frame.stamp);
         if !believed.is_empty() {
             self.welcome(frame, &believed);
@@ -211,7 +218,8 @@ impl People {
                 }
                 let mut pixels = Vec::new();
                 self.detector.mask(&detection, &mut pixels);
-                self.strangers.note(frame.stamp, detection, number, pixels);
+                let still = self.scene.shows(frame, number, &pixels);
+                self.strangers.note(frame.stamp, detection, number, pixels, still);
             }
         }
     }

@@ -59,6 +59,11 @@ impl Person {
         })
     }
 
+    /// Whether their clothes were not looked at for a while.
+    pub(super) fn due(&self, stamp: f64) -> bool {
+        stamp - self.looked >= CLOTHES_EVERY
+    }
+
     /// There, and not lost.
     pub(super) fn tracked(&self) -> bool {
         self.there && !matches!(self.tracker.estimate().status, Status::Lost | Status::Searching)
@@ -87,10 +92,7 @@ impl Person {
         if self.tracked() {
             self.seen = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
-            if estimate.status == Status::Tracking
-                && frame.stamp - self.looked >= CLOTHES_EVERY
-                && !frame.colors.is_empty()
-            {
+            if estimate.status == Status::Tracking && self.due(frame.stamp) && !frame.colors.is_empty() {
                 let own = |image, pixel: usize| share.owners(image).get(pixel) == Some(&share.own);
                 self.clothes.look(frame, self.tracker.body(), &estimate.world_from_limb, own);
                 self.looked = frame.stamp;

@@ -1,6 +1,6 @@
 //! The still scene that all persons stand in, learnt where nobody is.
 
-use crate::observation::background::Backgrounds;
+use crate::observation::background::{Background, Backgrounds};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::share::NOBODY;
 
@@ -85,6 +85,19 @@ impl Scene {
                 }
             }
         }
+    }
+
+    /// Whether most of these pixels of an image show what is known to be still.
+    pub(super) fn shows(&self, frame: &Frame, image: usize, pixels: &[usize]) -> bool {
+        let Some((image, known)) = frame.images.get(image).and_then(|image| Some((image, self.known.of(image)?)))
+        else {
+            return false;
+        };
+        let still = |pixel: &&usize| {
+            let known = known.depth().get(**pixel).copied().unwrap_or(0.0);
+            metres(image, **pixel).is_some_and(|z| Background::holds(known, z))
+        };
+        2 * pixels.iter().filter(still).count() > pixels.len()
     }
 
     /// These pixels of an image show a person.

@@ -4,6 +4,8 @@ use crate::detect::Detection;
 use crate::math::Vec3;
 use crate::relocalize::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 
+/// The same of what has stood there from the start: plants get up to 4, persons who show more than half 8.
+const STILL_COSTS: f64 = 5.0;
 /// Who was not seen for so long is forgotten, seconds.
 const FORGOTTEN: f64 = 0.5;
 
@@ -31,10 +33,10 @@ impl Strangers {
         self.seen.retain(|stranger| stamp - stranger.stamp < FORGOTTEN);
     }
 
-    /// Takes a look in.
-    pub(super) fn note(&mut self, stamp: f64, detection: Detection, image: usize, pixels: Vec<usize>) {
+    /// Takes a look in; `still`: what is seen has stood there all the time.
+    pub(super) fn note(&mut self, stamp: f64, detection: Detection, image: usize, pixels: Vec<usize>, still: bool) {
         let Some(place) = detection.joint("humanoid_root").map(|root| root.position) else { return };
-        let gain = detection.person - LOOK_COSTS;
+        let gain = detection.person - if still { STILL_COSTS } else { LOOK_COSTS };
         let near = |stranger: &&mut Stranger| stranger.place.distance(place) < SAME_PERSON;
         let before = self.seen.iter_mut().find(near).map(|stranger| stranger.sum);
         self.seen.retain(|stranger| stranger.place.distance(place) >= SAME_PERSON);
