@@ -17,6 +17,8 @@ def test_mutated_files_and_odd_arguments_are_refused_or_read():
 
 def test_sound_samples_are_read(tmp_path):
     for name, sample in fuzz_samples.SAMPLES.items():
+        if name.startswith(("realsense", "db3", "ros1")):
+            continue  # read in tests of their own
         folder = tmp_path / name.replace(" ", "_")
         folder.mkdir()
         sample.make(folder)

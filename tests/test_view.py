@@ -91,7 +91,7 @@ def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):
 
 
 def test_everybody_has_a_body_of_their_own_and_is_cleared_when_they_go(tmp_path):
-    pytest.importorskip("rerun", reason="Rerun is not installed (pip install voodoo[view])")
+    pytest.importorskip("rerun", reason="Rerun is not installed")
     people, bodies, steps = voodoo.People(), {}, []
     for step in track_people(two_people(), people):
         bodies |= {person.id: people.body(person.id) for person in step.estimate}

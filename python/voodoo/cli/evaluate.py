@@ -56,7 +56,7 @@ def eval_command(
 
     A recording with truth_people.csv beside it is tracked with --people any and judged for MOTA, IDF1, switches of identity,
     false bodies and joints. With --result a .csv that any program wrote is judged: stamp_s, person, status, residual_m, then
-    NAME_x, NAME_y, NAME_z. It needs pip install voodoo[eval]; --out gets people.csv and people.md.
+    NAME_x, NAME_y, NAME_z. It needs pip install 'voodoo-tracker[eval]'; --out gets people.csv and people.md.
 
     Examples
 

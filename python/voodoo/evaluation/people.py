@@ -310,7 +310,7 @@ def motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
     try:
         import motmetrics as library
     except ImportError:
-        raise VoodooError("several people are judged by py-motmetrics: pip install 'voodoo[eval]'") from None
+        raise VoodooError("several people are judged by py-motmetrics: pip install 'voodoo-tracker[eval]'") from None
     return library
 
 
