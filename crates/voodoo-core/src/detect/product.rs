@@ -8,7 +8,7 @@ use crate::math::widest;
 /// registers of AVX2.
 pub(super) const ROWS: usize = 12;
 const LANES: usize = 16;
-const HALF: usize = LANES / 2;
+const NARROW: usize = LANES / 2;
 
 /// Trained weights and biases, columns in groups of `LANES`; missing columns are zeros.
 #[derive(Debug)]
@@ -53,8 +53,8 @@ impl Panels {
                     if whole {
                         self.columns::<LANES>(group, 0, seen, out);
                     } else {
-                        self.columns::<HALF>(group, 0, seen, out);
-                        self.columns::<HALF>(group, HALF, seen, out);
+                        self.columns::<NARROW>(group, 0, seen, out);
+                        self.columns::<NARROW>(group, NARROW, seen, out);
                     }
                 }
             },

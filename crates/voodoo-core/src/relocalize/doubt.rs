@@ -6,8 +6,7 @@ use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 const YOUNG: f64 = 1.0;
-/// Every so manyth frame of a young or lost track is looked at, and of one with a limb in doubt: a look costs as much as five
-/// frames.
+/// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
 const EVERY: [usize; 2] = [3, 15];
 /// A detection is elsewhere when its shoulders and hips are this far from the tracked ones in the mean, metres: three times as far
 /// as a detector errs.
@@ -30,7 +29,8 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    frames: usize,
+    /// Frames since the last look.
+    waited: Option<usize>,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
     elsewhere: f64,
     nobody: f64,
@@ -63,10 +63,13 @@ impl Doubt {
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;
         self.since = self.since.or(Some(stamp));
-        let first = self.frames == 0;
-        self.frames += 1;
+        self.waited = self.waited.map(|frames| frames + 1);
         let every = if young { EVERY[0] } else { EVERY[1] };
-        (young || doubtful) && (first || self.frames.is_multiple_of(every))
+        let due = (young || doubtful) && self.waited.is_none_or(|frames| frames >= every);
+        if due {
+            self.waited = Some(0);
+        }
+        due
     }
 
     /// Weighs a detection against the pose, world frame; whether the detection's is to be tried.

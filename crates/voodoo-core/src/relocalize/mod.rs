@@ -116,8 +116,9 @@ impl Relocalizer {
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
     /// was not where it should be in the frame before, or the body `lost`.
     pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {
-        let often = lost || self.watch.open();
-        if self.doubt.due(frame.stamp, doubtful, often) && self.known {
+        // A body that was found a moment ago may face the other way.
+        let doubtful = doubtful || self.watch.open();
+        if self.doubt.due(frame.stamp, doubtful, lost) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
         } else {
             self.people.forget();
