@@ -145,7 +145,7 @@ impl Tracker {
             let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
             match share {
                 None => relocalizer.look(frame, &model.body, root, doubtful, lost),
-                Some(share) => relocalizer.look_at_share(frame, share, &model.body, root, [doubtful, lost]),
+                Some(share) => relocalizer.look_at_share(frame, share, &model.body, root, lost),
             }
         }
         if config.hypotheses && schedule.whole_body && known {
@@ -209,7 +209,9 @@ impl Tracker {
         let lost = self.assessor.status() == Status::Lost;
         if self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
-            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost) && self.move_to_detection(frame) {
+            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, among)
+                && self.move_to_detection(frame)
+            {
                 return;
             }
         }
