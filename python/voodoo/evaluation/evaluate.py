@@ -218,11 +218,13 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     # Who is there and not found is as lost as who is looked for in a wrong place.
     missed = searching[:, None] & np.isfinite(reference).all(axis=2)
     class_, lost = metrics.tracking_class(np.where(missed, NOWHERE_M, errors), stamps, limit=limit)
+    compared = metrics.shifted(reference, 0 if exact else lag)
+    without = metrics.without_offsets(positions, compared)
+    class_without, _ = metrics.tracking_class(np.where(missed, NOWHERE_M, without), stamps, limit=limit)
     still = metrics.standing_still(reference, stamps)
     distances = np.concatenate([step.witness.distances for step in steps])
     about_joints = np.concatenate([step.witness.about_joints for step in steps])
     measured = np.array([step.measured for step in steps])
-    compared = metrics.shifted(reference, 0 if exact else lag)
     first_wait, first_error = _first_pose(stamps, status, reference, errors0)
     far, near = (limb_ends(errors, far=which) for which in (True, False))
     score = Score(
@@ -234,7 +236,9 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         error_lag0_m=metrics.mean_or_nan(errors0),
         error_best_lag_m=metrics.mean_or_nan(errors_best),
         best_lag=None if class_ is None else lag,
-        error_without_offsets_m=metrics.mean_or_nan(metrics.without_offsets(positions, compared)),
+        error_without_offsets_m=metrics.mean_or_nan(without),
+        class_without_offsets=np.nan if class_without is None else float(class_without),
+        lost_without_offsets=np.nan if class_without is None else float(class_without == 0),
         first_pose_s=first_wait,
         first_pose_error_m=first_error,
         within_5cm=metrics.share_within(errors, 0.05),

@@ -210,7 +210,7 @@ def _frames(truth: PeopleTruth, rows: PeopleRows) -> _Frames:
 
 def match(truth: PeopleTruth, rows: PeopleRows, frames: _Frames) -> Matches:
     """Who is whom, frame by frame, over all persons at once and keeping the pairs of the frame before."""
-    mm = _motmetrics()
+    mm = motmetrics()
     roots, own = truth.of(ROOT), rows.of(ROOT)
     posed = np.asarray(np.isfinite(own).all(axis=1))
     ids = np.unique(rows.persons)
@@ -301,12 +301,17 @@ def _joint_errors(truth: PeopleTruth, rows: PeopleRows, frames: _Frames, found: 
     return np.array(pairs) if pairs else np.empty((0, len(metrics.JOINTS)))
 
 
-def _motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
+def motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
+    """The library, which is optional.
+
+    Raises:
+        VoodooError: it is not installed; says how.
+    """
     try:
-        import motmetrics
+        import motmetrics as library
     except ImportError:
         raise VoodooError("several people are judged by py-motmetrics: pip install 'voodoo[eval]'") from None
-    return motmetrics
+    return library
 
 
 def together(scores: Sequence[PeopleScore]) -> PeopleScore:

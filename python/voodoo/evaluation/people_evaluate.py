@@ -10,7 +10,7 @@ import numpy as np
 
 from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.evaluation.people import PeopleScore, score
+from voodoo.evaluation.people import PeopleScore, motmetrics, score
 from voodoo.export.people import PeopleTrack
 from voodoo.export.people_rows import read_rows
 from voodoo.model.body import Body
@@ -90,6 +90,7 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
         VoodooError: the recording has no truth of several people, or a frame was refused.
     """
     truth = truth_of(recording)
+    motmetrics()  # that it is missing should not be told after the work
     steps = list(track_people(recording, people, settings=settings))
     rows = PeopleTrack.of([step.estimate for step in steps]).rows()
     seconds = float(np.mean([step.seconds for step in steps])) if steps else np.nan

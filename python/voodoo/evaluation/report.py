@@ -19,6 +19,8 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("error_lag0_m", "... at lag 0", lambda value: f"{100 * value:.1f} cm"),
     ("error_best_lag_m", "... at the best lag", lambda value: f"{100 * value:.1f} cm"),
     ("error_without_offsets_m", "... each joint's constant offset removed", lambda value: f"{100 * value:.1f} cm"),
+    ("class_without_offsets", "... class average of that error", lambda value: f"{value:.2f}"),
+    ("lost_without_offsets", "... sequences that end with a joint lost by it", lambda value: f"{100 * value:.1f} %"),
     ("first_pose_s", "first pose after", lambda value: f"{value:.2f} s"),
     ("first_pose_error_m", "mean error in the first pose", lambda value: f"{100 * value:.1f} cm"),
     ("within_5cm", "joints within 5 cm", lambda value: f"{100 * value:.1f} %"),

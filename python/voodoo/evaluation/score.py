@@ -33,6 +33,7 @@ class Score:
         first_pose_error_m: mean error in that frame, at lag 0.
         within_5cm, within_10cm: share of joint errors, at the same lag as `error_m`.
         joint_error_m: mean error of each of the twelve joints, at the same lag.
+        class_without_offsets, lost_without_offsets: the class, and whether a joint is lost at the end (0 or 1), of that error.
         tracking_class: 2, 1 or 0 as in K06 Table I, see metrics.tracking_class, at the same lag.
         lost_joints: the joints that were ever lost.
         selection: how the person's depth points were found, see witness.
@@ -60,6 +61,8 @@ class Score:
     error_best_lag_m: float = np.nan
     best_lag: int | None = None
     error_without_offsets_m: float = np.nan
+    class_without_offsets: float = np.nan
+    lost_without_offsets: float = np.nan
     first_pose_s: float = np.nan
     first_pose_error_m: float = np.nan
     within_5cm: float = np.nan

@@ -46,7 +46,8 @@ class Summary:
 
 
 MEANS = (
-    "error_m", "error_lag0_m", "error_best_lag_m", "error_without_offsets_m", "first_pose_s", "first_pose_error_m",
+    "error_m", "error_lag0_m", "error_best_lag_m", "error_without_offsets_m",
+    "class_without_offsets", "lost_without_offsets", "first_pose_s", "first_pose_error_m",
     "within_5cm", "within_10cm", "depth_within_5cm", "depth_median_m",
     "depth_p95_m", "person_within_5cm", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
     "reference_standing_jitter_m", "degraded_share", "lost_share", "searching_share", "lost_recall", "false_alarm_rate", "step_s",

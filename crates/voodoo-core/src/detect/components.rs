@@ -128,24 +128,25 @@ impl Components {
         self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
         let mut finer = 1.0;
         self.join(view, finer, |_| true);
-        self.sum_up(view);
+        self.measure(view);
         for _ in 0..CUTS {
             self.too_large.clear();
-            self.too_large.extend(self.parts.iter().filter(|part| part.area > AREA[1]).map(|part| part.label));
+            let too_large = self.areas.iter().enumerate().filter(|(_, area)| f64::from(**area) > AREA[1]);
+            self.too_large.extend(too_large.map(|(label, _)| label as u32));
             if self.too_large.is_empty() {
                 break;
             }
             finer *= CUT_FINER;
             self.cut(view, finer);
-            self.sum_up(view);
+            self.measure(view);
         }
+        self.sum_up(view);
         candidates.clear();
         self.propose(candidates);
     }
 
     /// Takes too large parts apart and joins their pixels again by smaller steps.
     fn cut(&mut self, view: &View, finer: f32) {
-        self.too_large.sort_unstable();
         let mut again = vec![false; self.labels.len()];
         for index in 0..self.labels.len() {
             let label = self.labels[index];
@@ -169,6 +170,8 @@ impl Components {
                 if z <= 0.0 || !of(index) {
                     continue;
                 }
+                // No pixel that came before hangs on this one.
+                let mut root = index as u32;
                 for (other, there) in [
                     (index.wrapping_sub(1), column >= 1),
                     (index.wrapping_sub(width), row >= 1),
@@ -179,7 +182,9 @@ impl Components {
                         continue;
                     }
                     if (z - depth[other]).abs() < finer * (STEP[0] + STEP[1] * z.min(depth[other])) {
-                        self.unite(index as u32, other as u32);
+                        let other = self.root(other as u32);
+                        self.labels[root.max(other) as usize] = root.min(other);
+                        root = root.min(other);
                     }
                 }
             }
@@ -189,11 +194,6 @@ impl Components {
                 self.labels[index] = self.root(index as u32);
             }
         }
-    }
-
-    fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.labels[a.max(b) as usize] = a.min(b);
     }
 
     fn root(&mut self, mut index: u32) -> u32 {
@@ -208,15 +208,20 @@ impl Components {
         }
     }
 
-    /// Sizes of the parts, the largest first.
-    fn sum_up(&mut self, view: &View) {
-        let Self { labels, parts, areas, .. } = self;
+    /// Surface of everything that hangs together.
+    fn measure(&mut self, view: &View) {
+        let Self { labels, areas, .. } = self;
         areas.clear();
         areas.resize(labels.len(), 0.0);
         let area = view.pixel_area() as f32;
         for (label, z) in labels.iter().zip(&view.depth).filter(|(label, _)| **label != NONE) {
             areas[*label as usize] += area * z * z;
         }
+    }
+
+    /// Sizes of the parts, the largest first.
+    fn sum_up(&mut self, view: &View) {
+        let Self { labels, parts, areas, .. } = self;
         parts.clear();
         let large = areas.iter().enumerate().filter(|(_, area)| f64::from(**area) > LEAST_PART);
         parts.extend(large.map(|(label, area)| Part::new(label as u32, f64::from(*area))));

@@ -22,19 +22,61 @@ const NEIGHBOUR: f64 = 0.05;
 /// The plane is fitted again to the points within this share of the distance that the trials allowed.
 const NEARER: [f64; 2] = [0.7, 0.5];
 
+/// So many points are compared with a plane at a time.
+const LANES: usize = 8;
+
+/// Points in single precision, coordinate by coordinate, with how far from the floor each may be seen.
+#[derive(Debug, Default)]
+struct Lanes {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+    near: Vec<f32>,
+}
+
+impl Lanes {
+    fn clear(&mut self) {
+        [&mut self.x, &mut self.y, &mut self.z, &mut self.near].into_iter().for_each(Vec::clear);
+    }
+
+    fn push(&mut self, point: Vec3) {
+        self.x.push(point.x as f32);
+        self.y.push(point.y as f32);
+        self.z.push(point.z as f32);
+        self.near.push((NEAR[0] + NEAR[1] * point.z * point.z) as f32);
+    }
+
+    /// Sum of what `worth` says of heights above a plane, in units of how far from the floor points may be seen.
+    fn sum(&self, plane: &Ground, worth: impl Fn(f32) -> f32) -> f64 {
+        let [a, b, c] = plane.normal.to_array().map(|value| value as f32);
+        let offset = plane.offset as f32;
+        let one = |x: f32, y: f32, z: f32, near: f32| worth((a * x + b * y + c * z - offset) / near);
+        let [x, y, z, near] = [&self.x, &self.y, &self.z, &self.near].map(|values| values.as_chunks::<LANES>());
+        let mut sums = [0.0_f32; LANES];
+        for (((x, y), z), near) in x.0.iter().zip(y.0).zip(z.0).zip(near.0) {
+            for lane in 0..LANES {
+                sums[lane] += one(x[lane], y[lane], z[lane], near[lane]);
+            }
+        }
+        let rest = x.1.iter().zip(y.1).zip(z.1).zip(near.1).map(|(((x, y), z), near)| one(*x, *y, *z, *near));
+        f64::from(sums.iter().sum::<f32>() + rest.sum::<f32>())
+    }
+}
+
 /// Working memory.
 #[derive(Debug, Default)]
 pub(super) struct FloorFinder {
-    points: Vec<Vec3>,
+    points: Lanes,
     /// Those on surfaces that face upwards.
     level: Vec<Vec3>,
+    level_lanes: Lanes,
 }
 
 impl FloorFinder {
     /// The floor in the camera's frame; `up` is the direction upwards about as it is known there.
     pub(super) fn find(&mut self, view: &View, up: Vec3) -> Option<Ground> {
         self.sample(view, up);
-        let count = self.points.len();
+        let count = self.points.x.len();
         if self.level.len() < 20 {
             return None;
         }
@@ -62,6 +104,7 @@ impl FloorFinder {
     fn sample(&mut self, view: &View, up: Vec3) {
         self.points.clear();
         self.level.clear();
+        self.level_lanes.clear();
         let seen = view.depth.iter().filter(|z| **z > 0.0).count();
         let step = (seen / FLOOR_SAMPLES).max(1);
         let beside = ((NEIGHBOUR * view.width as f64) as usize).max(2);
@@ -77,25 +120,17 @@ impl FloorFinder {
                 let normal = (view.point(left) - point).cross(view.point(above) - point).normalize_or_zero();
                 if normal.dot(up).abs() > LEAST_UPRIGHT {
                     self.level.push(point);
+                    self.level_lanes.push(point);
                 }
             }
         }
     }
 
     fn score(&self, plane: &Ground) -> f64 {
-        let mut score = 0.0;
-        for point in &self.points {
-            let (height, near) = (plane.normal.dot(*point) - plane.offset, NEAR[0] + NEAR[1] * point.z * point.z);
-            if height < -2.0 * near {
-                score -= BELOW;
-            }
-        }
-        for point in &self.level {
-            let (height, near) = (plane.normal.dot(*point) - plane.offset, NEAR[0] + NEAR[1] * point.z * point.z);
-            // A squared distance, cut off: planes through the middle of what is level win over those beside it.
-            score += (1.0 - (height / near).powi(2)).max(0.0);
-        }
-        score
+        let below = |height: f32| if height < -2.0 { 1.0 } else { 0.0 };
+        // A squared distance, cut off: planes through the middle of what is level win over those beside it.
+        let on = |height: f32| (1.0 - height * height).max(0.0);
+        self.level_lanes.sum(plane, on) - BELOW * self.points.sum(plane, below)
     }
 
     /// The plane through all level points near it, by least squares along its normal.

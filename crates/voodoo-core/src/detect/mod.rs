@@ -5,6 +5,7 @@ pub mod crop;
 mod floor;
 mod names;
 pub mod network;
+mod product;
 mod rejections;
 pub mod segmentation;
 mod skeleton;

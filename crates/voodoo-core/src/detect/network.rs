@@ -1,12 +1,12 @@
-//! The network that looks at a picture: convolutions as products of matrices, by the linear algebra library.
+//! The network that looks at a picture: convolutions as products of matrices.
 //!
 //! Maps lie channel by channel for every pixel, row by row. The structure is that of A2J (Xiong et al., "A2J: Anchor-to-Joint
 //! Regression Network", ICCV 2019) on a small residual network: every cell of a 12 x 12 grid says of every joint how much it
 //! counts and where the joint is from there.
 
 use super::crop::{SIZE, WIDTH};
+use super::product::{Panels, ROWS};
 use super::weights::{Weights, WeightsError};
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 
 /// Numbers a cell gives for a joint: how much it counts, offset to the right, offset down, depth.
 const A_JOINT: usize = 4;
@@ -22,8 +22,7 @@ struct Map {
 /// A convolution, with what happens to its edge.
 #[derive(Debug)]
 struct Convolution {
-    weight: DMatrix<f32>,
-    bias: Vec<f32>,
+    panels: Panels,
     kernel: usize,
     stride: usize,
     padding: usize,
@@ -31,29 +30,24 @@ struct Convolution {
 
 impl Convolution {
     fn take(weights: &mut Weights, name: &str, stride: usize) -> Result<Self, WeightsError> {
-        let (weight, bias, kernel) = weights.layer(name, 4)?;
-        Ok(Self { weight, bias, kernel, stride, padding: usize::from(kernel > 1) })
+        let (panels, kernel) = weights.layer(name, 4)?;
+        Ok(Self { panels, kernel, stride, padding: usize::from(kernel > 1) })
     }
 
     fn inputs(&self) -> usize {
-        self.weight.ncols() / (self.kernel * self.kernel)
+        self.panels.inputs / (self.kernel * self.kernel)
+    }
+
+    fn outputs(&self) -> usize {
+        self.panels.outputs
     }
 
     /// The map after it; `columns` is working memory.
     fn apply(&self, map: &Map, out: &mut Map, columns: &mut Vec<f32>, relu: bool) {
         out.edge = (map.edge + 2 * self.padding - self.kernel) / self.stride + 1;
-        out.channels = self.bias.len();
-        let pixels = out.edge * out.edge;
-        out.values.clear();
-        (0..pixels).for_each(|_| out.values.extend_from_slice(&self.bias));
-        let seen = if self.kernel == 1 && self.stride == 1 {
-            &map.values
-        } else {
-            self.gather(map, out.edge, columns);
-            &*columns
-        };
-        let mut product = DMatrixViewMut::from_slice(&mut out.values, out.channels, pixels);
-        product.gemm(1.0, &self.weight, &DMatrixView::from_slice(seen, self.weight.ncols(), pixels), 1.0);
+        out.channels = self.outputs();
+        self.gather(map, out.edge, columns);
+        self.panels.apply(columns, out.edge * out.edge, &mut out.values);
         if relu {
             rectify(&mut out.values);
         }
@@ -63,8 +57,9 @@ impl Convolution {
     fn gather(&self, map: &Map, edge: usize, columns: &mut Vec<f32>) {
         let row_of = self.kernel * map.channels;
         columns.clear();
-        columns.resize(edge * edge * self.kernel * row_of, 0.0);
-        for (number, chunk) in columns.chunks_exact_mut(row_of).enumerate() {
+        let pixels = edge * edge;
+        columns.resize(pixels.div_ceil(ROWS) * ROWS * self.kernel * row_of, 0.0);
+        for (number, chunk) in columns.chunks_exact_mut(row_of).take(pixels * self.kernel).enumerate() {
             let (pixel, ky) = (number / self.kernel, number % self.kernel);
             let Some(row) = (pixel / edge * self.stride + ky).checked_sub(self.padding).filter(|row| *row < map.edge)
             else {
@@ -127,21 +122,17 @@ impl Stage {
 
 /// A matrix and a bias.
 #[derive(Debug)]
-struct Linear {
-    weight: DMatrix<f32>,
-    bias: Vec<f32>,
-}
+struct Linear(Panels);
 
 impl Linear {
     fn take(weights: &mut Weights, name: &str) -> Result<Self, WeightsError> {
-        let (weight, bias, _) = weights.layer(name, 2)?;
-        Ok(Self { weight, bias })
+        Ok(Self(weights.layer(name, 2)?.0))
     }
 
     fn apply(&self, values: &[f32]) -> Vec<f32> {
-        let mut out = self.bias.clone();
-        let mut product = DMatrixViewMut::from_slice(&mut out, self.bias.len(), 1);
-        product.gemm(1.0, &self.weight, &DMatrixView::from_slice(values, values.len(), 1), 1.0);
+        let (mut row, mut out) = (values.to_vec(), Vec::new());
+        row.resize(ROWS * values.len(), 0.0);
+        self.0.apply(&row, 1, &mut out);
         out
     }
 }
@@ -230,36 +221,37 @@ impl Network {
         let mut chain = Vec::new();
         for stage in &self.stages {
             chain.push((&stage.reduce, channels, None));
-            channels = stage.reduce.bias.len();
+            channels = stage.reduce.outputs();
             for block in &stage.blocks {
-                chain.push((&block.first, channels, Some(block.first.bias.len())));
-                chain.push((&block.second, block.first.bias.len(), Some(channels)));
+                chain.push((&block.first, channels, Some(block.first.outputs())));
+                chain.push((&block.second, block.first.outputs(), Some(channels)));
             }
             ends.push(channels);
         }
         chain.push((&self.top[0], ends[3], Some(ends[2])));
         chain.push((&self.top[1], ends[2], Some(ends[1])));
-        chain.push((&self.middle.first, ends[1], Some(self.middle.first.bias.len())));
-        chain.push((&self.middle.second, self.middle.first.bias.len(), Some(ends[1])));
+        chain.push((&self.middle.first, ends[1], Some(self.middle.first.outputs())));
+        chain.push((&self.middle.second, self.middle.first.outputs(), Some(ends[1])));
         chain.push((&self.head, ends[1], None));
         for (layer, inputs, outputs) in chain {
-            let outputs = outputs.unwrap_or(layer.bias.len());
-            if layer.inputs() != inputs || layer.bias.len() != outputs {
-                let found = format!("{} and {}", layer.inputs(), layer.bias.len());
+            let outputs = outputs.unwrap_or(layer.outputs());
+            if layer.inputs() != inputs || layer.outputs() != outputs {
+                let found = format!("{} and {}", layer.inputs(), layer.outputs());
                 return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
             }
         }
-        let pooled = self.hidden.as_ref().map_or(ends[3], |hidden| hidden.bias.len());
-        let joints = self.head.bias.len() / A_JOINT;
-        let lengths = self.sizes.as_ref().map_or(0, |sizes| sizes[1].bias.len());
+        let pooled = self.hidden.as_ref().map_or(ends[3], |hidden| hidden.0.outputs);
+        let joints = self.head.outputs() / A_JOINT;
+        let lengths = self.sizes.as_ref().map_or(0, |sizes| sizes[1].0.outputs);
         let mut linear = vec![(&self.visible, pooled, joints), (&self.facing, pooled, 1), (&self.person, pooled, 1)];
         linear.extend(self.hidden.iter().map(|hidden| (hidden, ends[3], pooled)));
         if let Some([scale, length, length_scale]) = &self.sizes {
             linear.extend([(scale, pooled, joints), (length, pooled, lengths), (length_scale, pooled, lengths)]);
         }
         for (layer, inputs, outputs) in linear {
-            if layer.weight.ncols() != inputs || layer.bias.len() != outputs {
-                let found = format!("{} and {}", layer.weight.ncols(), layer.bias.len());
+            let Linear(layer) = layer;
+            if layer.inputs != inputs || layer.outputs != outputs {
+                let found = format!("{} and {}", layer.inputs, layer.outputs);
                 return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
             }
         }
@@ -268,7 +260,7 @@ impl Network {
 
     /// Number of joints it tells.
     pub fn joints(&self) -> usize {
-        self.head.bias.len() / A_JOINT
+        self.head.outputs() / A_JOINT
     }
 
     /// Looks at a picture, `SIZE * SIZE` pixels.
@@ -379,15 +371,15 @@ mod tests {
         {
             let map = Map { edge, channels, values: noise(edge * edge * channels, 0.3) };
             let weights = noise(outputs * kernel * kernel * channels, 7.1);
-            let weight = DMatrix::from_row_slice(outputs, kernel * kernel * channels, &weights);
-            let layer = Convolution { weight, bias: noise(outputs, 1.7), kernel, stride, padding };
+            let panels = Panels::of(&weights, &noise(outputs, 1.7));
+            let layer = Convolution { panels, kernel, stride, padding };
             let (mut out, mut columns) = (Map::default(), vec![5.0; 3]);
             layer.apply(&map, &mut out, &mut columns, false);
             assert_eq!(out.edge, (edge + 2 * padding - kernel) / stride + 1);
             for row in 0..out.edge {
                 for column in 0..out.edge {
                     for output in 0..outputs {
-                        let mut sum = layer.bias[output];
+                        let mut sum = noise(outputs, 1.7)[output];
                         for (ky, kx) in (0..kernel).flat_map(|ky| (0..kernel).map(move |kx| (ky, kx))) {
                             let (y, x) = (row * stride + ky, column * stride + kx);
                             if y < padding || x < padding || y - padding >= edge || x - padding >= edge {

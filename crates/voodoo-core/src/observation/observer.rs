@@ -76,6 +76,11 @@ impl Observer {
         self.backgrounds.clear();
     }
 
+    /// Notes which images of a frame are segmented; nothing is learnt.
+    pub fn face(&mut self, frame: &Frame) {
+        find_segmented(frame, &mut self.segmented);
+    }
+
     /// Step 1 (K06 IV-B.1): learns the background, and keeps the points in the enlarged box of the whole body.
     pub fn observe(&mut self, frame: &Frame, expected: Expectation, config: &Config) {
         find_segmented(frame, &mut self.segmented);

@@ -63,9 +63,14 @@ impl Doubt {
         *self = Self::default();
     }
 
-    /// Nobody said where it is.
-    pub(super) fn found_itself(&mut self) {
-        self.found_itself = true;
+    /// Whether nobody said where it is.
+    pub(super) fn found_itself(&mut self, itself: bool) {
+        self.found_itself = itself;
+    }
+
+    /// Whether nobody said where it is.
+    pub(super) fn itself(&self) -> bool {
+        self.found_itself
     }
 
     /// Whether the track was started less than a second ago.
@@ -151,7 +156,7 @@ mod tests {
     fn a_body_that_found_itself_is_gone_when_it_is_lost_for_long_and_any_that_is_no_person() {
         let mut doubt = Doubt::default();
         assert!(!(0..100).any(|frame| doubt.nobody(f64::from(frame) / 30.0, true, None)), "somebody said where it is");
-        doubt.found_itself();
+        doubt.found_itself(true);
         assert!(doubt.nobody(100.0 / 30.0, true, None));
         assert!(!doubt.nobody(4.0, false, None), "it is back");
         let mut doubt = Doubt::default();

@@ -18,7 +18,7 @@ use crate::body::{Body, Model};
 use crate::detect::{Detection, Wanted};
 use crate::fit::{Context, Fit};
 use crate::math::{Aabb, Pose, Vec3, shifted};
-use crate::observation::candidates::Candidates;
+use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
 use crate::observation::segments::Segments;
@@ -56,6 +56,8 @@ pub struct Relocalizer {
     people: People,
     doubt: Doubt,
     belief: Belief,
+    /// A detector knows bodies like this one.
+    known: bool,
 }
 
 impl Relocalizer {
@@ -64,6 +66,7 @@ impl Relocalizer {
         self.watch.restart();
         self.doubt.restart();
         self.belief = Belief::default();
+        self.known = People::know(&model.body);
         self.motion.clear();
         self.postures.restart(&model.body, poses);
     }
@@ -90,15 +93,31 @@ impl Relocalizer {
         people::sized(model, detection)
     }
 
-    /// The track was started where a detector saw somebody.
-    pub fn found_itself(&mut self) {
-        self.doubt.found_itself();
+    /// The track was started: `itself` where a detector saw somebody, and nobody had said where.
+    pub fn take_note_of_start(&mut self, itself: bool) {
+        self.doubt.found_itself(itself);
+    }
+
+    /// Whether nobody had said where the track starts.
+    pub fn found_itself(&self) -> bool {
+        self.doubt.itself()
+    }
+
+    /// Whether the track was started less than a second ago.
+    pub fn young(&self, stamp: f64) -> bool {
+        self.doubt.young(stamp)
+    }
+
+    /// The pose of a body that fits best what a detector saw in this frame, world frame.
+    pub fn posed(&self, body: &Body) -> Option<Vec<Pose>> {
+        people::posed(body, self.people.seen()?)
     }
 
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
     /// was not where it should be in the frame before, or the body `lost`.
-    pub fn look(&mut self, frame: &Frame, body: &Body, root: Vec3, doubtful: bool, lost: bool) {
-        if self.doubt.due(frame.stamp, doubtful, lost) && People::know(body) {
+    pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {
+        let often = lost || self.watch.open();
+        if self.doubt.due(frame.stamp, doubtful, often) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
         } else {
             self.people.forget();
@@ -106,8 +125,8 @@ impl Relocalizer {
     }
 
     /// The same for one of several persons: good tracks are looked at, too, and who is lost is not looked for here.
-    pub fn look_at_share(&mut self, frame: &Frame, share: Share, body: &Body, root: Vec3, lost: bool) {
-        if self.doubt.due(frame.stamp, true, false) && !lost && People::know(body) {
+    pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
+        if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
         } else {
             self.people.forget();
@@ -143,13 +162,16 @@ impl Relocalizer {
 
     /// The poses that a detector saw in this frame, refined, where they are no worse than the present ones; working frame. What
     /// `fit` has matched is as before when it returns.
-    pub fn detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
+    pub fn detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> Option<&[Pose]> {
         let detection = self.people.seen()?;
         let origin = context.seen.origin();
         let mut place = people::posed(&context.model.body, detection)?;
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
         let (low, high) = (detection.low - origin, detection.high - origin);
-        let bounds = Aabb::new(low - Vec3::splat(MARGIN), high + Vec3::splat(MARGIN));
+        let there = Aabb::new(low - Vec3::splat(MARGIN), high + Vec3::splat(MARGIN));
+        // What the present pose explains must not be left behind, unless it is `lost` there.
+        let here = if lost { there } else { body_box(&context.model.body, present, MARGIN) };
+        let bounds = Aabb::new(there.mins.min(here.mins), there.maxs.max(here.maxs));
         // What was believed is tried now: the next time it has to be believed anew.
         self.doubt.tried();
         self.belief = Belief::default();
@@ -170,7 +192,8 @@ impl Relocalizer {
     /// Notes what a frame said of the body; whether it has to be searched in this frame.
     pub fn observe(&mut self, sighting: Sighting, poses: &[Pose]) -> bool {
         if self.watch.due(sighting) {
-            return true;
+            // Which way a body faces that was found a moment ago, a detector tells better.
+            return self.watch.lost() || !self.known;
         }
         if !self.watch.open() {
             self.motion.clear();

@@ -3,7 +3,7 @@
 pub mod girth;
 
 use crate::association::contour::edges;
-use crate::body::{Model, Pair};
+use crate::body::{Body, Model, Pair};
 use crate::config::Config;
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::hypotheses::{GAIN, overall_cost};
@@ -41,6 +41,8 @@ pub struct Sizes {
     open: bool,
     /// The pose was not set exactly: it is fitted before the girths are.
     rough: bool,
+    /// The body as it was set, unless its sizes are known.
+    set: Option<Body>,
     /// What is known about the girths since the first frame fitted them; empty when they were given.
     girths: Vec<Girth>,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
@@ -54,6 +56,7 @@ impl Sizes {
     pub fn restart(&mut self, model: &Model, start: Start, config: &Config) {
         let fit = start != Start::SizesKnown;
         (self.open, self.rough) = (fit, start == Start::Detected);
+        self.set = fit.then(|| model.body.clone());
         self.girths.clear();
         self.pairs.clear();
         if fit && config.fit_lengths {
@@ -66,9 +69,20 @@ impl Sizes {
         self.open && self.rough
     }
 
+    /// The sizes are known: no frame changes them.
+    pub fn known(&self) -> bool {
+        self.set.is_none()
+    }
+
+    /// The body as it was set, before frames changed its sizes.
+    pub fn as_set(&self) -> Option<&Body> {
+        self.set.as_ref()
+    }
+
     /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
     pub fn edited(&mut self, model: &Model) {
         self.girths.clear();
+        self.set = self.set.is_some().then(|| model.body.clone());
         if !self.pairs.is_empty() {
             self.follow_lengths(model);
         }
@@ -242,7 +256,6 @@ fn start_cost(setting: Setting, model: &Model, poses: &[Pose], fit: &mut Fit) ->
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::body::Body;
     use crate::shape::TaperedEllipticCylinder;
     use crate::testing::{before_wall, stand, standing, with_setting};
 

@@ -5,10 +5,10 @@ mod edits;
 pub mod estimate;
 mod queries;
 mod report;
+mod start;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::Detection;
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
@@ -94,26 +94,12 @@ impl Tracker {
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
         if self.is_started() {
+            self.verify_start(frame);
             self.follow(frame, None)
         } else {
             self.search(frame)
         }
         Ok(&self.estimate)
-    }
-
-    /// Looks for a person, and follows the one that is found.
-    fn search(&mut self, frame: &Frame) {
-        if let Some((body, poses)) = self.relocalizer.first(frame, &self.model) {
-            self.restart(body, poses, true);
-            self.assessor.doubt_pose();
-            self.relocalizer.found_itself();
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.follow(frame, None);
-            if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
-                return;
-            }
-        }
-        self.stop(frame.stamp);
     }
 
     /// The pose at the next instant (K06 IV-B), by all of a frame or by its `share` of it.
@@ -140,12 +126,12 @@ impl Tracker {
         sizes.initialise(setting, model, poses, fit);
         steps += fit.run(setting.of(model), predicted, poses);
         // Other configurations of arms and legs.
-        if schedule.whole_body {
+        if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
             let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
             match share {
-                None => relocalizer.look(frame, &model.body, root, doubtful, lost),
-                Some(share) => relocalizer.look_at_share(frame, share, &model.body, root, lost),
+                None => relocalizer.look(frame, root, doubtful, lost),
+                Some(share) => relocalizer.look_at_share(frame, share, root, lost),
             }
         }
         if config.hypotheses && schedule.whole_body && known {
@@ -158,8 +144,9 @@ impl Tracker {
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
         motion.commit(frame.stamp);
-        if self.config.relocalization && schedule.whole_body {
-            self.relocalize(frame, share.is_some());
+        let relocalizes = self.config.relocalization && schedule.whole_body;
+        if relocalizes && self.relocalize(frame, known, share.is_some()) {
+            return self.follow(frame, share);
         }
         self.remember();
         self.report(frame.stamp, steps);
@@ -177,25 +164,6 @@ impl Tracker {
         &self.estimate
     }
 
-    /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
-    pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detection: &Detection, known: bool) -> bool {
-        let Some((body, poses)) = self.relocalizer.placed(&self.model, detection, known) else { return false };
-        self.restart(body, poses, !known);
-        self.assessor.doubt_pose();
-        if !known {
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-        }
-        self.follow(frame, Some(share));
-        !matches!(self.estimate.status, Status::Lost | Status::Searching)
-    }
-
-    /// There is nobody: from the next frame on somebody is looked for.
-    fn stop(&mut self, stamp: f64) {
-        self.motion.poses.clear();
-        self.motion.stamp = Some(stamp);
-        self.estimate = Estimate { stamp, ..Estimate::default() };
-    }
-
     /// Refuses what cannot be used, before anything changes.
     fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         if !self.is_started() && !self.relocalizer.finds(&self.model.body) {
@@ -204,19 +172,21 @@ impl Tracker {
         frame.check(&self.model.body, self.motion.stamp)
     }
 
-    /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found.
-    fn relocalize(&mut self, frame: &Frame, among: bool) {
+    /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found. A track
+    /// that is not `known` for long starts anew instead, in this frame: whether it does.
+    fn relocalize(&mut self, frame: &Frame, known: bool, among: bool) -> bool {
         let lost = self.assessor.status() == Status::Lost;
-        if self.relocalizer.detection().is_some() {
+        if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, among)
                 && self.move_to_detection(frame)
             {
-                return;
+                // What was learnt of sizes and scene was learnt in the wrong place.
+                return !among && self.relocalizer.young(frame.stamp) && self.restart_at_detection();
             }
         }
         if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
-            return;
+            return false;
         }
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         let seen = observer.seen(frame, motion.origin);
@@ -228,15 +198,17 @@ impl Tracker {
         if self.relocalizer.conclude(found, sighting, &self.motion.poses) {
             self.assessor.give_up();
         }
+        false
     }
 
     /// Moves the body to where a detector sees it; whether it is there now.
     fn move_to_detection(&mut self, frame: &Frame) -> bool {
-        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         let learnt = observer.release(frame, relocalizer.own());
         let seen = observer.seen(frame, motion.origin);
         let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-        let place = relocalizer.detected(setting.of(model), fit, &motion.poses);
+        let lost = assessor.status() == Status::Lost;
+        let place = relocalizer.detected(setting.of(model), fit, &motion.poses, lost);
         let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
         let moved = better && self.move_to_predicted(frame);
         if !moved {
