@@ -131,7 +131,7 @@ impl Tracker {
             let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
             match share {
                 None => relocalizer.look(frame, root, doubtful, lost),
-                Some(share) => relocalizer.look_at_share(frame, share, root, doubtful, lost),
+                Some(share) => relocalizer.look_at_share(frame, share, root, lost),
             }
         }
         if config.hypotheses && schedule.whole_body && known {
@@ -178,9 +178,11 @@ impl Tracker {
         let lost = self.assessor.status() == Status::Lost;
         if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
-            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost) && self.move_to_detection(frame) {
+            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, among)
+                && self.move_to_detection(frame)
+            {
                 // What was learnt of sizes and scene was learnt in the wrong place.
-                return self.relocalizer.young(frame.stamp) && self.restart_at_detection();
+                return !among && self.relocalizer.young(frame.stamp) && self.restart_at_detection();
             }
         }
         if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {

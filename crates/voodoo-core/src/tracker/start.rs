@@ -17,7 +17,7 @@ impl Tracker {
             return;
         }
         relocalizer.look(frame, motion.poses[0].translation, false, false);
-        if relocalizer.elsewhere(&model.body, &motion.poses, false) {
+        if relocalizer.elsewhere(&model.body, &motion.poses, false, false) {
             observer.face(frame);
             let seen = observer.seen(frame, motion.origin);
             let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
