@@ -85,7 +85,7 @@ def errors(
     return np.array(found)
 
 
-def seconds_until_right(wrong: np.ndarray, right: np.ndarray, stamps: np.ndarray, least: float) -> float:
+def seconds_until_right(wrong: np.ndarray, right: np.ndarray, stamps: np.ndarray, least: float = RIGHT_M) -> float:
     """Seconds from the first frame to the first from which on the errors (F,) are small enough: `least` metres always are.
     Infinite without one."""
     good = wrong <= np.maximum(least, FACTOR * right)

@@ -87,7 +87,7 @@ def four(seed: int, *, seconds: float = 12.0) -> MadeUpRecording:
     """Four people come one after the other and walk about, to and fro, at four depths."""
     chance = np.random.default_rng((seed, 4))
     people = []
-    for number, depth in enumerate(chance.permutation((2.1, 2.8, 3.5, 4.2))):
+    for number, depth in enumerate(chance.permutation((1.9, 2.5, 3.1, 3.7))):
         side = (-1.0, 1.0)[number % 2]
         time = 0.5 + 0.5 * number
         points = [(time, float(depth), side * _outside(depth))]
@@ -95,7 +95,7 @@ def four(seed: int, *, seconds: float = 12.0) -> MadeUpRecording:
             side = -side
             time += float(chance.uniform(1.8, 2.6))
             y = side * float(chance.uniform(0.2, 0.3)) * depth
-            points.append((time, float(depth + chance.uniform(-0.2, 0.2)), y))
+            points.append((time, float(depth + chance.uniform(-0.12, 0.12)), y))
         people.append(_walker(points, number, chance))
     return _recorded(f"four {seed}", people, seconds, chance, seed)
 
@@ -183,7 +183,8 @@ def _recorded(
 
 def _furniture(chance: np.random.Generator) -> tuple[Box, ...]:
     """A wall, a cupboard as high as a person, a table and a chair."""
-    wall = float(chance.uniform(4.9, 5.6))
+    # Nobody walks beyond 4.2 m: the furniture begins behind that.
+    wall = float(chance.uniform(5.4, 5.9))
     side = float(chance.choice((-1.0, 1.0)))
 
     def box(x: float, y: float, size: tuple[float, float], low: float, high: float) -> Box:

@@ -1,7 +1,7 @@
 //! The floor in a depth image where nobody told it: the plane with the most points that has hardly any below it.
 
 use super::view::View;
-use crate::math::Vec3;
+use crate::math::{LANES, Vec3};
 use crate::observation::frame::Ground;
 
 /// Points that are looked at, about.
@@ -21,9 +21,6 @@ const LEAST_UPRIGHT: f64 = 0.766;
 const NEIGHBOUR: f64 = 0.05;
 /// The plane is fitted again to the points within this share of the distance that the trials allowed.
 const NEARER: [f64; 2] = [0.7, 0.5];
-
-/// So many points are compared with a plane at a time.
-const LANES: usize = 8;
 
 /// Points in single precision, coordinate by coordinate, with how far from the floor each may be seen.
 #[derive(Debug, Default)]

@@ -7,16 +7,16 @@ use crate::math::widest;
 /// Rows and columns that are worked on together: their sums fit the registers of AVX-512, and those of half of the columns the
 /// registers of AVX2.
 pub(super) const ROWS: usize = 12;
-const LANES: usize = 16;
-const HALF: usize = LANES / 2;
+const TOGETHER: usize = 16;
+const NARROW: usize = TOGETHER / 2;
 
-/// Trained weights and biases, columns in groups of `LANES`; missing columns are zeros.
+/// Trained weights and biases, columns in groups of `TOGETHER`; missing columns are zeros.
 #[derive(Debug)]
 pub(super) struct Panels {
     pub(super) inputs: usize,
     pub(super) outputs: usize,
-    weights: Vec<[f32; LANES]>,
-    bias: Vec<[f32; LANES]>,
+    weights: Vec<[f32; TOGETHER]>,
+    bias: Vec<[f32; TOGETHER]>,
 }
 
 impl Panels {
@@ -24,11 +24,11 @@ impl Panels {
     pub(super) fn of(weights: &[f32], bias: &[f32]) -> Self {
         let outputs = bias.len();
         let inputs = weights.len().checked_div(outputs).unwrap_or(0);
-        let groups = outputs.div_ceil(LANES);
-        let mut sorted = vec![[0.0; LANES]; groups * inputs];
-        let mut sorted_bias = vec![[0.0; LANES]; groups];
+        let groups = outputs.div_ceil(TOGETHER);
+        let mut sorted = vec![[0.0; TOGETHER]; groups * inputs];
+        let mut sorted_bias = vec![[0.0; TOGETHER]; groups];
         for (output, bias) in bias.iter().enumerate() {
-            let (group, lane) = (output / LANES, output % LANES);
+            let (group, lane) = (output / TOGETHER, output % TOGETHER);
             sorted_bias[group][lane] = *bias;
             for input in 0..inputs {
                 sorted[group * inputs + input][lane] = weights[output * inputs + input];
@@ -51,10 +51,10 @@ impl Panels {
             || {
                 for group in 0..self.bias.len() {
                     if whole {
-                        self.columns::<LANES>(group, 0, seen, out);
+                        self.columns::<TOGETHER>(group, 0, seen, out);
                     } else {
-                        self.columns::<HALF>(group, 0, seen, out);
-                        self.columns::<HALF>(group, HALF, seen, out);
+                        self.columns::<NARROW>(group, 0, seen, out);
+                        self.columns::<NARROW>(group, NARROW, seen, out);
                     }
                 }
             },
@@ -66,7 +66,7 @@ impl Panels {
     fn columns<const WIDTH: usize>(&self, group: usize, first: usize, seen: &[f32], out: &mut [f32]) {
         let panel = &self.weights[group * self.inputs..][..self.inputs];
         let Some(bias) = self.bias[group][first..].first_chunk::<WIDTH>() else { return };
-        let column = group * LANES + first;
+        let column = group * TOGETHER + first;
         let width = WIDTH.min(self.outputs.saturating_sub(column));
         for (tile, rows) in seen.chunks_exact(ROWS * self.inputs).enumerate() {
             let sums = product(rows, panel, first, bias);
@@ -88,7 +88,7 @@ fn wide_registers() -> bool {
 #[inline(always)]
 fn product<const WIDTH: usize>(
     rows: &[f32],
-    panel: &[[f32; LANES]],
+    panel: &[[f32; TOGETHER]],
     first: usize,
     bias: &[f32; WIDTH],
 ) -> [[f32; WIDTH]; ROWS] {

@@ -5,13 +5,15 @@ use crate::config::Config;
 use crate::detect::{Detection, LENGTHS};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
-use crate::observation::frame::Frame;
+use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::share::Share;
 use crate::tracker::estimate::Status;
 use crate::{Body, Tracker};
 
-/// A lost person of whom nothing hides the place, or who left the images, is gone after this, seconds.
+/// A lost person of whom nothing hides the place is gone after this, seconds.
 const LEAVES: f64 = 0.3;
+/// Who is mostly outside of all images is gone after this, seconds.
+const OUTSIDE: f64 = 0.1;
 /// Who is hidden is waited for so long, seconds.
 const HIDDEN: f64 = 2.0;
 /// Number of the stature among a detection's sizes.
@@ -99,26 +101,49 @@ impl Person {
             }
             return;
         }
-        let patience = if self.hidden(frame) { HIDDEN } else { LEAVES };
+        let patience = match self.whereabouts(frame, share) {
+            Whereabouts::Hidden => HIDDEN,
+            Whereabouts::Outside => OUTSIDE,
+            Whereabouts::Gone => LEAVES,
+        };
         self.there &= estimate.status != Status::Searching && frame.stamp - self.seen < patience;
     }
 
-    /// Whether something stands before most of where they are thought to be.
-    fn hidden(&self, frame: &Frame) -> bool {
+    /// What the images show of most of where they are thought to be.
+    fn whereabouts(&self, frame: &Frame, share: Share) -> Whereabouts {
+        if frame.images.is_empty() {
+            // Depth cameras that gave no image this time are no sign that anybody went.
+            return if share.scene.is_empty() { Whereabouts::Gone } else { Whereabouts::Hidden };
+        }
         let sites = &self.tracker.estimate().sites;
-        let hides = |site: &&Vec3| {
-            frame.images.iter().any(|image| {
-                let point = image.world_from_sensor.inverse_transform_point(**site);
-                let [fx, fy, cx, cy] = image.intrinsics;
-                let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
-                let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < image.width as f64 && v < image.height as f64;
-                if !inside {
-                    return false;
-                }
-                let z = f64::from(image.pixels.get(v as usize * image.width + u as usize)) * image.metres_per_unit;
-                z > 0.0 && z < point.z - HIDES
-            })
-        };
-        2 * sites.iter().filter(hides).count() > sites.len()
+        let (mut hidden, mut outside) = (0, 0);
+        for site in sites {
+            let depths = || frame.images.iter().filter_map(|image| measured(image, *site));
+            outside += usize::from(depths().next().is_none());
+            hidden += usize::from(depths().any(|[z, place]| z > 0.0 && z < place - HIDES));
+        }
+        match sites.len() / 2 {
+            half if hidden > half => Whereabouts::Hidden,
+            half if outside > half => Whereabouts::Outside,
+            _ => Whereabouts::Gone,
+        }
     }
+}
+
+/// Where somebody is who is not seen.
+#[derive(Clone, Copy, Debug)]
+enum Whereabouts {
+    Hidden,
+    Outside,
+    Gone,
+}
+
+/// The depth that an image measured where a place is seen, 0 for none, and that of the place; none outside the image.
+fn measured(image: &DepthImage, place: Vec3) -> Option<[f64; 2]> {
+    let point = image.world_from_sensor.inverse_transform_point(place);
+    let [fx, fy, cx, cy] = image.intrinsics;
+    let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
+    let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < image.width as f64 && v < image.height as f64;
+    let z = || f64::from(image.pixels.get(v as usize * image.width + u as usize)) * image.metres_per_unit;
+    inside.then(|| [z(), point.z])
 }

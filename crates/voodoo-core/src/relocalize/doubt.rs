@@ -6,12 +6,14 @@ use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 const YOUNG: f64 = 1.0;
-/// Every so manyth frame of a young or lost track is looked at, and of one with a limb in doubt: a look costs as much as five
-/// frames.
+/// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
 const EVERY: [usize; 2] = [3, 15];
 /// A detection is elsewhere when its shoulders and hips are this far from the tracked ones in the mean, metres: three times as far
 /// as a detector errs.
 const ELSEWHERE: f64 = 0.15;
+/// The same of knees and ankles, which cross unseen, and of elbows and wrists: twice as far as a detector errs.
+const LEGS_ELSEWHERE: f64 = 0.12;
+const ARMS_ELSEWHERE: f64 = 0.15;
 /// One detection counts for at most this, in log odds.
 const MOST_ODDS: f64 = 4.0;
 /// From this sum of log odds on it is tried.
@@ -23,6 +25,22 @@ const GONE: f64 = 2.0;
 /// Joints that tell where the trunk is and which way round.
 const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 
+const LEGS: [&str; 4] = ["l_knee", "r_knee", "l_ankle", "r_ankle"];
+const ARMS: [&str; 4] = ["l_elbow", "r_elbow", "l_wrist", "r_wrist"];
+
+/// Mean distance of detected joints from the tracked ones, metres.
+fn apart(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0_f64);
+    for name in names {
+        if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
+            let tracked: Vec3 = body.site_position(world_from_limb, site);
+            sum += seen.position.distance(tracked);
+            count += 1.0;
+        }
+    }
+    sum / count.max(1.0)
+}
+
 /// What detections said of a track.
 #[derive(Debug, Default)]
 pub(super) struct Doubt {
@@ -30,7 +48,8 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    frames: usize,
+    /// Frames since the last look.
+    waited: Option<usize>,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
     elsewhere: f64,
     nobody: f64,
@@ -63,23 +82,21 @@ impl Doubt {
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;
         self.since = self.since.or(Some(stamp));
-        let first = self.frames == 0;
-        self.frames += 1;
+        self.waited = self.waited.map(|frames| frames + 1);
         let every = if young { EVERY[0] } else { EVERY[1] };
-        (young || doubtful) && (first || self.frames.is_multiple_of(every))
+        let due = (young || doubtful) && self.waited.is_none_or(|frames| frames >= every);
+        if due {
+            self.waited = Some(0);
+        }
+        due
     }
 
-    /// Weighs a detection against the pose, world frame; whether the detection's is to be tried.
-    pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose]) -> bool {
-        let mut apart = Vec::with_capacity(TRUNK.len());
-        for name in TRUNK {
-            if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
-                let tracked: Vec3 = body.site_position(world_from_limb, site);
-                apart.push(seen.position.distance(tracked));
-            }
-        }
-        let mean = apart.iter().sum::<f64>() / apart.len().max(1) as f64;
-        if mean > ELSEWHERE {
+    /// Weighs a detection against the pose, world frame, by the trunk, and with `limbs` by legs and arms; whether the detection's
+    /// is to be tried.
+    pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose], limbs: bool) -> bool {
+        let apart = |names: &[&str]| apart(detection, body, world_from_limb, names);
+        let limbs_are = limbs && (apart(&LEGS) > LEGS_ELSEWHERE || apart(&ARMS) > ARMS_ELSEWHERE);
+        if apart(&TRUNK) > ELSEWHERE || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST_ODDS);
         } else {
             self.elsewhere = 0.0;
@@ -134,7 +151,7 @@ mod tests {
         let about = Pose::from_parts(Vec3::ZERO, Quat::from_rotation_z(std::f64::consts::PI));
         let aside = Pose::from_parts(0.4 * Vec3::X, Quat::IDENTITY);
         let near = Pose::from_parts(0.1 * Vec3::X, Quat::IDENTITY);
-        let tried = |root| Doubt::default().weigh(&seen_at(root), &body, &tracked);
+        let tried = |root| Doubt::default().weigh(&seen_at(root), &body, &tracked, false);
         assert_eq!([about, aside, near].map(tried), [true, true, false]);
     }
 

@@ -116,17 +116,18 @@ impl Relocalizer {
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
     /// was not where it should be in the frame before, or the body `lost`.
     pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {
-        let often = lost || self.watch.open();
-        if self.doubt.due(frame.stamp, doubtful, often) && self.known {
+        // A body that was found a moment ago may face the other way.
+        let doubtful = doubtful || self.watch.open();
+        if self.doubt.due(frame.stamp, doubtful, lost) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
         } else {
             self.people.forget();
         }
     }
 
-    /// The same for one of several persons, who is not looked for here where they are lost.
-    pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, doubtful: bool, lost: bool) {
-        if self.doubt.due(frame.stamp, doubtful, false) && !lost && self.known {
+    /// The same for one of several persons: good tracks are looked at, too, and who is lost is not looked for here.
+    pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
+        if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
         } else {
             self.people.forget();
@@ -143,11 +144,16 @@ impl Relocalizer {
         self.people.own()
     }
 
-    /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame.
-    pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool) -> bool {
+    /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; `among` several
+    /// persons also that its arms and legs are.
+    pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool, among: bool) -> bool {
         let Some(detection) = self.people.seen() else { return false };
         // A lost body is where a person is seen for sure.
-        if lost { self.belief.observe(Some(detection)) } else { self.doubt.weigh(detection, body, world_from_limb) }
+        if lost {
+            self.belief.observe(Some(detection))
+        } else {
+            self.doubt.weigh(detection, body, world_from_limb, among)
+        }
     }
 
     /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.

@@ -5,10 +5,10 @@ mod edits;
 pub mod estimate;
 mod queries;
 mod report;
-mod start;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
+use crate::detect::Detection;
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
@@ -102,6 +102,71 @@ impl Tracker {
         Ok(&self.estimate)
     }
 
+    /// In the first frame after a reset: where a detector sees the person elsewhere or the other way round, and the frame agrees,
+    /// the start was given wrongly.
+    fn verify_start(&mut self, frame: &Frame) {
+        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
+            return;
+        }
+        relocalizer.look(frame, motion.poses[0].translation, false, false);
+        if relocalizer.elsewhere(&model.body, &motion.poses, false, false) {
+            observer.face(frame);
+            let seen = observer.seen(frame, motion.origin);
+            let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
+            if relocalizer.detected(setting.of(model), fit, &motion.poses, false).is_some() {
+                self.restart_at_detection();
+            }
+        }
+    }
+
+    /// Starts anew where a detector sees the body, in the sizes it was set in; whether it could.
+    fn restart_at_detection(&mut self) -> bool {
+        let body = self.sizes.as_set().unwrap_or(&self.model.body).clone();
+        let Some(poses) = self.relocalizer.posed(&body) else { return false };
+        let (known, itself) = (self.sizes.known(), self.relocalizer.found_itself());
+        self.restart(body, poses, !known);
+        self.relocalizer.take_note_of_start(itself);
+        if !known {
+            self.sizes.restart(&self.model, Start::Detected, &self.config);
+        }
+        true
+    }
+
+    /// Looks for a person, and follows the one that is found.
+    fn search(&mut self, frame: &Frame) {
+        if let Some((body, poses)) = self.relocalizer.first(frame, &self.model) {
+            self.restart(body, poses, true);
+            self.assessor.doubt_pose();
+            self.relocalizer.take_note_of_start(true);
+            self.sizes.restart(&self.model, Start::Detected, &self.config);
+            self.follow(frame, None);
+            if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
+                return;
+            }
+        }
+        self.stop(frame.stamp);
+    }
+
+    /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
+    pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detection: &Detection, known: bool) -> bool {
+        let Some((body, poses)) = self.relocalizer.placed(&self.model, detection, known) else { return false };
+        self.restart(body, poses, !known);
+        self.assessor.doubt_pose();
+        if !known {
+            self.sizes.restart(&self.model, Start::Detected, &self.config);
+        }
+        self.follow(frame, Some(share));
+        !matches!(self.estimate.status, Status::Lost | Status::Searching)
+    }
+
+    /// There is nobody: from the next frame on somebody is looked for.
+    fn stop(&mut self, stamp: f64) {
+        self.motion.poses.clear();
+        self.motion.stamp = Some(stamp);
+        self.estimate = Estimate { stamp, ..Estimate::default() };
+    }
+
     /// The pose at the next instant (K06 IV-B), by all of a frame or by its `share` of it.
     fn follow(&mut self, frame: &Frame, share: Option<Share>) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
@@ -131,7 +196,7 @@ impl Tracker {
             let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
             match share {
                 None => relocalizer.look(frame, root, doubtful, lost),
-                Some(share) => relocalizer.look_at_share(frame, share, root, doubtful, lost),
+                Some(share) => relocalizer.look_at_share(frame, share, root, lost),
             }
         }
         if config.hypotheses && schedule.whole_body && known {
@@ -178,9 +243,11 @@ impl Tracker {
         let lost = self.assessor.status() == Status::Lost;
         if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
-            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost) && self.move_to_detection(frame) {
+            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, among)
+                && self.move_to_detection(frame)
+            {
                 // What was learnt of sizes and scene was learnt in the wrong place.
-                return self.relocalizer.young(frame.stamp) && self.restart_at_detection();
+                return !among && self.relocalizer.young(frame.stamp) && self.restart_at_detection();
             }
         }
         if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
@@ -267,97 +334,4 @@ impl Tracker {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-mod tests {
-    use super::*;
-    use crate::testing::{before_wall, farthest, moved, put_board, standing, with_frame};
-
-    /// A tracker that has followed the standing body for three frames.
-    fn tracking() -> (Tracker, Vec<u16>) {
-        let (model, poses) = standing();
-        let pixels = before_wall(&model.body, &poses);
-        let mut tracker = Tracker::new(model.body, Config::default()).unwrap();
-        tracker.reset_pose(&poses).unwrap();
-        for frame in 0..3 {
-            show(&mut tracker, &pixels, frame);
-        }
-        (tracker, pixels)
-    }
-
-    /// Shows a frame; the status.
-    fn show(tracker: &mut Tracker, pixels: &[u16], frame: usize) -> Status {
-        with_frame(pixels, frame as f64 / 30.0, |frame| tracker.step(frame).unwrap().status)
-    }
-
-    #[test]
-    fn a_refused_frame_leaves_every_part_as_it_was() {
-        let (mut tracker, pixels) = tracking();
-        let before = format!("{tracker:?}");
-        assert!(with_frame(&pixels, 0.0, |frame| tracker.step(frame).is_err()), "time ran backwards");
-        assert_eq!(format!("{tracker:?}"), before);
-        show(&mut tracker, &pixels, 3);
-        assert_ne!(format!("{tracker:?}"), before);
-    }
-
-    #[test]
-    fn edits_keep_the_track() {
-        type Edit = fn(&mut Tracker);
-        let edits: [Edit; 4] = [
-            |tracker| tracker.scale(1.02).unwrap(),
-            |tracker| tracker.remove_limb("l_hand").unwrap(),
-            |tracker| {
-                let shape = tracker.body().limbs()[tracker.body().limb_index("r_calf").unwrap()].shape;
-                let (a, b) = (1.1 * shape.a0(), 1.1 * shape.b0());
-                let thicker = crate::TaperedEllipticCylinder::new(shape.length(), a, b, a, b).unwrap();
-                tracker.set_shape("r_calf", thicker).unwrap();
-            },
-            |tracker| {
-                let hand = &tracker.body().limbs()[tracker.body().limb_index("r_hand").unwrap()];
-                let (shape, mut joint) = (hand.shape, hand.parent.as_ref().unwrap().1.clone());
-                joint.parent_from_joint.translation = Vec3::Z * shape.length();
-                tracker.add_limb("held", "r_hand", shape, joint, Vec::new()).unwrap();
-            },
-        ];
-        for (number, edit) in edits.into_iter().enumerate() {
-            let (mut tracker, _) = tracking();
-            let before = tracker.estimate().clone();
-            edit(&mut tracker);
-            let after = tracker.estimate().clone();
-            assert_eq!((after.status, after.stamp, after.steps), (before.status, before.stamp, 0), "edit {number}");
-            let limbs = tracker.body().limbs().len();
-            assert!(after.world_from_limb.len() == limbs && after.limb_status.len() == limbs, "edit {number}");
-            let (then, now) = (&before.world_from_limb[0], &after.world_from_limb[0]);
-            assert!(then.translation.distance(now.translation) < 0.01);
-            assert!(after.joint_gaps.iter().all(|gap| *gap < 1e-9), "edit {number}: {:?}", after.joint_gaps);
-            let pixels = before_wall(tracker.body(), &after.world_from_limb);
-            let status = show(&mut tracker, &pixels, 3);
-            assert_eq!(status, Status::Tracking, "edit {number}");
-            let off = farthest(&tracker.estimate().world_from_limb, &after.world_from_limb);
-            assert!(off < 0.02, "edit {number}: {off} m");
-        }
-    }
-
-    #[test]
-    fn a_lost_body_is_found_beside_its_place_and_no_board_of_its_size_is() {
-        let (mut tracker, empty) = tracking();
-        let (model, poses) = standing();
-        let nothing = vec![4500; empty.len()];
-        let aside = moved(&poses, 0.7 * Vec3::X);
-        let person = before_wall(&model.body, &aside);
-        for frame in 3..8 {
-            assert_eq!(show(&mut tracker, &nothing, frame), Status::Lost);
-        }
-        for (frame, width) in [0.15, 0.2, 0.25].into_iter().flat_map(|width| [width; 3]).enumerate() {
-            let mut board = nothing.clone();
-            put_board(&mut board, Vec3::new(-0.7, 0.1, 2.6), [width, 0.85]);
-            assert_eq!(show(&mut tracker, &board, 8 + frame), Status::Lost, "{width} m wide");
-            let moved = poses[0].translation.distance(tracker.estimate().world_from_limb[0].translation);
-            assert!(moved < 0.1, "{width} m wide: moved by {moved} m");
-        }
-        for frame in 20..30 {
-            show(&mut tracker, &person, frame);
-        }
-        let off = farthest(&tracker.estimate().world_from_limb, &aside);
-        assert!(tracker.estimate().status == Status::Tracking && off < 0.05, "{off} m");
-    }
-}
+mod tests;

@@ -1,0 +1,94 @@
+//! Steps of the tracker as a whole.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use super::*;
+use crate::testing::{before_wall, farthest, moved, put_board, standing, with_frame};
+
+/// A tracker that has followed the standing body for three frames.
+fn tracking() -> (Tracker, Vec<u16>) {
+    let (model, poses) = standing();
+    let pixels = before_wall(&model.body, &poses);
+    let mut tracker = Tracker::new(model.body, Config::default()).unwrap();
+    tracker.reset_pose(&poses).unwrap();
+    for frame in 0..3 {
+        show(&mut tracker, &pixels, frame);
+    }
+    (tracker, pixels)
+}
+
+/// Shows a frame; the status.
+fn show(tracker: &mut Tracker, pixels: &[u16], frame: usize) -> Status {
+    with_frame(pixels, frame as f64 / 30.0, |frame| tracker.step(frame).unwrap().status)
+}
+
+#[test]
+fn a_refused_frame_leaves_every_part_as_it_was() {
+    let (mut tracker, pixels) = tracking();
+    let before = format!("{tracker:?}");
+    assert!(with_frame(&pixels, 0.0, |frame| tracker.step(frame).is_err()), "time ran backwards");
+    assert_eq!(format!("{tracker:?}"), before);
+    show(&mut tracker, &pixels, 3);
+    assert_ne!(format!("{tracker:?}"), before);
+}
+
+#[test]
+fn edits_keep_the_track() {
+    type Edit = fn(&mut Tracker);
+    let edits: [Edit; 4] = [
+        |tracker| tracker.scale(1.02).unwrap(),
+        |tracker| tracker.remove_limb("l_hand").unwrap(),
+        |tracker| {
+            let shape = tracker.body().limbs()[tracker.body().limb_index("r_calf").unwrap()].shape;
+            let (a, b) = (1.1 * shape.a0(), 1.1 * shape.b0());
+            let thicker = crate::TaperedEllipticCylinder::new(shape.length(), a, b, a, b).unwrap();
+            tracker.set_shape("r_calf", thicker).unwrap();
+        },
+        |tracker| {
+            let hand = &tracker.body().limbs()[tracker.body().limb_index("r_hand").unwrap()];
+            let (shape, mut joint) = (hand.shape, hand.parent.as_ref().unwrap().1.clone());
+            joint.parent_from_joint.translation = Vec3::Z * shape.length();
+            tracker.add_limb("held", "r_hand", shape, joint, Vec::new()).unwrap();
+        },
+    ];
+    for (number, edit) in edits.into_iter().enumerate() {
+        let (mut tracker, _) = tracking();
+        let before = tracker.estimate().clone();
+        edit(&mut tracker);
+        let after = tracker.estimate().clone();
+        assert_eq!((after.status, after.stamp, after.steps), (before.status, before.stamp, 0), "edit {number}");
+        let limbs = tracker.body().limbs().len();
+        assert!(after.world_from_limb.len() == limbs && after.limb_status.len() == limbs, "edit {number}");
+        let (then, now) = (&before.world_from_limb[0], &after.world_from_limb[0]);
+        assert!(then.translation.distance(now.translation) < 0.01);
+        assert!(after.joint_gaps.iter().all(|gap| *gap < 1e-9), "edit {number}: {:?}", after.joint_gaps);
+        let pixels = before_wall(tracker.body(), &after.world_from_limb);
+        let status = show(&mut tracker, &pixels, 3);
+        assert_eq!(status, Status::Tracking, "edit {number}");
+        let off = farthest(&tracker.estimate().world_from_limb, &after.world_from_limb);
+        assert!(off < 0.02, "edit {number}: {off} m");
+    }
+}
+
+#[test]
+fn a_lost_body_is_found_beside_its_place_and_no_board_of_its_size_is() {
+    let (mut tracker, empty) = tracking();
+    let (model, poses) = standing();
+    let nothing = vec![4500; empty.len()];
+    let aside = moved(&poses, 0.7 * Vec3::X);
+    let person = before_wall(&model.body, &aside);
+    for frame in 3..8 {
+        assert_eq!(show(&mut tracker, &nothing, frame), Status::Lost);
+    }
+    for (frame, width) in [0.15, 0.2, 0.25].into_iter().flat_map(|width| [width; 3]).enumerate() {
+        let mut board = nothing.clone();
+        put_board(&mut board, Vec3::new(-0.7, 0.1, 2.6), [width, 0.85]);
+        assert_eq!(show(&mut tracker, &board, 8 + frame), Status::Lost, "{width} m wide");
+        let moved = poses[0].translation.distance(tracker.estimate().world_from_limb[0].translation);
+        assert!(moved < 0.1, "{width} m wide: moved by {moved} m");
+    }
+    for frame in 20..30 {
+        show(&mut tracker, &person, frame);
+    }
+    let off = farthest(&tracker.estimate().world_from_limb, &aside);
+    assert!(tracker.estimate().status == Status::Tracking && off < 0.05, "{off} m");
+}

@@ -1,0 +1,133 @@
+"""Several people from Python: who is there, what is refused, and real recordings of two."""
+
+import csv
+from itertools import islice
+
+import numpy as np
+import pytest
+
+import voodoo
+from voodoo.errors import BodyError, ConfigError, MeasurementError
+from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.people import PeopleFrontEnd
+from voodoo.recordings import open_recording
+from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
+from voodoo.recordings.pose2sim import SITES
+from voodoo.sensors.settings import FrontEndSettings
+from voodoo.synthetic.render import render_depth
+
+CAMERA = voodoo.Camera(160, 120, 120.0, 120.0, 79.5, 59.5)
+WORLD_FROM_SENSOR = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 0, 1]])
+STANDING = {
+    "humanoid_root": (2.4, 0.0, 0.95), "vc7": (2.4, 0.0, 1.48), "l_shoulder": (2.4, -0.18, 1.42),
+    "r_shoulder": (2.4, 0.18, 1.42), "l_hip": (2.4, -0.1, 0.92), "r_hip": (2.4, 0.1, 0.92),
+}  # fmt: skip
+
+
+def frame(stamp, *people):
+    """What the camera sees of posed bodies before a wall."""
+    depth = np.full((120, 160), 4.5)
+    for body, estimate in people:
+        seen = render_depth(body, estimate.world_from_limb, camera=CAMERA, world_from_sensor=WORLD_FROM_SENSOR).depth
+        depth = np.where(seen > 0.0, np.minimum(seen, depth), depth)
+    shown = voodoo.Frame(stamp)
+    shown.add_depth(depth.astype(np.float32), camera=CAMERA, metres_per_unit=1.0, world_from_sensor=WORLD_FROM_SENSOR)
+    return shown
+
+
+@pytest.fixture(scope="module")
+def someone():
+    tracker = voodoo.Tracker(voodoo.Body.human(1.75, model="measured"))
+    return tracker.body, tracker.reset(joints=STANDING, fit_sizes=False)
+
+
+def test_somebody_comes_and_goes(someone):
+    people = voodoo.People()
+    assert len(people.estimate) == 0 and np.isnan(people.estimate.stamp)
+    for index in range(6):
+        found = people.step(frame(index / 15.0, someone))
+    (person,) = found
+    assert (person.id, person.status) == (1, "tracking") and found is people.estimate
+    assert np.linalg.norm(person.estimate.joints["humanoid_root"] - STANDING["humanoid_root"]) < 0.15
+    assert people.body(1).limb_names == voodoo.Body.human(model="measured").limb_names
+    for index in range(6, 14):
+        found = people.step(frame(index / 15.0))
+    assert len(found) == 0
+    with pytest.raises(BodyError, match=r"those who are there \(nobody\), found 1"):
+        people.body(1)
+
+
+def test_what_is_measured_of_one_person_is_theirs(someone):
+    people = voodoo.People()
+    assert people.add(STANDING, fit_sizes=False) == 1
+    people.step(frame(0.0, someone))
+    wrist = people.estimate.persons[0].estimate.joints["l_wrist"]
+    own = voodoo.Frame(0.1)
+    own.add_position("l_wrist", wrist + [-0.3, 0.0, 0.3], weight=500.0, source="glove")
+    (person,) = people.step(frame(0.1, someone), own={1: own})
+    assert person.estimate.sources["glove"][:2] == (1, 1)
+    assert np.linalg.norm(person.estimate.joints["l_wrist"] - wrist) > 0.1
+    late = voodoo.Frame(0.3)
+    with pytest.raises(MeasurementError, match=r"own: expected frames with the stamp 0.2 s, found 0.3 s"):
+        people.step(frame(0.2, someone), own={1: late})
+    people.only(7)
+    assert len(people.step(frame(0.2, someone))) == 0
+
+
+def test_what_cannot_be_meant_is_refused(someone):
+    for wrong in ({"limit": 0}, {"forget_after": float("nan")}, {"region": ((0, 0, 0), (1, 1))}, {"config": "fast"}):
+        with pytest.raises(ConfigError, match=next(iter(wrong))):
+            voodoo.People(**wrong)
+    with pytest.raises(BodyError, match="body"):
+        voodoo.People("human")
+    people = voodoo.People()
+    people.step(frame(1.0, someone))
+    with pytest.raises(MeasurementError, match="stamp"):
+        people.step(frame(0.5, someone))
+    with pytest.raises(MeasurementError, match=r"image: expected an array of shape \(120, 160, 3\) and dtype uint8"):
+        voodoo.Frame(0.0).add_color(np.zeros((120, 160), dtype=np.uint8), camera=CAMERA)
+
+
+def test_two_persons_in_four_pictures_without_names(voodoo_data):
+    folder = voodoo_data / "pose2sim-two"
+    if not folder.is_dir():
+        pytest.skip(f"the recording of two people is not at {folder}")
+    recording, people = open_recording(folder), voodoo.People()
+    files = [next(folder.glob(f"*_P{number}_0-100.trc")) for number in (1, 2)]
+    known = [read_trc(file, world_from_file=Z_UP_FROM_Y_UP).of(SITES) for file in files]
+    front_end = PeopleFrontEnd(people, settings=FrontEndSettings.of(recording))
+    errors = []
+    for index, recorded in enumerate(islice(paired(recording), 40)):
+        found = front_end.step(recorded)
+        assert [person.id for person in found] == [1, 2], index
+        errors.append(
+            [
+                min(
+                    np.nanmean([np.linalg.norm(person.estimate.joints[name] - places[index, row])])
+                    for person in found
+                    for row in [names.index(name)]
+                )
+                for names, places in known
+                for name in names
+                if name[2:] in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+            ]
+        )
+    assert np.nanmean(errors) < 0.05
+
+
+def test_two_who_cross_keep_their_numbers(voodoo_data):
+    folder = voodoo_data / "people" / "pp_p2_two_cross_twice_cmu"
+    if not folder.is_dir():
+        pytest.skip(f"the recording of people is not at {folder}")
+    with (folder / "truth_people.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if float(row["in_view"]) > 0.3]
+    recording, people = open_recording(folder / "bag"), voodoo.People()
+    front_end, numbers = PeopleFrontEnd(people, settings=FrontEndSettings.of(recording)), {}
+    for recorded in islice(paired(recording), 72):
+        for person in front_end.step(recorded):
+            root = person.estimate.joints["humanoid_root"]
+            for row in rows:
+                place = [float(row[f"humanoid_root_{axis}"]) for axis in "xyz"]
+                if abs(float(row["stamp_s"]) - recorded.stamp) < 1e-4 and np.linalg.norm(root - place) < 0.5:
+                    numbers.setdefault(person.id, set()).add(row["person"])
+    assert sorted(numbers) == [1, 2] and sorted(map(len, numbers.values())) == [1, 1], numbers
