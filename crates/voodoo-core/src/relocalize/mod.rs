@@ -134,6 +134,11 @@ impl Relocalizer {
         }
     }
 
+    /// What a detector saw in this frame counts for nothing.
+    pub fn forget(&mut self) {
+        self.people.forget();
+    }
+
     /// What a detector saw in this frame, if it looked.
     pub fn detection(&self) -> Option<&Detection> {
         self.people.seen()

@@ -114,10 +114,14 @@ impl Tracker {
             observer.face(frame);
             let seen = observer.seen(frame, motion.origin);
             let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-            if relocalizer.detected(setting.of(model), fit, &motion.poses, false).is_some() {
+            let better = relocalizer.detected(setting.of(model), fit, &motion.poses, false).is_some();
+            if better {
                 self.restart_at_detection();
+                return;
             }
         }
+        // The start was right: what it says of body and scene counts.
+        relocalizer.forget();
     }
 
     /// Starts anew where a detector sees the body, in the sizes it was set in; whether it could.
