@@ -321,10 +321,12 @@ def test_ctrl_c_ends_an_evaluation_at_once_and_keeps_what_is_done(tmp_path):
     (tmp_path / "all").mkdir()
     for number in range(300):
         (tmp_path / "all" / f"r{number:03d}").symlink_to(sample_path())
+    # A shell's background job ignores the signal, and what it starts does, too.
+    listen = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
     command = [
         sys.executable,
         "-c",
-        "from voodoo.cli import main; main()",
+        f"{listen}; from voodoo.cli import main; main()",
         "eval",
         "all",
         "--use",
@@ -341,7 +343,11 @@ def test_ctrl_c_ends_an_evaluation_at_once_and_keeps_what_is_done(tmp_path):
         time.sleep(5.0)
         began = time.perf_counter()
         os.killpg(running.pid, signal.SIGINT)  # as a terminal does: the workers get it, too
-        out, err = running.communicate(timeout=60)
+        try:
+            out, err = running.communicate(timeout=60)
+        finally:
+            if running.poll() is None:
+                os.killpg(running.pid, signal.SIGKILL)
         took = time.perf_counter() - began
     assert running.returncode == 130, err
     done = int(err.split("interrupted: ")[1].split(" of 300")[0])
