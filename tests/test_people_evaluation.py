@@ -254,5 +254,5 @@ def test_any_result_can_be_judged_by_the_command_line(voodoo_data, tmp_path):
 
 def test_without_the_library_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "motmetrics", None)
-    with pytest.raises(VoodooError, match=r"voodoo\[eval\]"):
+    with pytest.raises(VoodooError, match=r"voodoo-tracker\[eval\]"):
         judged(truth([[0.0]] * 3, persons=(1,)), result({1: [0.0] * 3}))

@@ -117,8 +117,8 @@ impl Relocalizer {
     /// was not where it should be in the frame before, or the body `lost`.
     pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {
         // A body that was found a moment ago may face the other way.
-        let doubtful = doubtful || self.watch.open();
-        if self.doubt.due(frame.stamp, doubtful, lost) && self.known {
+        let often = lost || self.watch.open();
+        if self.doubt.due(frame.stamp, doubtful, often) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
         } else {
             self.people.forget();
