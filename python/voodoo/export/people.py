@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +12,8 @@ import numpy.typing as npt
 
 from voodoo.errors import VoodooError, reading
 from voodoo.export.people_rows import PeopleRows, read_rows, write_rows
-from voodoo.export.track import Track, arrays_of, check_suffix, track_of_rows, tracks_of
+from voodoo.export.result_file import appearing_whole, check_suffix
+from voodoo.export.track import Track, arrays_of, track_of_rows, tracks_of
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
@@ -121,10 +121,7 @@ class PeopleTrack:
             OSError: the file cannot be written.
         """
         path = Path(path)
-        check_suffix(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.part")
-        try:
+        with appearing_whole(path) as part:
             if path.suffix == ".csv":
                 write_rows(part, self.rows())
             else:
@@ -137,9 +134,6 @@ class PeopleTrack:
                     np.savez_compressed(
                         file, allow_pickle=False, stamps=self.stamps, persons=np.array(sorted(self.tracks)), **arrays
                     )
-            os.replace(part, path)  # noqa: PTH105 - the replacement must be atomic
-        finally:
-            part.unlink(missing_ok=True)
 
     @classmethod
     def load(cls, path: str | Path) -> PeopleTrack:

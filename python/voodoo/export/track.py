@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy.typing as npt
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, reading
 from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
+from voodoo.export.result_file import appearing_whole, check_suffix
 from voodoo.ik.angles import angle_names as angle_names_of
 from voodoo.ik.angles import angles_of
 from voodoo.ik.chain import Chain
@@ -23,7 +23,6 @@ from voodoo.names import SEARCHING
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
-SUFFIXES = (".csv", ".npz")
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
 FORMAT_VERSION = 2
 """Of .npz. It rises when earlier readers would misread a file; further arrays and columns do not raise it."""
@@ -192,17 +191,11 @@ class Track:
             OSError: the file cannot be written.
         """
         path = Path(path)
-        check_suffix(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.part")
-        try:
+        with appearing_whole(path) as part:
             if path.suffix == ".csv":
                 self._write_csv(part)
             else:
                 self._write_npz(part)
-            os.replace(part, path)  # noqa: PTH105 - the replacement must be atomic
-        finally:
-            part.unlink(missing_ok=True)
 
     def _write_csv(self, path: Path) -> None:
         with path.open("w", newline="", encoding="utf-8") as file:
@@ -372,16 +365,6 @@ def _told(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
         "limb_status": {str(limb): tuple(map(str, row)) for limb, row in zip(limbs, words, strict=True)},
         "left_out": {str(reason): int(count) for reason, count in zip(reasons, counts, strict=True)},
     }
-
-
-def check_suffix(path: Path) -> None:
-    """Refuse result files that are neither .csv nor .npz.
-
-    Raises:
-        VoodooError: names both.
-    """
-    if path.suffix not in SUFFIXES:
-        raise VoodooError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}, found {path.suffix!r}")
 
 
 def _angles(estimates: Sequence[Estimate], body: Body | None) -> tuple[tuple[str, ...], FloatArray]:

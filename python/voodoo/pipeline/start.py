@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from voodoo._core import Estimate
 from voodoo.config import Config
 from voodoo.errors import VoodooError
+from voodoo.export.result_file import SUFFIXES
 from voodoo.export.skeleton import bones
-from voodoo.export.track import SUFFIXES, Track
+from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.joint import short
 from voodoo.model.legs import legs_body

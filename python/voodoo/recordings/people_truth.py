@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import RecordingError, reading
+from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
+from voodoo.recordings.joint_table import read_positions
 
 PEOPLE_TRUTH_FILE = "truth_people.csv"
 _FIRST = ("stamp_s", "person", "in_view")
@@ -64,23 +64,9 @@ def read_people_truth(path: Path, root_from_truth: Callable[[float], FloatArray]
     Raises:
         RecordingError: another header, a short row, a cell that is no number, or two rows of a person at one stamp.
     """
-    with reading(path, "a table of several people"), path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    if len(rows) < 2:
-        raise RecordingError(f"{path}: expected a header and at least one row, found {len(rows)} lines")
-    header = rows[0]
-    names = tuple(cell.removesuffix("_x") for cell in header[3::3])
-    if header != [*_FIRST, *(f"{name}_{axis}" for name in names for axis in "xyz")] or not names:
-        raise RecordingError(f"{path}: expected columns {', '.join(_FIRST)}, NAME_x, NAME_y, ..., found {header[:5]}")
-    table = np.empty((len(rows) - 1, len(header)))
-    for index, row in enumerate(rows[1:]):
-        where = f"{path}, line {index + 2}"
-        if len(row) != len(header):
-            raise RecordingError(f"{where}: expected {len(header)} cells, found {len(row)}")
-        try:
-            table[index] = [float(cell) for cell in row]
-        except ValueError as error:
-            raise RecordingError(f"{where}: expected numbers, found {error}") from error
+    names, table = read_positions(path, _FIRST)
+    if not names:
+        raise RecordingError(f"{path}: expected joints, NAME_x, NAME_y, NAME_z, found none")
     if not np.isfinite(table).all() or (table[:, 1] < 1).any() or (table[:, 1] % 1.0 != 0.0).any():
         raise RecordingError(f"{path}: expected finite numbers and persons from 1, found others")
     return _by_person(path, table, names, root_from_truth)

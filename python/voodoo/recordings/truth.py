@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Callable
@@ -15,6 +13,7 @@ import numpy as np
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.joint import short
+from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.recording import Reference, Start
 from voodoo.recordings.stored import read_stored_text
 
@@ -42,23 +41,7 @@ def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
     Raises:
         RecordingError: another header, a short row, a cell that is no number, stamps that do not rise.
     """
-    with reading(path, "a table of joint positions"):
-        rows = list(csv.reader(io.StringIO(read_stored_text(path, "a table of joint positions"))))
-    if len(rows) < 2:
-        raise RecordingError(f"{path}: expected a header and at least one row, found {len(rows)} lines")
-    header = rows[0]
-    names = tuple(cell.removesuffix("_x") for cell in header[1::3])
-    if header != ["stamp_s", *(f"{name}_{axis}" for name in names for axis in "xyz")] or len(set(names)) != len(names):
-        raise RecordingError(f"{path}: expected columns stamp_s, NAME_x, NAME_y, NAME_z, ..., found {header[:4]}...")
-    table = np.empty((len(rows) - 1, len(header)))
-    for index, row in enumerate(rows[1:]):
-        where = f"{path}, line {index + 2}"
-        if len(row) != len(header):
-            raise RecordingError(f"{where}: expected {len(header)} cells, found {len(row)}")
-        try:
-            table[index] = [float(cell) if cell else math.nan for cell in row]
-        except ValueError as error:
-            raise RecordingError(f"{where}: expected numbers, found {error}") from error
+    names, table = read_positions(path, ("stamp_s",))
     stamps = table[:, 0]
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any() or np.isinf(table).any():
         raise RecordingError(f"{path}: expected rising stamps and finite positions, found others")
