@@ -105,7 +105,7 @@ impl Regions {
     /// The edges of all limbs in all pictures, in the given step of a frame.
     pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, pairs: &mut Vec<RegionPair>) {
         pairs.clear();
-        let reach = REACH[step.min(REACH.len() - 1)];
+        let reach = (REACH[step.min(REACH.len() - 1)] as f64 * crate::tune!("REACH", 1.0)) as usize;
         for picture in frame.colors {
             self.look(frame, picture, posed);
             let Self { cameras, groups, scanner, .. } = self;
@@ -119,7 +119,7 @@ impl Regions {
                 let Some(edge) = scanner.edge(&view, line, reach) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
-                let information = edge.information / (1.0 + edge.information * MODEL_ERROR * MODEL_ERROR);
+                let information = crate::tune!("W", 1.0) as f32 * edge.information / (1.0 + edge.information * (crate::tune!("ME", 2.0) as f32).powi(2));
                 let limb = usize::from(line.limb);
                 pairs.push(RegionPair {
                     limb,

@@ -1,5 +1,7 @@
 //! Where along a line the edge of a limb is, from the log ratios of limb and surroundings at its samples.
 
+use crate::tune;
+
 /// Log ratios of neighbouring pixels err alike: so many of them tell as much as one.
 const TEMPERATURE: f32 = 6.0;
 /// Greatest distance from the expected edge at which one is looked for, samples.
@@ -31,7 +33,7 @@ pub(super) fn edge(ratios: &[f32], reach: usize, width: usize) -> Edge {
     }
     let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
     for (index, sum) in sums.iter().enumerate() {
-        let share = ((sum - most) / TEMPERATURE).exp();
+        let share = ((sum - most) / tune!("T", 6.0) as f32).exp();
         let place = index as f32 - reach as f32;
         total += share;
         first += share * place;

@@ -45,7 +45,7 @@ impl Scanner {
         if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
             return None;
         }
-        let width = if line.both && line.width < WIDEST as f32 { (line.width + 0.5) as usize } else { 0 };
+        let width = if line.both && line.width < crate::tune!("WIDE", 48.0) as f32 { (line.width + 0.5) as usize } else { 0 };
         let count = 2 * reach + width;
         let start = 0.5 - (reach + width) as f32;
         for (index, ratio) in self.ratios[..count].iter_mut().enumerate() {
@@ -93,7 +93,7 @@ impl View<'_> {
             }
             self.model.limbs[other].log[bin]
         };
-        (own - other).clamp(-MOST_RATIO, MOST_RATIO)
+        { let m = crate::tune!("CLIP", 2.0) as f32; (own - other).clamp(-m, m) }
     }
 }
 

@@ -41,6 +41,8 @@ pub struct WholeBody {
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
+    /// Weight of the edges of colours on each limb.
+    edges: Vec<f64>,
 }
 
 impl Solver for WholeBody {
@@ -136,11 +138,17 @@ impl WholeBody {
 
     /// Standard deviation of every joint's motion.
     fn expect_motion(&mut self, problem: &Problem) {
+        let information = 1.0 / (problem.config.point_sigma * problem.config.point_sigma);
+        self.edges.clear();
+        self.edges.resize(problem.body.limbs().len(), 0.0);
+        for pair in &problem.correspondences.regions {
+            self.edges[pair.limb] += pair.information / information;
+        }
         self.joint_sigmas.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
-            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb];
+            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + crate::tune!("SHOWN", 1.0) * self.edges[limb];
             let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
