@@ -140,6 +140,21 @@ impl PyTracker {
         self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
     }
 
+    /// The lines of the last step in the pictures of a camera: limb, place (2), outward normal (2), offset, sigma, row by row.
+    fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let camera = self.cameras.iter().position(|known| known == source);
+        let rows: Vec<Vec<f32>> = camera.map_or_else(Vec::new, |camera| {
+            let lines = self.tracker.region_lines(camera as u16);
+            lines
+                .map(|line| {
+                    let ([u, v], [nu, nv]) = (line.place, line.normal);
+                    vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
+                })
+                .collect()
+        });
+        PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
     /// Signed distance of world points `(N, 3)` to the posed body, metres, negative inside.
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let array = PointArray::new("points", points)?;

@@ -73,6 +73,20 @@ pub struct RegionPair {
     pub source: u16,
 }
 
+/// What pictures say of a limb, by its lines: shares of those that can tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RegionSupport {
+    /// Its colours end at its contour: of the whole limb, each line weighted with its distance from the proximal joint, and of
+    /// its outer part.
+    pub own: [f64; 2],
+    /// The colours of its surroundings are seen within it, likewise.
+    pub against: [f64; 2],
+    /// Lines that can tell, as a share of all.
+    pub shown: f64,
+    /// Number of lines.
+    pub lines: f64,
+}
+
 /// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
@@ -101,6 +115,8 @@ pub struct Correspondences {
     pub contour: Vec<ContourPair>,
     /// Contours of limbs and edges of colours.
     pub regions: Vec<RegionPair>,
+    /// What they say of each limb; empty without pictures.
+    pub region_support: Vec<RegionSupport>,
     /// Elastic bands.
     pub bands: Vec<Band>,
 }

@@ -81,6 +81,7 @@ impl Fit {
         self.correspondences.sites.clear();
         self.correspondences.contour.clear();
         self.correspondences.regions.clear();
+        self.correspondences.region_support.clear();
         self.regions.clear();
     }
 
@@ -214,6 +215,11 @@ impl Fit {
     }
 
     /// Colours of limbs and surroundings.
+    pub fn regions(&self) -> &Regions {
+        &self.regions
+    }
+
+    /// The same, to change.
     pub fn regions_mut(&mut self) -> &mut Regions {
         &mut self.regions
     }
@@ -222,6 +228,16 @@ impl Fit {
     pub fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
         if context.config.regions {
             self.regions.begin(context.seen.frame(), posed(context, poses));
+        }
+    }
+
+    /// Looks for every edge of colours by itself, both sides of a limb apart: pairs that tell how wide it is.
+    pub fn match_outline(&mut self, context: Context, poses: &[Pose]) {
+        let Self { regions, correspondences, .. } = self;
+        correspondences.regions.clear();
+        if context.config.regions {
+            let (frame, posed) = (context.seen.frame(), posed(context, poses));
+            regions.find_outline(frame, posed, &mut correspondences.regions);
         }
     }
 
@@ -235,9 +251,10 @@ impl Fit {
     fn find_regions(&mut self, context: Context, poses: &[Pose], step: usize) {
         let Self { regions, correspondences, .. } = self;
         correspondences.regions.clear();
+        correspondences.region_support.clear();
         let frame = context.seen.frame();
         if context.config.regions && !frame.colors.is_empty() {
-            regions.find(frame, posed(context, poses), step, &mut correspondences.regions);
+            regions.find(frame, posed(context, poses), step, correspondences);
         }
     }
 

@@ -5,6 +5,7 @@
 //! or the surroundings', and where the body is thought to be. A line's edge is a distance along one direction, as any other
 //! correspondence.
 
+mod evidence;
 mod histogram;
 mod labels;
 mod lens;
@@ -13,11 +14,12 @@ mod models;
 mod posterior;
 mod scan;
 
-use crate::association::correspondence::RegionPair;
+use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
 use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 use crate::observation::frame::{ColorImage, ColorPixels, Frame};
+use evidence::Evidence;
 use histogram::Kind;
 use labels::Labels;
 use lens::Lens;
@@ -42,6 +44,8 @@ struct Camera {
     model: ColorModel,
     labels: Labels,
     lines: Vec<Line>,
+    /// What was found on each of them.
+    edges: Vec<Option<scan::Found>>,
     camera_from_limb: Vec<Pose>,
     known: bool,
 }
@@ -55,6 +59,7 @@ pub struct Regions {
     /// Time of the last frame, seconds.
     stamp: Option<f64>,
     scanner: Scanner,
+    evidence: Vec<Evidence>,
 }
 
 /// The body at the time of a frame, in the working frame.
@@ -68,6 +73,21 @@ pub struct Posed<'a> {
     pub previous: &'a [Pose],
     /// The working frame's origin in the world.
     pub origin: Vec3,
+}
+
+/// A line across the contour of a limb in a picture, and the edge of its colours there; pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegionLine {
+    /// The limb.
+    pub limb: usize,
+    /// Where the contour is seen.
+    pub place: [f32; 2],
+    /// Unit vector outward.
+    pub normal: [f32; 2],
+    /// How far outward the edge lies.
+    pub offset: f32,
+    /// Its standard deviation; infinite where nothing is told.
+    pub sigma: f32,
 }
 
 impl Regions {
@@ -103,24 +123,56 @@ impl Regions {
     }
 
     /// The edges of all limbs in all pictures, in the given step of a frame.
-    pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, pairs: &mut Vec<RegionPair>) {
-        pairs.clear();
+    pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
         let reach = (REACH[step.min(REACH.len() - 1)] as f64 * crate::tune!("REACH", 1.0)) as usize;
+        self.evidence.clear();
+        self.evidence.resize(posed.poses.len(), Evidence::default());
+        self.find_within(frame, posed, reach, true, &mut found.regions);
+        found.region_support.clear();
+        found.region_support.extend(self.evidence.iter().map(Evidence::support));
+    }
+
+    /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
+    pub fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
+        self.find_within(frame, posed, REACH[1], false, pairs);
+    }
+
+    fn find_within(&mut self, frame: &Frame, posed: Posed, reach: usize, together: bool, pairs: &mut Vec<RegionPair>) {
+        pairs.clear();
         for picture in frame.colors {
             self.look(frame, picture, posed);
-            let Self { cameras, groups, scanner, .. } = self;
-            let Some(camera) = cameras.iter().find(|camera| camera.number == picture.camera && camera.known) else {
+            let Self { cameras, groups, scanner, evidence, .. } = self;
+            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera && camera.known) else {
                 continue;
             };
             let unit = unit_of(&camera.lens);
             let view = scan::View { picture, model: &camera.model, labels: &camera.labels, groups, unit };
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
+            camera.edges.clear();
             for line in &camera.lines {
-                let Some(edge) = scanner.edge(&view, line, reach) else { continue };
+                let found = scanner.edge(&view, line, reach, together);
+                camera.edges.push(found);
+                if together {
+                    let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
+                    evidence[usize::from(line.limb)].take(line.foot.z / length, found.map(|found| found.beside));
+                }
+                let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
-                let information = crate::tune!("W", 1.0) as f32 * edge.information / (1.0 + edge.information * (crate::tune!("ME", 2.0) as f32).powi(2));
+                let information = crate::tune!("W", 1.0) as f32 * edge.information
+                    / (1.0 + edge.information * (crate::tune!("ME", 2.0) as f32).powi(2));
                 let limb = usize::from(line.limb);
+                let name = posed.body.limbs()[limb].name.as_str();
+                let information = information
+                    * if crate::tune!("LENW", 0.0) > 0.0 { (posed.body.limbs()[limb].shape.length() / crate::tune!("LENW", 0.0)) as f32 } else { 1.0 } * if name == "pelvis" {
+                        crate::tune!("WPEL", 1.0) as f32
+                    } else if name == "thorax" {
+                        crate::tune!("WTHO", 1.0) as f32
+                    } else if name.ends_with("clavicle") {
+                        crate::tune!("WCLA", 1.0) as f32
+                    } else {
+                        1.0
+                    };
                 pairs.push(RegionPair {
                     limb,
                     x: posed.poses[limb] * line.foot,
@@ -131,6 +183,24 @@ impl Regions {
                 });
             }
         }
+    }
+
+    /// The lines of the last look at a camera's picture.
+    pub fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
+        let camera = self.cameras.iter().find(|known| known.number == camera);
+        camera.into_iter().flat_map(|camera| {
+            let unit = unit_of(&camera.lens);
+            camera.lines.iter().zip(&camera.edges).map(move |(line, found)| {
+                let edge = found.map(|found| found.edge).unwrap_or_default();
+                RegionLine {
+                    limb: usize::from(line.limb),
+                    place: line.place,
+                    normal: line.normal,
+                    offset: unit * edge.mean,
+                    sigma: unit / edge.information.sqrt(),
+                }
+            })
+        })
     }
 
     /// Learns colours where the body was found.
@@ -170,7 +240,10 @@ impl Regions {
         lines.clear();
         let viewer = Viewer { body, lens, labels, unit: unit_of(lens) };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
-            viewer.add(limb, pose, &HEIGHTS, lines);
+            let length = body.limbs()[limb].shape.length();
+            let count = if crate::tune!("SPACING", 0.045) > 0.0 { (length / crate::tune!("SPACING", 0.045)).round().clamp(3.0, 16.0) as usize } else { 6 };
+            let heights: Vec<f64> = (0..count).map(|k| (k as f64 + 0.5) / count as f64).collect();
+            viewer.add(limb, pose, &heights, lines);
         }
     }
 

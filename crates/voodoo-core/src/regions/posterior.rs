@@ -42,5 +42,10 @@ pub(super) fn edge(ratios: &[f32], reach: usize, width: usize) -> Edge {
     let mean = first / total;
     let variance = (second / total - mean * mean).max(0.25);
     let flat = (count * count - 1) as f32 / 12.0;
-    Edge { mean, information: (1.0 / variance - 1.0 / flat).max(0.0) }
+    let information = (1.0 / variance - 1.0 / flat).max(0.0);
+    if tune!("CORR", 1.0) > 0.0 && information > 0.0 {
+        let most = reach as f32 * tune!("MOST", 1.0) as f32;
+        return Edge { mean: (mean / (variance * information)).clamp(-most, most), information };
+    }
+    Edge { mean, information }
 }

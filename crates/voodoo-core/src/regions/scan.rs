@@ -11,6 +11,8 @@ use crate::observation::frame::ColorImage;
 const MOST_RATIO: f32 = 2.0;
 /// A limb wider than this is looked for by one edge alone, units.
 const WIDEST: usize = 48;
+/// What is beside the contour is so many samples wide.
+const NEAR: usize = 5;
 /// Colours are learnt from this far inside and outside of the contour, units.
 const LEARN_FROM: f32 = 2.0;
 /// As far outside of it the surroundings are learnt, units.
@@ -38,21 +40,36 @@ impl Default for Scanner {
     }
 }
 
+/// What is found on a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub edge: Edge,
+    /// Mean log ratios inside and outside of the contour.
+    pub beside: [f32; 2],
+}
+
 impl Scanner {
     /// The edge on a line; `None` where it cannot be told.
-    pub(super) fn edge(&mut self, view: &View, line: &Line, reach: usize) -> Option<Edge> {
+    pub(super) fn edge(&mut self, view: &View, line: &Line, reach: usize, together: bool) -> Option<Found> {
         let group = view.group(line.limb);
         if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
             return None;
         }
-        let width = if line.both && line.width < crate::tune!("WIDE", 48.0) as f32 { (line.width + 0.5) as usize } else { 0 };
+        let width = if together && line.both && line.width < crate::tune!("WIDE", 48.0) as f32 {
+            (line.width + 0.5) as usize
+        } else {
+            0
+        };
         let count = 2 * reach + width;
         let start = 0.5 - (reach + width) as f32;
         for (index, ratio) in self.ratios[..count].iter_mut().enumerate() {
             *ratio = view.ratio(line, group, start + index as f32);
         }
-        let found = edge(&self.ratios[..count], reach, width);
-        (found.information > 0.0).then_some(found)
+        let (inside, outside) = self.ratios[..count].split_at(reach + width);
+        let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
+        let near = NEAR.min(reach);
+        let beside = [mean(&inside[inside.len() - near..]), mean(&outside[..near])];
+        Some(Found { edge: edge(&self.ratios[..count], reach, width), beside })
     }
 }
 
@@ -93,7 +110,10 @@ impl View<'_> {
             }
             self.model.limbs[other].log[bin]
         };
-        { let m = crate::tune!("CLIP", 2.0) as f32; (own - other).clamp(-m, m) }
+        {
+            let m = crate::tune!("CLIP", 2.0) as f32;
+            (own - other).clamp(-m, m)
+        }
     }
 }
 

@@ -147,8 +147,11 @@ impl WholeBody {
         self.joint_sigmas.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
+            let motion = if problem.correspondences.regions.is_empty() { motion } else { motion.max(crate::tune!("CLAVM", 0.1)) };
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
-            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + crate::tune!("SHOWN", 1.0) * self.edges[limb];
+            let measured = problem.correspondences.limbs[limb].total_weight()
+                + self.sites[limb]
+                + crate::tune!("SHOWN", 1.0) * self.edges[limb];
             let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
