@@ -164,7 +164,7 @@ impl Regions {
                 let limb = usize::from(line.limb);
                 let name = posed.body.limbs()[limb].name.as_str();
                 let information = information
-                    * if crate::tune!("LENW", 0.0) > 0.0 { (posed.body.limbs()[limb].shape.length() / crate::tune!("LENW", 0.0)) as f32 } else { 1.0 } * if name == "pelvis" {
+                    * if crate::tune!("LENW", 0.0) > 0.0 { (posed.body.limbs()[limb].shape.length() / crate::tune!("LENW", 0.0)) as f32 } else { 1.0 } * if line.width.is_infinite() { crate::tune!("RIMW", 1.0) as f32 } else { 1.0 } * if name.ends_with("foot") { crate::tune!("WFOOT", 1.0) as f32 } else if name.ends_with("hand") { crate::tune!("WHAND", 1.0) as f32 } else if name == "head" || name == "neck" { crate::tune!("WHEAD", 1.0) as f32 } else { 1.0 } * if name == "pelvis" {
                         crate::tune!("WPEL", 1.0) as f32
                     } else if name == "thorax" {
                         crate::tune!("WTHO", 1.0) as f32
@@ -278,7 +278,7 @@ fn groups(body: &Body) -> Vec<u16> {
     let mut names: Vec<String> = Vec::new();
     let mut groups: Vec<u16> = Vec::new();
     for limb in limbs {
-        let carried = limb.parent.as_ref().filter(|(_, joint)| joint.motion < CARRIED).map(|(parent, _)| *parent);
+        let carried = limb.parent.as_ref().filter(|(_, joint)| joint.motion < crate::tune!("CARRIED", 0.0)).map(|(parent, _)| *parent);
         if let Some(parent) = carried {
             groups.push(groups[parent]);
             continue;

@@ -159,6 +159,11 @@ impl Sizes {
             fit.match_outline(setting.of(model), poses);
             for (limb, outline) in self.outlines.iter_mut().enumerate() {
                 let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
+                let part = &model.body.limbs()[limb];
+                if part.match_caps[1] && crate::tune!("TIP", 1.0) > 0.0 {
+                    let longer = outline.tip(&part.shape, &poses[limb], pairs.clone());
+                    model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
+                }
                 let Some(step) = outline.start(&model.body.limbs()[limb].shape, &poses[limb], pairs) else { continue };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];

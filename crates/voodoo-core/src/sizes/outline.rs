@@ -13,6 +13,9 @@ const FRAMES_ALIKE: f64 = 10.0;
 /// How far the axis of a tracked limb is off across itself, metres.
 const ASIDE_SIGMA: f64 = 0.02;
 
+/// What anthropometry leaves open of the length of hands, feet and heads, metres.
+const TIP_SIGMA: f64 = 0.03;
+
 /// What is known of the surface of one limb.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outline {
@@ -72,6 +75,27 @@ impl Outline {
         let [e0, e1, e2] = self.total.factors.map(|factor| factor - 1.0);
         let so_far = SVector::from([self.total.shift.x, self.total.shift.y, e0, e1, e2]);
         self.take((h + self.information).cholesky()?.solve(&(g - self.information * so_far)))
+    }
+
+    /// How much longer a limb with a free distal end is, as a factor, by the edges along the end's rim.
+    pub(super) fn tip<'a>(
+        &self,
+        shape: &TaperedEllipticCylinder,
+        working_from_limb: &Pose,
+        pairs: impl Iterator<Item = &'a RegionPair>,
+    ) -> f64 {
+        let (mut h, mut g) = (1.0 / (TIP_SIGMA * TIP_SIGMA), 0.0);
+        for pair in pairs {
+            let foot = working_from_limb.inverse_transform_point(pair.x);
+            let along = working_from_limb.inverse_transform_vector(pair.normal).z;
+            if foot.z < shape.length() * 0.999 {
+                continue;
+            }
+            let weight = kernel(pair.distance) * pair.information / ALIKE;
+            h += weight * along * along;
+            g += weight * along * pair.distance;
+        }
+        1.0 + g / (h * shape.length())
     }
 
     /// The girth of a tracked limb: how far its axis is off in this frame is eliminated, and where it lies about the joints
