@@ -100,11 +100,6 @@ impl Histogram {
             self.counted = 0.0;
         }
     }
-
-    /// How alike two sets of colours are, from 0 to 1 (Bhattacharyya).
-    pub(super) fn alike(&self, other: &Self) -> f32 {
-        self.share.iter().zip(&other.share).map(|(a, b)| (a * b).sqrt()).sum()
-    }
 }
 
 fn smooth_color(values: &mut [f32], room: &mut Vec<f32>) {

@@ -54,12 +54,13 @@ struct Border {
 }
 
 impl Viewer<'_> {
-    /// Adds the lines of a limb at these shares of its length, and on its free ends.
-    pub(super) fn add(&self, index: usize, camera_from_limb: &Pose, heights: &[f64], lines: &mut Vec<Line>) {
+    /// Adds so many lines on each side of a limb, and those on its free ends.
+    pub(super) fn add(&self, index: usize, camera_from_limb: &Pose, a_side: usize, lines: &mut Vec<Line>) {
         let limb = &self.body.limbs()[index];
         let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
-        for t in heights {
-            let Some(points) = limb.shape.contour(*t, camera) else { continue };
+        for height in 0..a_side {
+            let t = (height as f64 + 0.5) / a_side as f64;
+            let Some(points) = limb.shape.contour(t, camera) else { continue };
             let sides = points.map(|found| {
                 let normal = camera_from_limb.rotation * found.normal;
                 let [fx, fy, ..] = self.lens.intrinsics;

@@ -13,9 +13,10 @@ mod lines;
 mod models;
 mod posterior;
 mod scan;
+mod scene;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
-use crate::body::Body;
+use crate::body::{Body, Limb};
 use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 use crate::observation::frame::{ColorImage, ColorPixels, Frame};
@@ -26,11 +27,14 @@ use lens::Lens;
 use lines::{Line, Viewer};
 use models::ColorModel;
 use scan::Scanner;
+use scene::Scene;
 
 /// How far from the contour its edge is looked for in the steps of a frame, units.
 const REACH: [usize; 4] = [15, 10, 6, 5];
-/// Where along a limb lines are.
-const HEIGHTS: [f64; 6] = [1.0 / 12.0, 3.0 / 12.0, 5.0 / 12.0, 7.0 / 12.0, 9.0 / 12.0, 11.0 / 12.0];
+/// Lines stand about so far apart along a limb, metres, and so many on each side at least and at most.
+const SPACING: f64 = 0.035;
+const LEAST_LINES: usize = 3;
+const MOST_LINES: usize = 16;
 /// A unit is a pixel of a lens with this focal length, pixels.
 const FOCAL: f64 = 520.0;
 /// Standard deviation of the body's own contour, units: limbs are no cones.
@@ -42,6 +46,7 @@ struct Camera {
     number: u16,
     lens: Lens,
     model: ColorModel,
+    scene: Option<Scene>,
     labels: Labels,
     lines: Vec<Line>,
     /// What was found on each of them.
@@ -97,8 +102,19 @@ impl Regions {
         self.cameras.iter_mut().for_each(|camera| camera.known = false);
     }
 
-    /// Keeps what a camera sees without anybody.
-    pub fn set_background(&mut self, _camera: u16, _pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
+    /// Keeps what a camera sees without anybody: pictures with their heights and widths; none: forgets it.
+    pub fn set_background(&mut self, camera: u16, pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
+        let scene = if pictures.is_empty() { None } else { Some(Scene::of(pictures)?) };
+        self.camera(camera).scene = scene;
+        Ok(())
+    }
+
+    /// Refuses pictures that cannot be compared with those of the empty scene.
+    pub fn check(&self, frame: &Frame) -> Result<(), TrackError> {
+        for (index, picture) in frame.colors.iter().enumerate() {
+            let known = self.cameras.iter().find(|camera| camera.number == picture.camera);
+            known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
+        }
         Ok(())
     }
 
@@ -124,7 +140,7 @@ impl Regions {
 
     /// The edges of all limbs in all pictures, in the given step of a frame.
     pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
-        let reach = (REACH[step.min(REACH.len() - 1)] as f64 * crate::tune!("REACH", 1.0)) as usize;
+        let reach = REACH[step.min(REACH.len() - 1)];
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, reach, true, &mut found.regions);
@@ -146,12 +162,13 @@ impl Regions {
                 continue;
             };
             let unit = unit_of(&camera.lens);
-            let view = scan::View { picture, model: &camera.model, labels: &camera.labels, groups, unit };
+            let Camera { model, labels, scene, lines, edges, .. } = camera;
+            let view = scan::View { picture, model, labels, scene: scene.as_ref(), groups, unit };
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
-            camera.edges.clear();
-            for line in &camera.lines {
+            edges.clear();
+            for line in &*lines {
                 let found = scanner.edge(&view, line, reach, together);
-                camera.edges.push(found);
+                edges.push(found);
                 if together {
                     let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
                     evidence[usize::from(line.limb)].take(line.foot.z / length, found.map(|found| found.beside));
@@ -159,20 +176,8 @@ impl Regions {
                 let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
-                let information = crate::tune!("W", 1.0) as f32 * edge.information
-                    / (1.0 + edge.information * (crate::tune!("ME", 2.0) as f32).powi(2));
+                let information = edge.information / (1.0 + edge.information * MODEL_ERROR * MODEL_ERROR);
                 let limb = usize::from(line.limb);
-                let name = posed.body.limbs()[limb].name.as_str();
-                let information = information
-                    * if crate::tune!("LENW", 0.0) > 0.0 { (posed.body.limbs()[limb].shape.length() / crate::tune!("LENW", 0.0)) as f32 } else { 1.0 } * if line.width.is_infinite() { crate::tune!("RIMW", 1.0) as f32 } else { 1.0 } * if name.ends_with("foot") { crate::tune!("WFOOT", 1.0) as f32 } else if name.ends_with("hand") { crate::tune!("WHAND", 1.0) as f32 } else if name == "head" || name == "neck" { crate::tune!("WHEAD", 1.0) as f32 } else { 1.0 } * if name == "pelvis" {
-                        crate::tune!("WPEL", 1.0) as f32
-                    } else if name == "thorax" {
-                        crate::tune!("WTHO", 1.0) as f32
-                    } else if name.ends_with("clavicle") {
-                        crate::tune!("WCLA", 1.0) as f32
-                    } else {
-                        1.0
-                    };
                 pairs.push(RegionPair {
                     limb,
                     x: posed.poses[limb] * line.foot,
@@ -240,10 +245,8 @@ impl Regions {
         lines.clear();
         let viewer = Viewer { body, lens, labels, unit: unit_of(lens) };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
-            let length = body.limbs()[limb].shape.length();
-            let count = if crate::tune!("SPACING", 0.045) > 0.0 { (length / crate::tune!("SPACING", 0.045)).round().clamp(3.0, 16.0) as usize } else { 6 };
-            let heights: Vec<f64> = (0..count).map(|k| (k as f64 + 0.5) / count as f64).collect();
-            viewer.add(limb, pose, &heights, lines);
+            let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
+            viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
         }
     }
 
@@ -271,27 +274,17 @@ fn moved_on(before: &Pose, now: &Pose, share: f64) -> Pose {
     Pose::from_parts(now.translation + share * shift, Quat::from_scaled_axis(share * turn) * now.rotation)
 }
 
-/// Groups of limbs with the same colours: the two of a pair, and what hardly moves with what it is joined to.
+/// Groups of limbs with the same colours: the two of a pair.
 fn groups(body: &Body) -> Vec<u16> {
-    let stem = |name: &str| name.trim_start_matches("l_").trim_start_matches("r_").to_owned();
-    let limbs = body.limbs();
+    let stem = |limb: &Limb| limb.name.trim_start_matches("l_").trim_start_matches("r_").to_owned();
     let mut names: Vec<String> = Vec::new();
-    let mut groups: Vec<u16> = Vec::new();
-    for limb in limbs {
-        let carried = limb.parent.as_ref().filter(|(_, joint)| joint.motion < crate::tune!("CARRIED", 0.0)).map(|(parent, _)| *parent);
-        if let Some(parent) = carried {
-            groups.push(groups[parent]);
-            continue;
-        }
-        let name = stem(&limb.name);
-        let group = names.iter().position(|known| *known == name).unwrap_or_else(|| {
+    let group = |limb: &Limb| {
+        let name = stem(limb);
+        let known = names.iter().position(|known| *known == name);
+        known.unwrap_or_else(|| {
             names.push(name);
             names.len() - 1
-        });
-        groups.push(group as u16);
-    }
-    groups
+        }) as u16
+    };
+    body.limbs().iter().map(group).collect()
 }
-
-/// A joint whose motion is less than this, radians, carries a limb in the clothes of its parent: the clavicle.
-const CARRIED: f64 = 0.05;

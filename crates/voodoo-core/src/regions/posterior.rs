@@ -1,9 +1,7 @@
 //! Where along a line the edge of a limb is, from the log ratios of limb and surroundings at its samples.
 
-use crate::tune;
-
 /// Log ratios of neighbouring pixels err alike: so many of them tell as much as one.
-const TEMPERATURE: f32 = 6.0;
+const TEMPERATURE: f32 = 8.0;
 /// Greatest distance from the expected edge at which one is looked for, samples.
 pub(super) const MOST_REACH: usize = 24;
 
@@ -33,7 +31,7 @@ pub(super) fn edge(ratios: &[f32], reach: usize, width: usize) -> Edge {
     }
     let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
     for (index, sum) in sums.iter().enumerate() {
-        let share = ((sum - most) / tune!("T", 6.0) as f32).exp();
+        let share = ((sum - most) / TEMPERATURE).exp();
         let place = index as f32 - reach as f32;
         total += share;
         first += share * place;
@@ -42,10 +40,11 @@ pub(super) fn edge(ratios: &[f32], reach: usize, width: usize) -> Edge {
     let mean = first / total;
     let variance = (second / total - mean * mean).max(0.25);
     let flat = (count * count - 1) as f32 / 12.0;
-    let information = (1.0 / variance - 1.0 / flat).max(0.0);
-    if tune!("CORR", 1.0) > 0.0 && information > 0.0 {
-        let most = reach as f32 * tune!("MOST", 1.0) as f32;
-        return Edge { mean: (mean / (variance * information)).clamp(-most, most), information };
+    let information = 1.0 / variance - 1.0 / flat;
+    if information <= 0.0 {
+        return Edge::default();
     }
-    Edge { mean, information }
+    // The bounds of the search draw the mean to the middle; what is left without them lies farther out.
+    let most = reach as f32;
+    Edge { mean: (mean / (variance * information)).clamp(-most, most), information }
 }

@@ -5,6 +5,7 @@ use super::labels::{Labels, NOTHING};
 use super::lines::{BEFORE, BESIDE, Line};
 use super::models::ColorModel;
 use super::posterior::{Edge, MOST_REACH, edge};
+use super::scene::Scene;
 use crate::observation::frame::ColorImage;
 
 /// Log ratios are held to this: a colour never seen before proves little.
@@ -24,6 +25,7 @@ pub(super) struct View<'a> {
     pub picture: &'a ColorImage<'a>,
     pub model: &'a ColorModel,
     pub labels: &'a Labels,
+    pub scene: Option<&'a Scene>,
     pub groups: &'a [u16],
     pub unit: f32,
 }
@@ -55,11 +57,7 @@ impl Scanner {
         if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
             return None;
         }
-        let width = if together && line.both && line.width < crate::tune!("WIDE", 48.0) as f32 {
-            (line.width + 0.5) as usize
-        } else {
-            0
-        };
+        let width = if together && line.both && line.width < WIDEST as f32 { (line.width + 0.5) as usize } else { 0 };
         let count = 2 * reach + width;
         let start = 0.5 - (reach + width) as f32;
         for (index, ratio) in self.ratios[..count].iter_mut().enumerate() {
@@ -102,7 +100,8 @@ impl View<'_> {
         let bin = bin_of(&self.picture.pixels, pixel);
         let own = self.model.limbs[group].log[bin];
         let other = if other == NOTHING {
-            self.model.around[group].log[bin]
+            let around = self.model.around[group].log[bin];
+            self.scene.map_or(around, |scene| scene.log(pixel, self.picture.pixels.get(pixel), around))
         } else {
             let other = self.group(other);
             if other == group || !self.model.limbs[other].known {
@@ -110,10 +109,7 @@ impl View<'_> {
             }
             self.model.limbs[other].log[bin]
         };
-        {
-            let m = crate::tune!("CLIP", 2.0) as f32;
-            (own - other).clamp(-m, m)
-        }
+        (own - other).clamp(-MOST_RATIO, MOST_RATIO)
     }
 }
 

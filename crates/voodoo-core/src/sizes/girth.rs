@@ -23,7 +23,7 @@ const ASIDE_SIGMA: f64 = 0.01;
 /// Edges of following frames err alike: this many frames tell as much as one.
 const ALIKE: f64 = 10.0;
 /// So many frames are remembered: clothes move.
-const REMEMBERED: f64 = 100.0;
+pub(super) const REMEMBERED: f64 = 100.0;
 /// Fewer matched points than this tell nothing.
 const ENOUGH: usize = 15;
 

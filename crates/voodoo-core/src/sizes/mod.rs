@@ -160,7 +160,7 @@ impl Sizes {
             for (limb, outline) in self.outlines.iter_mut().enumerate() {
                 let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
                 let part = &model.body.limbs()[limb];
-                if part.match_caps[1] && crate::tune!("TIP", 1.0) > 0.0 {
+                if part.match_caps[1] {
                     let longer = outline.tip(&part.shape, &poses[limb], pairs.clone());
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
@@ -191,17 +191,22 @@ impl Sizes {
         if !self.pairs.is_empty() && !reliance.lost {
             self.refine_lengths(setting, model, poses, predicted, fit);
         }
-        if reliance.girths && !self.outlines.is_empty() && crate::tune!("FOLLOW", 1.0) > 0.0 {
-            fit.match_outline(setting.of(model), poses);
-            for (limb, outline) in self.outlines.iter_mut().enumerate() {
-                let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
-                if let Some(step) = outline.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
-                    model.body.change_girth(limb, step.shift, step.axes());
-                }
-            }
+        if reliance.girths && !self.outlines.is_empty() {
+            self.follow_outlines(setting, model, poses, fit);
         }
         if reliance.girths {
             self.refine_girths(model, fit, reliance.limb);
+        }
+    }
+
+    /// Draws the girths to the edges of colours.
+    fn follow_outlines(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
+        fit.match_outline(setting.of(model), poses);
+        for (limb, outline) in self.outlines.iter_mut().enumerate() {
+            let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
+            if let Some(step) = outline.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
+                model.body.change_girth(limb, step.shift, step.axes());
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-use super::girth::{GIRTH_SIGMA, GirthFit, SHIFT_SIGMA, girth_row, kernel};
+use super::girth::{GIRTH_SIGMA, GirthFit, REMEMBERED, SHIFT_SIGMA, girth_row, kernel};
 use crate::association::correspondence::RegionPair;
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
@@ -25,9 +25,7 @@ pub(super) struct Outline {
 
 impl Default for Outline {
     fn default() -> Self {
-        let shift = crate::tune!("SHIFTS", SHIFT_SIGMA);
-        let girth = crate::tune!("GIRTHS", GIRTH_SIGMA);
-        let sigmas = SVector::from([shift, shift, girth, girth, girth]);
+        let sigmas = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA]);
         Self {
             information: SMatrix::from_diagonal(&sigmas.map(|sigma: f64| 1.0 / (sigma * sigma))),
             total: GirthFit::default(),
@@ -52,7 +50,7 @@ fn asked<'a>(
         let n = working_from_limb.inverse_transform_vector(pair.normal);
         let girth = girth_row(shape, foot, n);
         let row = SVector::from([n.x, n.y, girth.x, girth.y, girth.z]);
-        let weight = kernel(pair.distance) * pair.information / crate::tune!("ALIKE", ALIKE);
+        let weight = kernel(pair.distance) * pair.information / ALIKE;
         h += weight * row * row.transpose();
         g += weight * pair.distance * row;
     }
@@ -116,8 +114,7 @@ impl Outline {
         let inverse = aside.try_inverse()?;
         let own = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
         let pull = g.fixed_rows::<3>(2) - mixed * inverse * g.fixed_rows::<2>(0);
-        let mut information =
-            self.information.fixed_view::<3, 3>(2, 2) * (1.0 - 1.0 / crate::tune!("REMEMBERED", 100.0));
+        let mut information = self.information.fixed_view::<3, 3>(2, 2) * (1.0 - 1.0 / REMEMBERED);
         information += own;
         let step = information.cholesky()?.solve(&pull);
         self.information.fixed_view_mut::<3, 3>(2, 2).copy_from(&information);

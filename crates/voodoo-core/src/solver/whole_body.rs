@@ -21,6 +21,8 @@ const STILL_FROM: usize = 3;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
+/// By contours alone every joint moves by so much at least, radians: no points hold a shoulder where it is not.
+const LEAST_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
@@ -147,11 +149,9 @@ impl WholeBody {
         self.joint_sigmas.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
-            let motion = if problem.correspondences.regions.is_empty() { motion } else { motion.max(crate::tune!("CLAVM", 0.1)) };
+            let motion = if problem.correspondences.regions.is_empty() { motion } else { motion.max(LEAST_MOTION) };
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
-            let measured = problem.correspondences.limbs[limb].total_weight()
-                + self.sites[limb]
-                + crate::tune!("SHOWN", 1.0) * self.edges[limb];
+            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }

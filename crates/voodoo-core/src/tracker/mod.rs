@@ -242,7 +242,8 @@ impl Tracker {
         if !self.is_started() && !self.relocalizer.finds(&self.model.body) {
             return Err(TrackError::NotInitialised);
         }
-        frame.check(&self.model.body, self.motion.stamp)
+        frame.check(&self.model.body, self.motion.stamp)?;
+        self.fit.regions().check(frame)
     }
 
     /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found. A track

@@ -203,9 +203,6 @@ impl Assessor {
             // Where no depth image looks, pictures tell.
             if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
                 now = [colors.own[0] * colors.shown, colors.against[0], colors.shown];
-                if std::env::var("TUNE_PRINT").is_ok() {
-                    eprintln!("{} {:?}", body.limbs()[limb].name, colors);
-                }
             }
             // What other sensors than depth cameras see of a limb no depth image disproves.
             support.known &= self.exclusive.clouds[limb] < FEW;
