@@ -33,7 +33,7 @@ pub use wanted::Options;
 /// The detector looks at what nobody explains this often at most, seconds.
 const LOOK_EVERY: f64 = 0.06;
 /// Two bodies whose roots are nearer than this are one, metres.
-const ONE_BODY: f64 = 0.25;
+const ONE_BODY: f64 = 0.3;
 /// Who was there for less than this is not remembered, seconds.
 const KNOWN_AFTER: f64 = 1.0;
 
