@@ -14,10 +14,13 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
+
 from voodoo.cli.common import say
 from voodoo.cli.people import body_of
 from voodoo.config import Config
 from voodoo.errors import VoodooError
+from voodoo.export.ros2 import instant
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.first_look import FirstLook
 from voodoo.live.follow import ONE, Follower, Step
@@ -26,14 +29,24 @@ from voodoo.live.session import Output, Session
 from voodoo.live.sources.words import source_of
 from voodoo.live.spool import Files
 from voodoo.live.stream import Live
+from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
+from voodoo.model.camera import Camera
 from voodoo.names import HumanModel
 from voodoo.people import People
 from voodoo.pipeline.start import Beginning, start_tracker, starts_of
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.settings import Box, FrontEndSettings
+from voodoo.synthetic.render import render_depth
+from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
 
+_STANDING = {
+    "l_shoulder": (2.4, 0.19, 1.42),
+    "r_shoulder": (2.4, -0.19, 1.42),
+    "l_hip": (2.4, 0.09, 0.93),
+    "r_hip": (2.4, -0.09, 0.93),
+}
 _TICK_S = 0.05
 _LINE_S = 1.0
 _SWITCH_S = 5e-4
@@ -101,6 +114,7 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
         VoodooError, OSError: a source or an output that failed.
     """
     done = Done()
+    warm_up()
     with _prompt_threads(), _signals() as signals, live:
         outputs, files = _outputs(live, wishes)
         session = Session(live, lambda frame: _follower(live, wishes, frame), outputs=outputs)
@@ -236,3 +250,19 @@ def _signals() -> Iterator[list[str]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def warm_up() -> None:
+    """Do once what the first frames would wait for: a small picture of somebody is tracked and put into messages."""
+    camera = Camera(80, 60, 66.0, 66.0, 39.5, 29.5)
+    body = Body.human(model="measured")
+    tracker = Tracker(body)
+    tracker.reset(joints=_STANDING, fit_sizes=False)
+    pose = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
+    seen = render_depth(body, tracker.estimate.world_from_limb, camera=camera, world_from_sensor=pose).depth
+    image = np.where(np.isfinite(seen) & (seen > 0.0), seen, 4.0).astype(np.float32)
+    follower = Follower(Tracker(Body.human(model="measured")))
+    for number in range(3):
+        item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
+        step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))
+    instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="1", topic="/warm")

@@ -16,6 +16,8 @@ _LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="
 <Internal><SocketReceiveBufferSize min="default"/></Internal></Domain></CycloneDDS>"""
 _MS = 1_000_000
 _domains: dict[int, Any] = {}
+_quiet: set[str] = set()
+"""What nodes of this process publish, and other ones of it shall not take for an offer."""
 _lock = threading.Lock()
 
 
@@ -56,11 +58,14 @@ def on_loopback() -> bool:
 class Node:
     """Topics of a ROS 2 network; it uses ROS_DOMAIN_ID, and this machine only where the environment says so.
 
+    Args:
+        quiet: what it publishes is no offer to other nodes of this process.
+
     Raises:
         VoodooError: `cyclonedds` is not installed, or no network.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, quiet: bool = False) -> None:
         """Join the network."""
         idl()
         from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
@@ -78,6 +83,7 @@ class Node:
         except DDSException as error:
             raise VoodooError(f"ROS 2: expected a network, found none: {error}") from error
         self._offers: dict[str, tuple[str, Offer]] = {}
+        self._is_quiet = quiet
 
     def offers(self) -> dict[str, Offer]:
         """Topic -> what is published on it now; of several the last."""
@@ -88,7 +94,7 @@ class Node:
             info = getattr(sample, "sample_info", None)
             alive = info is None or int(info.instance_state) == 16  # DDS_IST_ALIVE
             name = getattr(sample, "topic_name", "")
-            if not alive or not name.startswith("rt/"):
+            if not alive or not name.startswith("rt/") or key in _quiet:
                 self._offers.pop(key, None)
                 continue
             reliable = isinstance(sample.qos[Policy.Reliability], Policy.Reliability.Reliable)
@@ -102,8 +108,11 @@ class Node:
         return Subscription(self._participant, self._waitset, topic, offer, depth)
 
     def advertise(self, topic: str, kind: str, *, depth: int = 10) -> Publication:
-        """Publish on a topic, reliably."""
-        return Publication(self._participant, topic, kind, depth)
+        """Publish on a topic, reliably, as long as the publication is kept."""
+        made = Publication(self._participant, topic, kind, depth)
+        if self._is_quiet:
+            _quiet.add(made.key)
+        return made
 
     def wait(self, seconds: float) -> None:
         """Until something comes on a subscribed topic, for so long [s] at most."""
@@ -162,6 +171,11 @@ class Publication:
 
         self._type = dds_type(kind)
         self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", self._type), _qos(True, False, depth))
+
+    @property
+    def key(self) -> str:
+        """What tells it from all others."""
+        return str(self._writer.guid)
 
     def write(self, message: bytes) -> None:
         """Publish a message (CDR with its header)."""

@@ -45,7 +45,7 @@ STANDING = ("odom", "map", "base_link", "world")
 _KEPT_S = 10.0
 _JUMP_S = 1.0
 _TF_PATIENCE_S = 0.05
-_ROOT_PATIENCE_S = 1.0
+ROOT_PATIENCE_S = 1.0
 """How long the first frame waits for a chain of transforms to one of STANDING."""
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -73,6 +73,7 @@ class RosFeed:
 
     Attributes:
         unusable: messages of the first topic that could not become an arrival.
+        expects_transforms: somebody publishes transforms; what comes before them waits for ROOT_PATIENCE_S, then it counts.
     """
 
     def __init__(
@@ -95,6 +96,7 @@ class RosFeed:
         self._root = root_frame if sensor_pose is None else sensor_pose[0]
         self._since: float | None = None
         self._cameras: dict[str, _Calibrated] = {}
+        self.expects_transforms = True
 
     @property
     def root_frame(self) -> str:
@@ -137,8 +139,8 @@ class RosFeed:
                 self._take_transforms(message, static=topic.endswith("tf_static"))
             elif kind == CAMERA_INFO:
                 self._take_calibration(topic, message)
-            elif topic in self._topics and kind in MEASURED:
-                return [self._arrival(topic, kind, message, now)]
+            elif topic in self._topics and kind in MEASURED and self._knows_root(topic, message, now):
+                return [self._arrival(topic, kind, message)]
         except RecordingError as error:
             self._refuse(topic, error, kind_of(error, "unreadable message"))
         return []
@@ -178,13 +180,11 @@ class RosFeed:
                 self._cameras.pop(image, None)
                 raise Fault("calibration unusable", str(error)) from error
 
-    def _arrival(self, topic: str, kind: str, message: Message, now: float) -> Arrival:
+    def _arrival(self, topic: str, kind: str, message: Message) -> Arrival:
         stamp = stamp_of(message, topic)
         measured = _measured_as(topic, kind, message)
         drives = topic == self._topics[0]
         frame = frame_of(message)
-        if drives and self._since is None:
-            self._since = now
         measure = partial(self._measure, topic, kind, measured, message, stamp, frame)
         return Arrival(
             sensor=topic,
@@ -193,23 +193,26 @@ class RosFeed:
             measure=measure,
             drives=drives,
             ready=lambda: self._is_ready(frame, stamp),
-            patience=_TF_PATIENCE_S if self._root is not None else _ROOT_PATIENCE_S,
+            patience=_TF_PATIENCE_S,
         )
 
     def _is_ready(self, frame: str, stamp: float) -> bool:
-        if self._pose is not None:
-            return True
-        if self._root is not None:
-            return self._root == frame or self._tree.covers(self._root, frame, stamp)
-        return any(self._tree.covers(root, frame, stamp) for root in STANDING)
+        return self._pose is not None or self.root_frame == frame or self._tree.covers(self.root_frame, frame, stamp)
 
-    def _root_of(self, frame: str, stamp: float) -> str:
-        """The root frame; chosen when the first frame is made."""
-        if self._root is None:
-            reached = [root for root in STANDING if root in self._tree.frames and self._leads(root, frame)]
-            self._root = next(iter(reached), frame)
-            self._faults.say(f"root frame {self._root!r}")
-        return self._root
+    def _knows_root(self, topic: str, message: Message, now: float) -> bool:
+        """Choose the root frame, if that can be done by now; before, nothing is measured."""
+        if self._root is not None:
+            return True
+        if topic != self._topics[0]:
+            return False
+        frame = frame_of(message)
+        self._since = now if self._since is None else self._since
+        reached = [root for root in STANDING if root in self._tree.frames and self._leads(root, frame)]
+        if not reached and self.expects_transforms and now - self._since < ROOT_PATIENCE_S:
+            return False
+        self._root = next(iter(reached), frame)
+        self._faults.say(f"root frame {self._root!r}")
+        return True
 
     def _leads(self, root: str, frame: str) -> bool:
         try:
@@ -221,9 +224,8 @@ class RosFeed:
     def _root_from_sensor(self, topic: str, frame: str, stamp: float) -> FloatArray:
         if self._pose is not None and topic == self._topics[0]:
             return self._pose[1]
-        root = self._root_of(frame, stamp)
         try:
-            return self._tree.lookup(root, frame, stamp)
+            return self._tree.lookup(self.root_frame, frame, stamp)
         except RecordingError as error:
             raise Fault(kind_of(error, "transform missing"), f"{topic}, stamp {stamp:.6f}: {error}") from error
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from voodoo._core import Estimate
 from voodoo.export.ros2 import instant
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Publication
 from voodoo.live.ros2.types import IDS, STORE
 from voodoo.live.session import Output
+from voodoo.model.body import Body
+from voodoo.pipeline.search import nobody
 
 TRACKED = "/humans/bodies/tracked"
 
@@ -29,30 +32,32 @@ class Ros2Output(Output):
     def __init__(self, root_frame: Callable[[], str], *, node: Node | None = None) -> None:
         """Join the network."""
         self._root = root_frame
-        self._node = Node() if node is None else node
+        self._node = Node(quiet=True) if node is None else node
         self._topics: dict[str, Publication] = {}
         self._shown: set[int] = set()
+        self._bodies: dict[int, Body] = {}
         self._publish_on("/tf", "tf2_msgs/msg/TFMessage", 100)
         self._publish_on(TRACKED, IDS, 1)
+        # Who listens finds them before the first pose.
+        self._publish_on(f"{_body(1)}/joint_states", "sensor_msgs/msg/JointState", 10)
+        self._publish_on(f"{_body(1)}/markers", "visualization_msgs/msg/MarkerArray", 10)
 
     def publish(self, step: Step) -> None:
         """See Output."""
-        there = []
-        for number, estimate in step.estimates.items():
-            seen = bool(estimate.joints) and str(estimate.status) != "lost"
-            if not seen and number not in self._shown:
-                continue
-            self._shown.discard(number)
-            topic = f"/humans/bodies/body_{number}"
-            messages = instant(estimate, step.bodies[number], root_frame=self._root(), person=str(number), topic=topic)
-            if seen:
-                there.append(str(number))
-                self._shown.add(number)
-            else:
-                continue
-            for name, message in messages.items():
-                self._write(name, message)
-        self._write(TRACKED, self._ids(step.stamp, there))
+        seen = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
+        for number in sorted(seen):
+            self._write_person(number, step.estimates[number], step.bodies[number])
+        for number in sorted(self._shown - seen):
+            # Their markers go, once.
+            self._write_person(number, nobody(step.stamp), step.bodies.get(number, self._bodies[number]))
+        self._shown = seen
+        self._bodies = {number: step.bodies[number] for number in seen}
+        self._write(TRACKED, self._ids(step.stamp, [str(number) for number in sorted(seen)]))
+
+    def _write_person(self, number: int, estimate: Estimate, body: Body) -> None:
+        messages = instant(estimate, body, root_frame=self._root(), person=str(number), topic=_body(number))
+        for name, message in messages.items():
+            self._write(name, message)
 
     def _ids(self, stamp: float, there: list[str]) -> object:
         seconds, rest = divmod(round(stamp * 1e9), 1_000_000_000)
@@ -68,3 +73,7 @@ class Ros2Output(Output):
     def _write(self, topic: str, message: object) -> None:
         kind = message.__msgtype__  # type: ignore[attr-defined]
         self._publish_on(topic, kind, 10).write(bytes(STORE.serialize_cdr(message, kind)))
+
+
+def _body(number: int) -> str:
+    return f"/humans/bodies/body_{number}"

@@ -83,7 +83,8 @@ def dds_type(kind: str) -> Any:  # noqa: ANN401 - a class made at run time
         VoodooError: `cyclonedds` is not installed, or an unknown type.
     """
     made = _struct(kind, topic=True)
-    made.serialize, made.deserialize = _serialize, classmethod(_deserialize)
+    made.serialize = _serialize
+    made.deserialize = made.deserialize_key = classmethod(_deserialize)
     return made
 
 

@@ -93,6 +93,7 @@ class Ros2Source(Source):
         assert self._node is not None
         assert self._feed is not None
         offers = self._node.offers()
+        self._feed.expects_transforms = bool({"/tf", "/tf_static"} & offers.keys())
         for topic in self._topics:
             offer = offers.get(topic)
             if offer is None or topic in self._subscriptions:
