@@ -61,7 +61,7 @@ def test_the_report_counts_every_frame(run):
 
 def test_all_files_tell_the_same(run):
     track = Track.load(run[0] / "pose.npz")
-    assert len(track) == json.loads((run[0] / "r.json").read_text())["published"]
+    assert len(track) == json.loads((run[0] / "r.json").read_text())["tracked"]
     assert (np.diff(track.stamps) > 0).all()
     np.testing.assert_allclose(Track.load(run[0] / "pose.csv").joints, track.joints, atol=1e-6)
     assert (run[0] / "pose.bvh").read_text().startswith("HIERARCHY")
@@ -141,8 +141,8 @@ def test_signals_finish_files(tmp_path, number):
         told = process.communicate(timeout=20)[1]
     assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number], told
     report = json.loads((tmp_path / "r.json").read_text())
-    assert len(Track.load(tmp_path / "p.csv")) == report["published"] > 0
-    assert len(open_recording(tmp_path / "t.mcap")) == report["published"]
+    assert len(Track.load(tmp_path / "p.csv")) == report["tracked"] > 0
+    assert len(open_recording(tmp_path / "t.mcap")) == report["tracked"]
     assert "wrote p.csv" in told
 
 

@@ -236,6 +236,7 @@ class Session:
             "latency_from": self.latency_from,
             "tracking_ms": _milliseconds(self.tracking),
             "received": self.live.received,
+            "tracked": self.tracking.count,
             "published": self.published,
             "with_pose": self.with_pose,
             "dropped": self.dropped,
