@@ -17,6 +17,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
@@ -177,11 +178,13 @@ def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[
 
 def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, person: str, nanoseconds: int) -> list[Any]:
     frames = frame_poses(track, posed, index, person)
+    poses = np.array([pose for _, pose in frames.values()])
+    above = np.array([np.eye(4) if parent is None else frames[parent][1] for parent, _ in frames.values()])
+    relative = np.linalg.inv(above) @ poses
+    turns = Rotation.from_matrix(relative[:, :3, :3]).as_quat().tolist()
+    places = relative[:, :3, 3].tolist()
     result = []
-    for name, (parent, pose) in frames.items():
-        relative = pose if parent is None else np.linalg.inv(frames[parent][1]) @ pose
-        x, y, z = (float(value) for value in relative[:3, 3])
-        qx, qy, qz, qw = (float(value) for value in Rotation.from_matrix(relative[:3, :3]).as_quat())
+    for (name, (parent, _)), (x, y, z), (qx, qy, qz, qw) in zip(frames.items(), places, turns, strict=True):
         result.append(
             _new(
                 "geometry_msgs/msg/TransformStamped",
@@ -199,12 +202,13 @@ def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, pers
 
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
     result = []
-    for number, (limb, pose) in enumerate(zip(body.limbs, track.world_from_limb[index], strict=True)):
+    poses = track.world_from_limb[index]
+    turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    for number, (limb, pose) in enumerate(zip(body.limbs, poses, strict=True)):
         middle = pose[:3, :3] @ np.array([0.0, 0.0, limb.shape.length / 2]) + pose[:3, 3]
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
         rgb = (0.9, 0.6, 0.3) if limb.name.startswith("l_") else (0.3, 0.6, 0.9)
-        turn = Rotation.from_matrix(pose[:3, :3]).as_quat()
-        result.append(_marker(header, "limbs", number, _CYLINDER, middle, turn, size, rgb, []))
+        result.append(_marker(header, "limbs", number, _CYLINDER, middle, turns[number], size, rgb, []))
     points = [_point(position) for position in track.joints[index]]
     still = np.array([0.0, 0.0, 0.0, 1.0])
     result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
@@ -291,3 +295,28 @@ def _middle(sites: dict[str, FloatArray], joint: str, otherwise: FloatArray) -> 
     if both[0] is None or both[1] is None:
         return otherwise
     return np.asarray((both[0] + both[1]) / 2.0)
+
+
+def instant(
+    estimate: Estimate, body: Body, *, root_frame: str, person: str, topic: str, markers: bool = True
+) -> dict[str, Any]:
+    """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
+
+    Args:
+        estimate: of the frame; without a pose (status "searching") there are no transforms and no joint states.
+        body: in its current sizes.
+        root_frame: frame of the estimate.
+        person: REP-155 id.
+        topic: begins the names of the person's topics, e.g. "/humans/bodies/body_1".
+        markers: also make the markers.
+
+    Raises:
+        VoodooError: a stamp before zero.
+    """
+    human = _Human(Track.of([estimate]), body, person, topic)
+    return human.messages(0, root_frame, markers=markers)
+
+
+def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition
+    """A message as ROS 2 sends and stores it."""
+    return bytes(_STORE.serialize_cdr(message, message.__msgtype__))

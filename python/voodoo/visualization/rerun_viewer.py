@@ -26,6 +26,7 @@ from voodoo.sensors.adapters import Memory, adapter_of
 from voodoo.visualization.body_geometry import bands, limb_colours, limb_mesh
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.rerun_log import StepLog, entity
+from voodoo.visualization.rerun_server import Server
 
 _MOST_POINTS = 40_000
 _EPOCH_S = 1e9
@@ -44,13 +45,17 @@ class Viewer:
     Args:
         save: .rrd file to write; None opens the viewer.
         name: of the recording, shown in the viewer.
+        serve: PORT, or HOST:PORT: show it to browsers there instead, see `voodoo.visualization.rerun_server`.
+
+    Attributes:
+        address: where a browser finds it; "" where it is not served.
 
     Raises:
         VoodooError: Rerun is not installed, another suffix, or a viewer that cannot open here.
         OSError: the file cannot be written.
     """
 
-    def __init__(self, *, save: str | Path | None = None, name: str = "voodoo") -> None:
+    def __init__(self, *, save: str | Path | None = None, name: str = "voodoo", serve: str | None = None) -> None:
         """Open the file or the viewer."""
         self._rr = _rerun()
         if save is not None and Path(save).suffix != ".rrd":
@@ -58,7 +63,11 @@ class Viewer:
         how = {} if save is None else _large_chunks(self._rr)
         self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, **how)
         self._stream.send_recording_name(name)
-        if save is None:
+        self._server: Server | None = None
+        if serve is not None:
+            self._server = Server(serve)
+            self._stream.connect_grpc(self._server.data)
+        elif save is None:
             self._open()
         else:
             Path(save).parent.mkdir(parents=True, exist_ok=True)
@@ -94,6 +103,13 @@ class Viewer:
         """Write what is still held back, and close the file."""
         self._stream.flush()
         self._stream.disconnect()
+        if self._server is not None:
+            self._server.close()
+
+    @property
+    def address(self) -> str:
+        """See the class."""
+        return "" if self._server is None else self._server.address
 
     def log(
         self,
