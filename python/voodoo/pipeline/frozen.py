@@ -39,7 +39,8 @@ class FrozenSensors:
         real sensors have noise. Only kinds in `use` count. What is `idle` is not used in this frame; pictures would have to be
         decoded for it, so it is looked at only where another sensor repeats itself.
         """
-        repeats, changes = [], False
+        repeats: list[Measurement] = []
+        changes = False
         for item in sorted(measurements, key=idle):
             adapter = adapter_of(item)
             if idle(item) and not repeats:
