@@ -11,7 +11,7 @@ HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "rosbags", "pydantic", "tomlkit"
 TYPERS_OWN = "pydantic"
 """Typer checks the options of a command with it, even for its help."""
 LIMIT_S = 0.2
-COMMANDS = ("track", "demo", "init", "ik", "eval", "info", "config", "body")
+COMMANDS = ("track", "live", "demo", "init", "ik", "eval", "info", "config", "body")
 CALLS = [["--version"], ["--help"], *([command, "--help"] for command in COMMANDS)]
 
 

@@ -83,6 +83,7 @@ _ROOMS = (
     "evaluation",
     "export",
     "ik",
+    "live",
     "measurements",
     "model",
     "people",

@@ -13,6 +13,7 @@ from voodoo.cli.demo import demo_command
 from voodoo.cli.evaluate import eval_command
 from voodoo.cli.ik import ik_command
 from voodoo.cli.init import init_command
+from voodoo.cli.live import live_command
 from voodoo.cli.show import body_command, config_command, info_command
 from voodoo.cli.track import track_command
 
@@ -56,6 +57,7 @@ def voodoo_command(
 
 # In the order of `voodoo --help`.
 app.command("track", short_help="Track the body through a recording: a row a frame.")(track_command)
+app.command("live", short_help="Track what a camera, ROS 2 or a played recording measures.")(live_command)
 app.command("demo", short_help="Track the bundled recording and draw what is found.")(demo_command)
 app.command("init", short_help="Find the first pose and write it, to edit and give back.")(init_command)
 app.command("ik", short_help="Find postures from a few known sites and silhouettes.")(ik_command)

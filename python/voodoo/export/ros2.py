@@ -17,6 +17,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
@@ -33,7 +34,8 @@ FRAMES = {"pelvis": "waist", "thorax": "torso", "torso": "torso", "head": "head"
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
 _TF = "tf2_msgs/msg/TFMessage"
-_CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 1, 7, 0, 3
+_POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+_SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
 
 
 def write_bag(
@@ -42,8 +44,10 @@ def write_bag(
     """Write a new bag folder.
 
     Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
-    `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints).
-    Searching frames have no transforms and no joint states; their markers delete those of the frame before.
+    `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints, and
+    where these are known ellipsoids of one standard deviation about them). Where it is known how far the body may be off,
+    `/humans/bodies/<person>/pose` (geometry_msgs/PoseWithCovarianceStamped) is the pose of `body_<person>` with its covariance.
+    Searching frames have no transforms, no joint states and no pose; their markers delete those of the frame before.
 
     Args:
         path: the folder, which must not exist.
@@ -100,6 +104,7 @@ class _Human:
     def kinds(self, markers: bool) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
         kinds = {f"{self.topic}/joint_states": "sensor_msgs/msg/JointState"}
+        kinds |= {f"{self.topic}/pose": _POSE} if np.isfinite(self.track.root_covariance).any() else {}
         return kinds | ({f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"} if markers else {})
 
     def messages(self, index: int, root_frame: str, *, markers: bool) -> dict[str, Any]:
@@ -119,6 +124,9 @@ class _Human:
                 velocity=np.empty(0),
                 effort=np.empty(0),
             )
+            if np.isfinite(self.track.root_covariance[index]).all():
+                pose = _body_pose(self.track, self._posed, index, self.person)
+                messages[f"{self.topic}/pose"] = _new(_POSE, header=header, pose=pose)
         if markers:
             drawn = _markers(self.track, self.body, index, header) if self._shown[index] else [_no_markers(header)]
             messages[f"{self.topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
@@ -177,11 +185,13 @@ def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[
 
 def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, person: str, nanoseconds: int) -> list[Any]:
     frames = frame_poses(track, posed, index, person)
+    poses = np.array([pose for _, pose in frames.values()])
+    above = np.array([np.eye(4) if parent is None else frames[parent][1] for parent, _ in frames.values()])
+    relative = np.linalg.inv(above) @ poses
+    turns = Rotation.from_matrix(relative[:, :3, :3]).as_quat().tolist()
+    places = relative[:, :3, 3].tolist()
     result = []
-    for name, (parent, pose) in frames.items():
-        relative = pose if parent is None else np.linalg.inv(frames[parent][1]) @ pose
-        x, y, z = (float(value) for value in relative[:3, 3])
-        qx, qy, qz, qw = (float(value) for value in Rotation.from_matrix(relative[:3, :3]).as_quat())
+    for (name, (parent, _)), (x, y, z), (qx, qy, qz, qw) in zip(frames.items(), places, turns, strict=True):
         result.append(
             _new(
                 "geometry_msgs/msg/TransformStamped",
@@ -197,17 +207,44 @@ def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, pers
     return result
 
 
+def _body_pose(track: Track, posed: Skeleton, index: int, person: str) -> Any:  # noqa: ANN401
+    """The pose of the body's frame with its covariance, moved there from the origin of the first limb's frame."""
+    _, pose = frame_poses(track, posed, index, person)[f"body_{person}"]
+    x, y, z = pose[:3, 3] - track.world_from_limb[index, 0, :3, 3]
+    moved = np.eye(6)
+    moved[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    turn = [float(value) for value in Rotation.from_matrix(pose[:3, :3]).as_quat()]
+    return _new(
+        "geometry_msgs/msg/PoseWithCovariance",
+        pose=_new(
+            "geometry_msgs/msg/Pose",
+            position=_point(pose[:3, 3]),
+            orientation=_new("geometry_msgs/msg/Quaternion", x=turn[0], y=turn[1], z=turn[2], w=turn[3]),
+        ),
+        covariance=(moved @ track.root_covariance[index] @ moved.T).ravel(),
+    )
+
+
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
     result = []
-    for number, (limb, pose) in enumerate(zip(body.limbs, track.world_from_limb[index], strict=True)):
+    poses = track.world_from_limb[index]
+    turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    for number, (limb, pose) in enumerate(zip(body.limbs, poses, strict=True)):
         middle = pose[:3, :3] @ np.array([0.0, 0.0, limb.shape.length / 2]) + pose[:3, 3]
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
         rgb = (0.9, 0.6, 0.3) if limb.name.startswith("l_") else (0.3, 0.6, 0.9)
-        turn = Rotation.from_matrix(pose[:3, :3]).as_quat()
-        result.append(_marker(header, "limbs", number, _CYLINDER, middle, turn, size, rgb, []))
+        result.append(_marker(header, "limbs", number, _CYLINDER, middle, turns[number], size, rgb, []))
     points = [_point(position) for position in track.joints[index]]
     still = np.array([0.0, 0.0, 0.0, 1.0])
     result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
+    for number, covariance in enumerate(track.covariance[index]):
+        if np.isfinite(covariance).all():
+            variances, axes = np.linalg.eigh(covariance)
+            axes[:, 0] *= np.sign(np.linalg.det(axes))
+            turn, radii = Rotation.from_matrix(axes).as_quat(), np.sqrt(np.maximum(variances, 0.0))
+            size = (2.0 * radii[0], 2.0 * radii[1], 2.0 * radii[2])
+            place = track.joints[index, number]
+            result.append(_marker(header, "uncertainty", number, _SPHERE, place, turn, size, (0.9, 0.9, 0.9), [], 0.3))
     return result
 
 
@@ -229,6 +266,7 @@ def _marker(
     size: tuple[float, float, float],
     rgb: tuple[float, float, float],
     points: list[Any],
+    opacity: float = 0.6,
 ) -> Any:  # noqa: ANN401
     x, y, z, w = (float(value) for value in turn)
     no_image = _new(
@@ -247,7 +285,7 @@ def _marker(
             orientation=_new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
         ),
         scale=_new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
-        color=_new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=0.6),
+        color=_new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
         lifetime=_new("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
         frame_locked=False,
         points=points,
@@ -291,3 +329,28 @@ def _middle(sites: dict[str, FloatArray], joint: str, otherwise: FloatArray) -> 
     if both[0] is None or both[1] is None:
         return otherwise
     return np.asarray((both[0] + both[1]) / 2.0)
+
+
+def instant(
+    estimate: Estimate, body: Body, *, root_frame: str, person: str, topic: str, markers: bool = True
+) -> dict[str, Any]:
+    """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
+
+    Args:
+        estimate: of the frame; without a pose (status "searching") there are no transforms and no joint states.
+        body: in its current sizes.
+        root_frame: frame of the estimate.
+        person: REP-155 id.
+        topic: begins the names of the person's topics, e.g. "/humans/bodies/body_1".
+        markers: also make the markers.
+
+    Raises:
+        VoodooError: a stamp before zero.
+    """
+    human = _Human(Track.of([estimate]), body, person, topic)
+    return human.messages(0, root_frame, markers=markers)
+
+
+def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition
+    """A message as ROS 2 sends and stores it."""
+    return bytes(_STORE.serialize_cdr(message, message.__msgtype__))

@@ -50,15 +50,16 @@ def bones(body: Body) -> tuple[Bone, ...]:
     poses: list[tuple[FloatArray, FloatArray]] = []
     _, limbs, _ = body.core.parts()
     names = [limb[0] for limb in limbs]
+    axes = [place[1] for limb in limbs if limb[3] is not None for place in limb[3][1:3]]
+    from_joints = iter(Rotation.from_rotvec(np.array(axes, dtype=np.float64).reshape(-1, 3)).as_matrix())
     for name, parent, shape, joint, _ in limbs:
-        if parent is None or joint is None:
+        if joint is None or parent is None:
             turn, shift, place, above, joint_name = np.eye(3), np.zeros(3), np.zeros(3), None, name
         else:
             above = names.index(parent)
             joint_name, on_parent, on_limb = joint[:3]
             parent_turn, parent_shift = poses[above]
-            parent_from_joint = Rotation.from_rotvec(on_parent[1]).as_matrix()
-            limb_from_joint = Rotation.from_rotvec(on_limb[1]).as_matrix()
+            parent_from_joint, limb_from_joint = next(from_joints), next(from_joints)
             turn = parent_turn @ parent_from_joint @ limb_from_joint.T
             place = np.asarray(on_limb[0], dtype=np.float64)
             shift = parent_turn @ np.asarray(on_parent[0]) + parent_shift - turn @ place

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import deque
 from itertools import pairwise
 
@@ -67,13 +67,19 @@ class _Edge:
 
     def add(self, stamp: float, transform: FloatArray, *, static: bool) -> None:
         if static:
-            self.stamps, self.transforms = [stamp], [transform]
+            self.stamps, self.transforms, self.constant = [stamp], [transform], True
             return
         if self.transforms and not np.array_equal(self.transforms[0], transform):
             self.constant = False
         at = bisect_right(self.stamps, stamp)
         self.stamps.insert(at, stamp)
         self.transforms.insert(at, transform)
+
+    def keep(self, since: float, until: float) -> None:
+        low, high = bisect_left(self.stamps, since), bisect_right(self.stamps, until)
+        # The newest that is too old still tells something: errors name its age.
+        low = min(low, max(len(self.stamps) - 1, 0))
+        self.stamps, self.transforms = self.stamps[low:high], self.transforms[low:high]
 
     def moves(self) -> bool:
         """Whether any transform is farther from the first one than odometry wavers."""
@@ -128,6 +134,20 @@ class TransformTree:
             self._neighbours.setdefault(parent, []).append(child)
             self._neighbours.setdefault(child, []).append(parent)
         self._edges[parent, child].add(stamp, transform, static=static)
+
+    def keep(self, since: float, until: float) -> None:
+        """Forget what changing transforms were before and after these stamps [s]: a live source has no end."""
+        for edge in self._edges.values():
+            if not edge.constant:
+                edge.keep(since, until)
+
+    def covers(self, root: str, frame: str, stamp: float) -> bool:
+        """Whether every changing transform between two frames is known up to a stamp [s]; False where there is no chain."""
+        try:
+            edges = [self._edge(a, b)[0] for a, b in pairwise(self.path(root, frame))]
+        except RecordingError:
+            return False
+        return all(edge.constant or (bool(edge.stamps) and edge.stamps[-1] >= stamp) for edge in edges)
 
     def path(self, root: str, frame: str) -> list[str]:
         """Frames from `root` to `frame`, both included.
@@ -190,6 +210,11 @@ class TransformTree:
     def _at(self, edge: _Edge, stamp: float, a: str, b: str) -> FloatArray:
         if edge.constant:
             return edge.transforms[0]
+        if not edge.stamps:
+            raise RecordingError(
+                f"{self.source}: expected a transform between {a!r} and {b!r} near stamp {stamp:.6f}, found none",
+                reason="without a transform near its stamp",
+            )
         index = max(bisect_right(edge.stamps, stamp) - 1, 0)
         span = edge.stamps[index + 1] - edge.stamps[index] if index + 1 < len(edge.stamps) else math.inf
         if stamp > edge.stamps[index] and span <= 2.0 * self.max_age:

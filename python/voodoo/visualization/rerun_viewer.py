@@ -14,6 +14,7 @@ from types import ModuleType, TracebackType
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.errors import VoodooError
@@ -26,6 +27,7 @@ from voodoo.sensors.adapters import Memory, adapter_of
 from voodoo.visualization.body_geometry import bands, limb_colours, limb_mesh
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.rerun_log import StepLog, entity
+from voodoo.visualization.rerun_server import Server
 
 _MOST_POINTS = 40_000
 _EPOCH_S = 1e9
@@ -36,7 +38,8 @@ _SEEN_M = 0.002
 class Viewer:
     """Writes what happens in a step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
-    Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/bands`, `world/points/<source>` (coloured by
+    Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/uncertainty` (one standard
+    deviation of each joint), `world/body/bands`, `world/points/<source>` (coloured by
     the limb they lie on), `world/laser/<source>`, `world/markers/<source>`, `world/rays`, `world/cameras/<source>`
     (pictures with the outlines of the projected limbs, skin candidates and keypoints; in depth images the person's
     silhouette, limb by limb), `plots/...`; the timeline is `time`.
@@ -44,13 +47,17 @@ class Viewer:
     Args:
         save: .rrd file to write; None opens the viewer.
         name: of the recording, shown in the viewer.
+        serve: PORT, or HOST:PORT: show it to browsers there instead, see `voodoo.visualization.rerun_server`.
+
+    Attributes:
+        address: where a browser finds it; "" where it is not served.
 
     Raises:
         VoodooError: Rerun is not installed, another suffix, or a viewer that cannot open here.
         OSError: the file cannot be written.
     """
 
-    def __init__(self, *, save: str | Path | None = None, name: str = "voodoo") -> None:
+    def __init__(self, *, save: str | Path | None = None, name: str = "voodoo", serve: str | None = None) -> None:
         """Open the file or the viewer."""
         self._rr = _rerun()
         if save is not None and Path(save).suffix != ".rrd":
@@ -58,7 +65,11 @@ class Viewer:
         how = {} if save is None else _large_chunks(self._rr)
         self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, **how)
         self._stream.send_recording_name(name)
-        if save is None:
+        self._server: Server | None = None
+        if serve is not None:
+            self._server = Server(serve)
+            self._stream.connect_grpc(self._server.data)
+        elif save is None:
             self._open()
         else:
             Path(save).parent.mkdir(parents=True, exist_ok=True)
@@ -94,6 +105,13 @@ class Viewer:
         """Write what is still held back, and close the file."""
         self._stream.flush()
         self._stream.disconnect()
+        if self._server is not None:
+            self._server.close()
+
+    @property
+    def address(self) -> str:
+        """See the class."""
+        return "" if self._server is None else self._server.address
 
     def log(
         self,
@@ -209,7 +227,25 @@ class Viewer:
             f"{path}/joints",
             rr.Points3D(estimate.joint_positions, radii=0.012, labels=list(estimate.joint_names), show_labels=False),
         )
+        self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
+
+    def _log_spread(self, path: str, estimate: Estimate) -> None:
+        """Ellipsoids within which joints are to one standard deviation."""
+        covariances = estimate.joint_covariances
+        if not hasattr(self._rr, "Ellipsoids3D") or not len(covariances) or not np.isfinite(covariances).all():
+            return
+        variances, axes = np.linalg.eigh(covariances)
+        axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
+        self._stream.log(
+            path,
+            self._rr.Ellipsoids3D(
+                centers=estimate.joint_positions,
+                half_sizes=np.sqrt(np.maximum(variances, 0.0)),
+                quaternions=Rotation.from_matrix(axes).as_quat(),
+                colors=(255, 255, 255, 90),
+            ),
+        )
 
     def _log_rays(self, front_end: FrontEnd, estimate: Estimate) -> None:
         strips, colours, labels = [], [], []

@@ -1,0 +1,149 @@
+"""`voodoo live`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both, say, topics_of
+from voodoo.cli.options import (
+    BodyOption,
+    ConfigOption,
+    ExcludeOption,
+    FrameOption,
+    HeightOption,
+    InitOption,
+    LoaderNumberOption,
+    LoaderOption,
+    ModelOption,
+    PeopleOption,
+    TopicOption,
+    UseOption,
+)
+
+TERMINATED = 143
+"""Exit code after SIGTERM."""
+
+
+def live_command(
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SOURCE...",
+            help="realsense[:SERIAL], ros2:TOPIC[,TOPIC...], grow:FOLDER, or a recording that is played.",
+        ),
+    ],
+    init: InitOption = None,
+    body: BodyOption = None,
+    height: HeightOption = None,
+    model: ModelOption = None,
+    config: ConfigOption = None,
+    people: PeopleOption = "1",
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE", help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable."
+        ),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mcap",
+            help="Write inputs and results, for voodoo track to read: it stores pictures of people.",
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Write rate, latency, drops and faults at the end.")
+    ] = None,
+    duration: Annotated[float | None, typer.Option(metavar="S", min=0.0, help="End after so many seconds.")] = None,
+    rate: Annotated[float, typer.Option(metavar="N", help="How many times as fast a recording is played.")] = 1.0,
+    loop: Annotated[bool, typer.Option("--loop", help="Play a recording again and again.")] = False,
+    publish: Annotated[
+        bool | None,
+        typer.Option(
+            "--publish/--no-publish",
+            help="Publish transforms, joint states and markers on ROS 2; by default where a source is ros2.",
+        ),
+    ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
+    ] = False,
+    serve: Annotated[
+        str | None,
+        typer.Option(metavar="[HOST:]PORT", help="Show it in a browser: Rerun's web viewer; on 127.0.0.1 unless told."),
+    ] = None,
+    use: UseOption = None,
+    depth_range: Annotated[
+        str | None,
+        typer.Option(metavar="NEAR,FAR", help="Leave out depth beyond these metres, and flying pixels at edges."),
+    ] = None,
+    calibration: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE.toml", help="Where a camera is (root_frame, root_from_sensor): one for each SOURCE, in order."
+        ),
+    ] = None,
+    exclude: ExcludeOption = None,
+    frame: FrameOption = None,
+    topic: TopicOption = None,
+    option: LoaderNumberOption = None,
+    loader: LoaderOption = None,
+) -> None:
+    """Track what a source measures, as it comes: the newest frame each time; what comes too fast is dropped and counted.
+
+    Ends after --duration, with the recording, or with Ctrl-C or SIGTERM; files are finished then.
+    Once a second a line on stderr says rate, latency, drops and the status of each person.
+    What is wrong with the source is named there and counted.
+
+    Examples
+
+    voodoo live walk_bag/ --rate 1 --out walk.csv --report walk.json
+
+    voodoo live realsense --out pose.csv --record take1.mcap
+
+    voodoo live ros2:/camera/depth/image_rect_raw --people any --report live.json
+    """
+    from voodoo.cli.live_run import Wishes, entered, run
+    from voodoo.cli.people import limit_of, no_starts
+    from voodoo.cli.running import boxes_of, config_of, depth_filter_of, kinds_of
+    from voodoo.export.files import check_target
+    from voodoo.pipeline.start import beginning_of
+
+    with clear_errors():
+        refuse_both("--body", body, **{"--height": height, "--model": model})
+        refuse_both("--view", view or None, **{"--serve": serve})
+        several, limit = limit_of(people)
+        for target in out or ():
+            check_target(target, inputs=[Path(source) for source in sources])
+        wishes = Wishes(
+            beginning=no_starts(init) if several else beginning_of(init),
+            body=body,
+            height=height,
+            model=model,
+            config=config_of(config),
+            several=several,
+            limit=limit,
+            kinds=kinds_of(use),
+            depth_filter=depth_filter_of(depth_range),
+            boxes=boxes_of(exclude),
+            targets=tuple(out or ()),
+            record=record,
+            view=view,
+            serve=serve,
+            publish=any(source.startswith("ros2:") for source in sources) if publish is None else publish,
+        )
+        options: dict[str, Any] = {**topics_of(topic), **numbers_of(option)}
+        if loader is not None:
+            options["loader"] = loader
+        source = entered(
+            sources, calibration or (), rate=rate, loop=loop, root_frame=frame, options=options, several=several
+        )
+        done = run(source, wishes, duration=duration, report=report)
+        for path in done.written:
+            say(f"wrote {path}")
+        if done.signal == "SIGINT":
+            raise typer.Exit(INTERRUPTED)
+        if done.signal:
+            raise typer.Exit(TERMINATED)

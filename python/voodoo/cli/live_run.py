@@ -1,0 +1,268 @@
+"""What `voodoo live` does: open sources, follow, publish until a signal. Imported when the command runs, not for its help."""
+
+from __future__ import annotations
+
+import gc
+import json
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from voodoo.cli.common import say
+from voodoo.cli.people import body_of
+from voodoo.config import Config
+from voodoo.errors import VoodooError
+from voodoo.export.ros2 import instant
+from voodoo.live.assembly import LiveFrame
+from voodoo.live.first_look import FirstLook
+from voodoo.live.follow import ONE, Follower, Step
+from voodoo.live.recorder import Recorder
+from voodoo.live.session import Output, Session
+from voodoo.live.sources.words import source_of
+from voodoo.live.spool import Files
+from voodoo.live.stream import Live
+from voodoo.measurements import DepthImage
+from voodoo.model.body import Body
+from voodoo.model.camera import Camera
+from voodoo.names import HumanModel
+from voodoo.people import People
+from voodoo.pipeline.start import Beginning, start_tracker, starts_of
+from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.settings import Box, FrontEndSettings
+from voodoo.synthetic.render import render_depth
+from voodoo.tracker import Tracker
+from voodoo.visualization.rerun_viewer import Viewer
+
+_STANDING = {
+    "l_shoulder": (2.4, 0.19, 1.42),
+    "r_shoulder": (2.4, -0.19, 1.42),
+    "l_hip": (2.4, 0.09, 0.93),
+    "r_hip": (2.4, -0.09, 0.93),
+}
+_TICK_S = 0.05
+_LINE_S = 1.0
+_SWITCH_S = 5e-4
+"""How long a thread may keep Python from the others: the default of 5 ms is what a whole step takes."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the command line asks for."""
+
+    beginning: Beginning | None
+    body: Path | None
+    height: float | None
+    model: HumanModel | None
+    config: Config
+    several: bool
+    limit: int | None
+    kinds: tuple[str, ...]
+    depth_filter: DepthFilter | None
+    boxes: tuple[Box, ...]
+    targets: tuple[Path, ...] = ()
+    record: Path | None = None
+    view: bool = False
+    serve: str | None = None
+    publish: bool = False
+
+
+@dataclass
+class Done:
+    """How a session ended: by which signal ("": none), and what was written."""
+
+    signal: str = ""
+    written: list[Path] = field(default_factory=list)
+
+
+def entered(
+    words: Sequence[str],
+    calibrations: Sequence[Path],
+    *,
+    rate: float,
+    loop: bool,
+    root_frame: str | None,
+    options: Mapping[str, Any],
+    several: bool = False,
+) -> Live:
+    """The sources of the command line.
+
+    Raises:
+        VoodooError: more calibrations than sources, or a source that cannot be.
+    """
+    if len(calibrations) > len(words):
+        raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
+    places = [*calibrations, *[None] * (len(words) - len(calibrations))]
+    sources = [
+        source_of(word, rate=rate, loop=loop, root_frame=root_frame, options=options, calibration=place)
+        for word, place in zip(words, places, strict=True)
+    ]
+    return Live(sources, tell=say, eager=not several)
+
+
+def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | None) -> Done:
+    """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
+
+    Raises:
+        VoodooError, OSError: a source or an output that failed.
+    """
+    done = Done()
+    warm_up()
+    with _prompt_threads(), _signals() as signals, live:
+        outputs, files = _outputs(live, wishes)
+        session = Session(live, lambda frame: _follower(live, wishes, frame), outputs=outputs)
+        try:
+            _watch(session, signals, duration)
+        finally:
+            try:
+                session.finish()
+            finally:
+                if report is not None:
+                    write_report(report, session)
+        say(f"{session.line()}; {session.published} published")
+        done.signal = signals[0] if signals else ""
+        if files is not None:
+            done.written += files.written
+        done.written += [path for path in (wishes.record, report) if path is not None and path.exists()]
+    return done
+
+
+def _watch(session: Session, signals: Sequence[str], duration: float | None) -> None:
+    """Say a line a second until the end."""
+    clock = session.live.clock
+    began = said = clock.now()
+    while session.wait(_TICK_S) and not signals:
+        now = clock.now()
+        if duration is not None and now - began >= duration:
+            return
+        if now - said >= _LINE_S:
+            said += _LINE_S
+            say(session.line())
+
+
+def write_report(path: Path, session: Session) -> None:
+    """Write what happened as JSON; the file appears whole."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(json.dumps(session.report(), indent=2) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
+    look = FirstLook(live, frame)
+    settings = replace(
+        FrontEndSettings.of(look, use=wishes.kinds), depth_filter=wishes.depth_filter, exclude=wishes.boxes
+    )
+    if wishes.several:
+        body = body_of(wishes.body, height=wishes.height, model=wishes.model)
+        return Follower(people=lambda: People(body, config=wishes.config, limit=wishes.limit), settings=settings)
+    tracker = start_tracker(
+        look,
+        init=wishes.beginning,
+        body=None if wishes.body is None else Body.load(wishes.body),
+        height=wishes.height,
+        model=wishes.model,
+        config=wishes.config,
+        use=wishes.kinds,
+    )
+    return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, look))
+
+
+def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
+    outputs: list[Output] = []
+    files = None
+    if wishes.publish:
+        from voodoo.live.ros2.publisher import Ros2Output
+
+        outputs.append(Ros2Output(lambda: live.root_frame))
+    if wishes.targets:
+        files = Files(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.several)
+        outputs.append(files)
+    if wishes.record is not None:
+        outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
+        say(f"{wishes.record} stores pictures of people")
+    if wishes.view or wishes.serve is not None:
+        viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
+        outputs.append(Shown(viewer, several=wishes.several))
+        if viewer.address:
+            say(f"look at {viewer.address} in a browser")
+    return outputs, files
+
+
+class Shown(Output):
+    """Shows steps in Rerun; a viewer that is late shows fewer."""
+
+    name = "view"
+
+    def __init__(self, viewer: Viewer, *, several: bool) -> None:
+        """Keep both."""
+        self.viewer, self._several = viewer, several
+
+    def publish(self, step: Step) -> None:
+        """See Output."""
+        if self._several:
+            self.viewer.log_people(step.people, step.bodies, recorded=step.frame, seconds=step.seconds)
+            return
+        self.viewer.log(
+            step.estimates[ONE], step.bodies[ONE], recorded=step.frame, front_end=step.front_end, seconds=step.seconds
+        )
+
+    def close(self) -> None:
+        """See Output."""
+        self.viewer.close()
+
+
+@contextmanager
+def _prompt_threads() -> Iterator[None]:
+    """Threads wait less for each other, and what is loaded by now is not looked through for garbage again."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(_SWITCH_S)
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(before)
+
+
+@contextmanager
+def _signals() -> Iterator[list[str]]:
+    """Names of SIGINT and SIGTERM as they come; a second one ends the program at once."""
+    found: list[str] = []
+    before = {}
+
+    def note(number: int, _: FrameType | None) -> None:
+        found.append(signal.Signals(number).name)
+        signal.signal(number, signal.SIG_DFL)
+
+    if threading.current_thread() is threading.main_thread():
+        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield found
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def warm_up() -> None:
+    """Do once what the first frames would wait for: a small picture of somebody is tracked and put into messages."""
+    camera = Camera(80, 60, 66.0, 66.0, 39.5, 29.5)
+    body = Body.human(model="measured")
+    tracker = Tracker(body)
+    tracker.reset(joints=_STANDING, fit_sizes=False)
+    pose = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
+    seen = render_depth(body, tracker.estimate.world_from_limb, camera=camera, world_from_sensor=pose).depth
+    image = np.where(np.isfinite(seen) & (seen > 0.0), seen, 4.0).astype(np.float32)
+    follower = Follower(Tracker(Body.human(model="measured")))
+    for number in range(3):
+        item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
+        step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))
+    instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="1", topic="/warm")

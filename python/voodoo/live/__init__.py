@@ -1,0 +1,54 @@
+"""Live sources: what a camera, a robot's topics, a growing folder or a played recording measure, as recorded frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from voodoo.live.assembly import LiveFrame
+from voodoo.live.faults import FAULTS, Faults
+from voodoo.live.follow import Follower, Step
+from voodoo.live.source import Arrival, Source, SourceEnded, SourceGone
+from voodoo.live.sources.words import source_of
+from voodoo.live.stream import Live
+
+__all__ = [
+    "FAULTS",
+    "Arrival",
+    "Faults",
+    "Follower",
+    "Live",
+    "LiveFrame",
+    "Source",
+    "SourceEnded",
+    "SourceGone",
+    "Step",
+    "open",
+]
+
+
+def open(
+    *sources: str | Path | Source,
+    rate: float = 1.0,
+    loop: bool = False,
+    root_frame: str | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Live:
+    """Live sources as an iterator of recorded frames; use it in a `with` block.
+
+    Args:
+        *sources: "realsense", "realsense:SERIAL", "ros2:TOPIC[,TOPIC...]", "grow:FOLDER", the path of a recording, or a Source of
+            your own. The first one's images make the frames.
+        rate: of recordings: how many times as fast they are played.
+        loop: of recordings: begin again at the end.
+        root_frame: of recordings and ROS 2, instead of their own.
+        tell: is given a line for people at every fault.
+
+    Raises:
+        VoodooError: no such recording, or a library that the source needs is missing.
+    """
+    made = [
+        source if isinstance(source, Source) else source_of(source, rate=rate, loop=loop, root_frame=root_frame)
+        for source in sources
+    ]
+    return Live(made, tell=tell)

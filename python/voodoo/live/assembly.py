@@ -1,0 +1,192 @@
+"""From what arrives to recorded frames: stamps judged, sensors joined, damage named and left out."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import VoodooError
+from voodoo.live.faults import Fault, Faults
+from voodoo.live.source import Arrival
+from voodoo.live.stamps import HostTime, Stamps
+from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
+from voodoo.model.camera import Camera
+from voodoo.recordings.recording import refuse_blank
+
+WAIT_S = 0.010
+"""How long a depth image waits for the colour picture or transform that belongs to it, as in recordings."""
+_STALE_S = 0.5
+"""What is older than its frame by more is nothing of that instant."""
+_PENDING = 4
+_FAR_M = 100.0
+_LOOK = 16
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrame(RecordedFrame):
+    """A recorded frame that has just come.
+
+    Args:
+        number: from 0, of those that could be used.
+        taken: the host's time of measurement [s].
+        arrived: the host's time of arrival [s].
+        breaks: it does not go on from the frame before: time jumped, a camera changed, or more than 1 s is missing.
+    """
+
+    number: int
+    taken: float
+    arrived: float
+    breaks: bool
+
+
+class Assembler:
+    """Makes frames of arrivals; it knows no threads, and time only as it is told.
+
+    Args:
+        faults: counts what cannot be used.
+        wait: how long a frame waits for what belongs to it [s].
+        eager: decode pictures at once, not when somebody looks at them.
+
+    Attributes:
+        refused: arrivals that a frame was to be made for, and that could not be used.
+        frames: those that became frames.
+        kinds: sensor -> kind, of all that came.
+    """
+
+    def __init__(self, faults: Faults, *, wait: float = WAIT_S, eager: bool = True) -> None:
+        """Nothing came yet."""
+        self.refused = self.frames = 0
+        self.kinds: dict[str, str] = {}
+        self.host = HostTime()
+        self._faults, self._wait, self._eager = faults, wait, eager
+        self._stamps: dict[str, Stamps] = {}
+        self._others: dict[str, deque[Arrival]] = {}
+        self._driver: tuple[Arrival, float] | None = None
+        self._breaks = False
+        self._cameras: dict[str, Camera] = {}
+        self._images: dict[str, npt.NDArray[np.generic]] = {}
+
+    def feed(self, arrival: Arrival, now: float) -> None:
+        """Take up what arrived at the host's time `now` [s]; call `flush` before something else that drives."""
+        self.kinds.setdefault(arrival.sensor, arrival.kind)
+        verdict = self._stamps.setdefault(arrival.sensor, Stamps()).judge(arrival.stamp, now)
+        if verdict.fault:
+            self._faults.add(verdict.fault, f"{arrival.sensor}, stamp {arrival.stamp:.6f}", now)
+        if not verdict.usable:
+            self.refused += arrival.drives
+            return
+        if not arrival.drives:
+            pending = self._others.setdefault(arrival.sensor, deque(maxlen=_PENDING))
+            if verdict.breaks:
+                pending.clear()
+            pending.append(arrival)
+            return
+        if verdict.breaks:
+            self._breaks = True
+            if verdict.fault:
+                self.host.forget()
+        self._driver = (arrival, now)
+
+    def poll(self, now: float) -> LiveFrame | None:
+        """The next frame, if there is one by now."""
+        return self.flush(now) if self.due(now) <= 0.0 else None
+
+    def flush(self, now: float) -> LiveFrame | None:
+        """A frame of what came, complete or not."""
+        if self._driver is None:
+            return None
+        (driver, arrived), self._driver = self._driver, None
+        taken = driver.taken if driver.taken is not None else self.host.of(driver.stamp, arrived)
+        try:
+            measured = self._checked(driver.measure(), now)
+        except VoodooError as error:
+            self.refused += 1
+            self._faults.add_error(error, now, "unreadable message")
+            return None
+        items = (*self._joining(driver.stamp, now), measured)
+        breaks, self._breaks = self._breaks, False
+        self.frames += 1
+        return LiveFrame(driver.stamp, items, self.frames - 1, taken, arrived, breaks)
+
+    def due(self, now: float) -> float:
+        """Seconds until a frame may be made of what came; 0 when it is complete, infinity where there is nothing."""
+        if self._driver is None:
+            return float("inf")
+        driver, arrived = self._driver
+        waited = now - arrived
+        for_transforms = 0.0 if driver.ready() else driver.patience - waited
+        for_pictures = 0.0 if self._is_complete(driver.stamp) else self._wait - waited
+        return max(for_transforms, for_pictures, 0.0)
+
+    def _is_complete(self, stamp: float) -> bool:
+        """Whether every other camera that is alive has sent what belongs to a time."""
+        for sensor, kind in self.kinds.items():
+            judged = self._stamps[sensor]
+            if kind not in ("color", "keypoints", "depth") or judged.last is None or sensor not in self._others:
+                continue
+            # The next one is due by then, and has not come.
+            missing = self._wait < stamp - judged.last < _STALE_S
+            if missing and judged.last + 0.9 * judged.period <= stamp + self._wait:
+                return False
+        return True
+
+    def _joining(self, stamp: float, now: float) -> list[Measurement]:
+        """What other sensors measured up to a time, decoded; what is later waits for the next frame."""
+        found: list[Measurement] = []
+        for pending in self._others.values():
+            while pending and pending[0].stamp <= stamp + self._wait:
+                arrival = pending.popleft()
+                if stamp - arrival.stamp > _STALE_S:
+                    continue
+                try:
+                    item = self._checked(arrival.measure(), now)
+                    if self._eager and isinstance(item, ColorImage):
+                        _ = item.image
+                    found.append(item)
+                except VoodooError as error:
+                    self._faults.add_error(error, now, "damaged picture")
+        return sorted(found, key=lambda item: item.stamp)
+
+    def _checked(self, item: Measurement, now: float) -> Measurement:
+        """The measurement, if its picture and camera can be what they say.
+
+        Raises:
+            RecordingError: they cannot.
+        """
+        camera = getattr(item, "camera", None)
+        if isinstance(camera, Camera):
+            before = self._cameras.setdefault(item.sensor, camera)
+            if before != camera:
+                self._faults.add("calibration changed", f"{item.sensor}: {camera} after {before}", now)
+                self._cameras[item.sensor] = camera
+                self._breaks = True
+        if isinstance(item, DepthImage):
+            refuse_blank(item, item.sensor)
+            self._refuse_far(item)
+            before_image = self._images.get(item.sensor)
+            self._images[item.sensor] = item.image
+            if before_image is not None and _same(before_image, item.image):
+                raise Fault("frozen picture", f"{item.sensor}, stamp {item.stamp:.6f}: the same as the image before")
+        return item
+
+    def _refuse_far(self, item: DepthImage) -> None:
+        if item.image.dtype.kind != "f":
+            return
+        seen = item.image[::_LOOK, ::_LOOK]
+        metres = seen[np.isfinite(seen) & (seen > 0.0)] * item.metres_per_unit
+        if metres.size and float(np.median(metres)) > _FAR_M:
+            raise Fault(
+                "wrong unit",
+                f"{item.sensor}, stamp {item.stamp:.6f}: expected metres, found a median of {np.median(metres):.0f}",
+            )
+
+
+def _same(before: npt.NDArray[np.generic], image: npt.NDArray[np.generic]) -> bool:
+    # Noise shows in the first rows that are looked at.
+    rows = slice(None, None, _LOOK)
+    if before.shape != image.shape or not np.array_equal(before[rows], image[rows], equal_nan=image.dtype.kind == "f"):
+        return False
+    return np.array_equal(before, image, equal_nan=image.dtype.kind == "f")

@@ -1,0 +1,119 @@
+"""What can go wrong with a source: each kind has a name, is counted, and is told on the way."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from voodoo.errors import RecordingError, VoodooError
+
+FAULTS: dict[str, str] = {
+    "stalled": "nothing that can be used came for 0.3 s",
+    "gone": "the source was unplugged or ended; it is opened again and again",
+    "repeated stamp": "a measurement with the stamp of the one before",
+    "late": "a measurement older than the one before",
+    "time jumped back": "stamps go on from an earlier time",
+    "time jumped ahead": "stamps go on from a later time than has passed",
+    "no stamp": "a header with a stamp of zero, or one that is no time",
+    "frozen picture": "a depth image that repeats the one before bit by bit under another stamp",
+    "blank picture": "a depth image in which nothing returned: all zero or NaN",
+    "wrong unit": "depths beyond 100 m: metres that are millimetres",
+    "another size": "an image of another size than its calibration says",
+    "calibration missing": "an image of a camera whose calibration did not come",
+    "calibration unusable": "a calibration that makes no camera",
+    "calibration changed": "another calibration than before",
+    "unknown encoding": "an image of an encoding that is not read",
+    "half a message": "fewer bytes than a message announces",
+    "unreadable message": "bytes that are no message of their type",
+    "damaged picture": "a compressed picture that does not decode",
+    "transform missing": "no chain of transforms to the root frame",
+    "transform too old": "no transform near a measurement's stamp",
+    "transform unusable": "a transform that is no rigid one",
+    "refused": "a measurement that the tracker refuses",
+    "lost on the way": "messages that the network lost",
+}
+"""Name -> what it means."""
+
+_OF_REASONS = {
+    "with a repeated stamp": "repeated stamp",
+    "with a stamp before the last one": "late",
+    "without a stamp": "no stamp",
+    "that are blank": "blank picture",
+    "of another size than calibrated": "another size",
+    "without a transform near its stamp": "transform too old",
+}
+_QUIET_S = 1.0
+"""A fault that goes on is told once a second."""
+
+
+class Fault(RecordingError):
+    """A measurement that cannot be used.
+
+    Args:
+        kind: a name in FAULTS.
+        message: what was expected and found, and where.
+    """
+
+    def __init__(self, kind: str, message: str) -> None:
+        """Keep both."""
+        super().__init__(message, reason=kind)
+        self.kind = kind
+
+
+def kind_of(error: VoodooError, otherwise: str) -> str:
+    """The name in FAULTS of what raised an error."""
+    if isinstance(error, Fault):
+        return error.kind
+    return _OF_REASONS.get(getattr(error, "reason", ""), otherwise)
+
+
+class Faults:
+    """Counts faults by name and tells them, one that goes on once a second.
+
+    Args:
+        tell: is given a line for people; None: nobody is told.
+
+    Attributes:
+        counts: name -> how often.
+        first: name -> the first one, in words.
+    """
+
+    def __init__(self, tell: Callable[[str], None] | None = None) -> None:
+        """None yet."""
+        self.counts: dict[str, int] = {}
+        self.first: dict[str, str] = {}
+        self._tell = tell
+        self._told: dict[str, tuple[float, int]] = {}
+        self._lock = threading.Lock()
+
+    def add(self, kind: str, words: object, now: float, count: int = 1) -> None:
+        """Count a fault.
+
+        Args:
+            kind: a name in FAULTS.
+            words: where, what was expected and what was found.
+            now: the host's time [s].
+            count: how many at once.
+        """
+        with self._lock:
+            self.counts[kind] = self.counts.get(kind, 0) + count
+            self.first.setdefault(kind, str(words))
+            at, counted = self._told.get(kind, (float("-inf"), 0))
+            if now - at < _QUIET_S:
+                return
+            since = self.counts[kind] - counted
+            self._told[kind] = (now, self.counts[kind])
+        self.say(f"{kind}: {words}" if since == 1 else f"{kind} ({since} times): {words}")
+
+    def add_error(self, error: VoodooError, now: float, otherwise: str) -> None:
+        """Count what raised an error; `otherwise` is its name where the error does not tell."""
+        self.add(kind_of(error, otherwise), error, now)
+
+    def say(self, words: str) -> None:
+        """Tell something that is no fault."""
+        if self._tell is not None:
+            self._tell(words)
+
+    def __len__(self) -> int:
+        """How many there were."""
+        return sum(self.counts.values())

@@ -1,0 +1,59 @@
+"""What a live source looks like to those who ask a recording how to begin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from voodoo.live.assembly import LiveFrame
+from voodoo.live.stream import Live
+from voodoo.measurements import FloatArray, RecordedFrame
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo
+
+
+class FirstLook(Recording):
+    """A recording without frames that has the sensors of a live source.
+
+    Args:
+        live: the source.
+        frame: its first frame.
+    """
+
+    def __init__(self, live: Live, frame: LiveFrame) -> None:
+        """Keep both."""
+        self.name = live.sources[0].name
+        self.path = Path(self.name)
+        self.root_frame = live.root_frame
+        self.start, self.reference = None, None
+        self._live, self._frame = live, frame
+
+    def __len__(self) -> int:
+        """No frames."""
+        return 0
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """No frames."""
+        return iter(())
+
+    def info(self) -> RecordingInfo:
+        """The sensors that measured something."""
+        sensors = tuple(
+            SensorInfo(sensor, kind, self.root_frame, 1, float("nan"), "live")
+            for sensor, kind in self._live.kinds.items()
+        )
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader="live",
+            frames=0,
+            start_stamp=self._frame.stamp,
+            duration=0.0,
+            rate_hz=float("nan"),
+            root_frame=self.root_frame,
+            sensors=sensors,
+        )
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """See Recording."""
+        known = self._live.root_from(frame, stamp)
+        return super().root_from(frame, stamp) if known is None else known

@@ -1,0 +1,62 @@
+"""Bounded queues between stages in which the latest wins: what nobody took in time is dropped and counted."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class Mailbox(Generic[T]):
+    """A queue of at most `most` items between two threads; the oldest goes when another one comes.
+
+    Args:
+        most: how many wait at the same time.
+
+    Attributes:
+        dropped: how many went untaken.
+    """
+
+    def __init__(self, most: int = 1) -> None:
+        """Nothing in it."""
+        self.dropped = 0
+        self._most = most
+        self._items: deque[T] = deque()
+        self._changed = threading.Condition()
+        self._closed = False
+
+    def put(self, item: T) -> None:
+        """Put an item in; after `close` nothing is taken up."""
+        with self._changed:
+            if self._closed:
+                return
+            if len(self._items) >= self._most:
+                self._items.popleft()
+                self.dropped += 1
+            self._items.append(item)
+            self._changed.notify()
+
+    def take(self, timeout: float | None = None) -> T | None:
+        """The oldest item; None where none comes within `timeout` [s], or the box is closed and empty."""
+        with self._changed:
+            if not self._items and not self._closed:
+                self._changed.wait(timeout)
+            return self._items.popleft() if self._items else None
+
+    def close(self) -> None:
+        """Nothing more comes; what is in it can still be taken."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing more comes and all was taken."""
+        with self._changed:
+            return self._closed and not self._items
+
+    def __len__(self) -> int:
+        """How many wait."""
+        return len(self._items)

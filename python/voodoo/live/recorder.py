@@ -1,0 +1,219 @@
+"""A ROS 2 bag (MCAP) of what was tracked and what came out, which `voodoo track` reads again."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
+
+from voodoo.errors import VoodooError
+from voodoo.export.ros2 import cdr, instant
+from voodoo.live.follow import Step
+from voodoo.live.session import Output
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
+from voodoo.model.camera import Camera
+
+_STORE = get_typestore(Stores.ROS2_HUMBLE)
+_TF = "tf2_msgs/msg/TFMessage"
+_QUALITY = 95
+
+
+class Recorder(Output):
+    """Writes depth, clouds, scans, colour (JPEG), calibrations, poses of sensors, and the skeletons.
+
+    What was dropped because the tracker was late is not in it; neither are keypoints and markers, for which ROS has no message.
+
+    Args:
+        path: .mcap file; it appears when the recording ends.
+        root_frame: tells the frame of the poses, once something came.
+
+    Raises:
+        VoodooError: another suffix, or a file that exists.
+    """
+
+    name = "record"
+    waiting = 64
+
+    def __init__(self, path: Path, *, root_frame: Callable[[], str]) -> None:
+        """Open a bag beside the file."""
+        if path.suffix != ".mcap":
+            raise VoodooError(f"{path}: expected a name that ends in .mcap, found {path.suffix!r}")
+        if path.exists():
+            raise VoodooError(f"{path}: expected a file that does not exist yet, found one")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._path, self._root = path, root_frame
+        self._folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
+        self._writer = Writer(self._folder / path.stem, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._writer.open()
+        self._topics: dict[str, Connection] = {}
+        self._cameras: dict[str, Camera] = {}
+        self._poses: dict[str, FloatArray] = {}
+        self._at = 0
+        self.frames = 0
+
+    def publish(self, step: Step) -> None:
+        """See Output."""
+        self._at = max(self._at + 1, round(step.frame.arrived * 1e9))
+        for item in sorted(step.frame.measurements, key=lambda item: item.stamp == step.stamp):
+            self._write_item(item)
+        for number, estimate in step.estimates.items():
+            topic = f"/humans/bodies/body_{number}"
+            messages = instant(estimate, step.bodies[number], root_frame=self._root(), person=str(number), topic=topic)
+            for topic, message in messages.items():
+                self._write(topic, message)
+        self.frames += 1
+
+    def _write_item(self, item: Measurement) -> None:
+        if not isinstance(item, DepthImage | ColorImage | PointCloud | LaserScan):
+            return
+        name = item.sensor.strip("/").replace("/", "_").replace(" ", "_") or "sensor"
+        frame = f"{name}_frame"
+        self._write_pose(frame, item.stamp, item.root_from_sensor)
+        header = _header(item.stamp, frame)
+        if isinstance(item, DepthImage):
+            self._write_camera(f"/{name}/depth/camera_info", header, item.camera)
+            self._write(f"/{name}/depth/image_raw", _depth(header, item))
+        elif isinstance(item, ColorImage):
+            self._write_camera(f"/{name}/color/camera_info", header, item.camera)
+            done, data = cv2.imencode(".jpg", item.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+            if done:
+                picture = _new(
+                    "sensor_msgs/msg/CompressedImage", header=header, format="bgr8; jpeg compressed bgr8", data=data
+                )
+                self._write(f"/{name}/color/image_raw/compressed", picture)
+        elif isinstance(item, PointCloud):
+            self._write(f"/{name}/points", _cloud(header, item))
+        else:
+            self._write(f"/{name}/scan", _scan(header, item))
+
+    def _write_camera(self, topic: str, header: Any, camera: Camera) -> None:  # noqa: ANN401
+        if self._cameras.get(topic) != camera:
+            self._cameras[topic] = camera
+            self._write(topic, camera_info(header, camera))
+
+    def _write_pose(self, frame: str, stamp: float, root_from_sensor: FloatArray) -> None:
+        self._write("/tf", transforms(self._root(), frame, stamp, root_from_sensor))
+
+    def _write(self, topic: str, message: Any) -> None:  # noqa: ANN401
+        if topic not in self._topics:
+            self._topics[topic] = self._writer.add_connection(topic, message.__msgtype__, typestore=_STORE)
+        self._at += 1
+        self._writer.write(self._topics[topic], self._at, cdr(message))
+
+    def close(self) -> None:
+        """Finish the file."""
+        try:
+            self._writer.close()
+            shutil.move(next((self._folder / self._path.stem).glob("*.mcap")), self._path)
+        finally:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401
+    """A tf2_msgs/TFMessage of one transform (4, 4)."""
+    x, y, z = (float(value) for value in parent_from_child[:3, 3])
+    qx, qy, qz, qw = (float(value) for value in Rotation.from_matrix(parent_from_child[:3, :3]).as_quat())
+    transform = _new(
+        "geometry_msgs/msg/TransformStamped",
+        header=_header(stamp, parent),
+        child_frame_id=child,
+        transform=_new(
+            "geometry_msgs/msg/Transform",
+            translation=_new("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
+            rotation=_new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+        ),
+    )
+    return _new(_TF, transforms=[transform])
+
+
+def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
+    """A sensor_msgs/CameraInfo."""
+    k = np.array([camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0])
+    p = np.array([camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0])
+    return _new(
+        "sensor_msgs/msg/CameraInfo",
+        header=header,
+        height=camera.height,
+        width=camera.width,
+        distortion_model=camera.model,
+        d=np.array(camera.distortion, dtype=np.float64),
+        k=k,
+        r=np.eye(3).ravel(),
+        p=p,
+        binning_x=0,
+        binning_y=0,
+        roi=_new("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
+    )
+
+
+def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
+    image = item.image
+    if image.dtype.kind == "u" and item.metres_per_unit != 0.001:
+        image = np.where(image > 0, image * np.float64(item.metres_per_unit), np.nan).astype(np.float32)
+    elif image.dtype.kind == "f" and item.metres_per_unit != 1.0:
+        image = (image * item.metres_per_unit).astype(np.float32)
+    return _new(
+        "sensor_msgs/msg/Image",
+        header=header,
+        height=image.shape[0],
+        width=image.shape[1],
+        encoding="16UC1" if image.dtype.kind == "u" else "32FC1",
+        is_bigendian=0,
+        step=image.shape[1] * image.dtype.itemsize,
+        data=np.ascontiguousarray(image).view(np.uint8).ravel(),
+    )
+
+
+def _cloud(header: Any, item: PointCloud) -> Any:  # noqa: ANN401
+    points = np.ascontiguousarray(item.points, dtype=np.float32)
+    fields = [
+        _new("sensor_msgs/msg/PointField", name=name, offset=4 * index, datatype=7, count=1)
+        for index, name in enumerate("xyz")
+    ]
+    return _new(
+        "sensor_msgs/msg/PointCloud2",
+        header=header,
+        height=1,
+        width=len(points),
+        fields=fields,
+        is_bigendian=False,
+        point_step=12,
+        row_step=12 * len(points),
+        data=points.view(np.uint8).ravel(),
+        is_dense=True,
+    )
+
+
+def _scan(header: Any, item: LaserScan) -> Any:  # noqa: ANN401
+    return _new(
+        "sensor_msgs/msg/LaserScan",
+        header=header,
+        angle_min=item.angle_min,
+        angle_max=item.angle_min + item.angle_increment * (len(item.ranges) - 1),
+        angle_increment=item.angle_increment,
+        time_increment=0.0,
+        scan_time=0.0,
+        range_min=item.range_min,
+        range_max=item.range_max,
+        ranges=item.ranges.astype(np.float32),
+        intensities=np.empty(0, dtype=np.float32),
+    )
+
+
+def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
+    return _STORE.types[kind](**fields)
+
+
+def _header(stamp: float, frame: str) -> Any:  # noqa: ANN401
+    seconds, rest = divmod(round(stamp * 1e9), 1_000_000_000)
+    time = _new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
+    return _new("std_msgs/msg/Header", stamp=time, frame_id=frame)

@@ -1,0 +1,187 @@
+"""A participant among ROS 2 nodes, by Cyclone DDS."""
+
+from __future__ import annotations
+
+import os
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+from voodoo.errors import VoodooError
+from voodoo.live.ros2.types import dds_type, idl, message_of, ros_name
+
+_LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
+<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
+<MaxAutoParticipantIndex>60</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+<Internal><SocketReceiveBufferSize min="default"/></Internal></Domain></CycloneDDS>"""
+_MS = 1_000_000
+_domains: dict[int, Any] = {}
+_quiet: set[str] = set()
+"""What nodes of this process publish, and other ones of it shall not take for an offer."""
+_lock = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What somebody publishes on a topic.
+
+    Args:
+        kind: message type, e.g. "sensor_msgs/msg/Image".
+        reliable: what is lost is sent again.
+        latched: who comes late gets the last messages.
+    """
+
+    kind: str
+    reliable: bool
+    latched: bool
+
+
+def domain_id() -> int:
+    """The ROS_DOMAIN_ID of the environment, by default 0.
+
+    Raises:
+        VoodooError: it is no number from 0 to 232.
+    """
+    word = os.environ.get("ROS_DOMAIN_ID", "0") or "0"
+    if not word.isdecimal() or int(word) > 232:
+        raise VoodooError(f"ROS_DOMAIN_ID: expected a number from 0 to 232, found {word!r}")
+    return int(word)
+
+
+def on_loopback() -> bool:
+    """Whether the environment wants this machine only, by the variables that ROS 2 knows."""
+    return os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST" or (
+        os.environ.get("ROS_LOCALHOST_ONLY", "") == "1"
+    )
+
+
+class Node:
+    """Topics of a ROS 2 network; it uses ROS_DOMAIN_ID, and this machine only where the environment says so.
+
+    Args:
+        quiet: what it publishes is no offer to other nodes of this process.
+
+    Raises:
+        VoodooError: `cyclonedds` is not installed, or no network.
+    """
+
+    def __init__(self, *, quiet: bool = False) -> None:
+        """Join the network."""
+        idl()
+        from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
+        from cyclonedds.core import DDSException, WaitSet
+        from cyclonedds.domain import Domain, DomainParticipant
+
+        number = domain_id()
+        try:
+            with _lock:
+                if number not in _domains and on_loopback() and not os.environ.get("CYCLONEDDS_URI"):
+                    _domains[number] = Domain(number, _LOOPBACK)
+            self._participant = DomainParticipant(number)
+            self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+            self._waitset = WaitSet(self._participant)
+        except DDSException as error:
+            raise VoodooError(f"ROS 2: expected a network, found none: {error}") from error
+        self._offers: dict[str, tuple[str, Offer]] = {}
+        self._is_quiet = quiet
+
+    def offers(self) -> dict[str, Offer]:
+        """Topic -> what is published on it now; of several the last."""
+        from cyclonedds.qos import Policy
+
+        for sample in self._publications.take(N=1000):
+            key = str(getattr(sample, "key", ""))
+            info = getattr(sample, "sample_info", None)
+            alive = info is None or int(info.instance_state) == 16  # DDS_IST_ALIVE
+            name = getattr(sample, "topic_name", "")
+            if not alive or not name.startswith("rt/") or key in _quiet:
+                self._offers.pop(key, None)
+                continue
+            reliable = isinstance(sample.qos[Policy.Reliability], Policy.Reliability.Reliable)
+            durability = sample.qos[Policy.Durability]
+            latched = durability is not None and durability != Policy.Durability.Volatile
+            self._offers[key] = (name[2:], Offer(ros_name(sample.type_name), reliable, latched))
+        return dict(self._offers.values())
+
+    def subscribe(self, topic: str, offer: Offer, *, depth: int = 5) -> Subscription:
+        """Take what comes on a topic."""
+        return Subscription(self._participant, self._waitset, topic, offer, depth)
+
+    def advertise(self, topic: str, kind: str, *, depth: int = 10) -> Publication:
+        """Publish on a topic, reliably, as long as the publication is kept."""
+        made = Publication(self._participant, topic, kind, depth)
+        if self._is_quiet:
+            _quiet.add(made.key)
+        return made
+
+    def wait(self, seconds: float) -> None:
+        """Until something comes on a subscribed topic, for so long [s] at most."""
+        self._waitset.wait(timeout=max(int(seconds * 1000), 1) * _MS)
+
+
+def _qos(reliable: bool, latched: bool, depth: int) -> Any:  # noqa: ANN401
+    from cyclonedds.qos import Policy, Qos
+
+    return Qos(
+        Policy.Reliability.Reliable(max_blocking_time=100 * _MS) if reliable else Policy.Reliability.BestEffort,
+        Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
+        Policy.History.KeepLast(depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )
+
+
+class Subscription:
+    """What comes on a topic.
+
+    Attributes:
+        topic: its name.
+        kind: message type.
+    """
+
+    def __init__(self, participant: Any, waitset: Any, topic: str, offer: Offer, depth: int) -> None:  # noqa: ANN401
+        """Subscribe."""
+        from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState
+        from cyclonedds.sub import DataReader
+        from cyclonedds.topic import Topic
+
+        self.topic, self.kind = topic, offer.kind
+        qos = _qos(offer.reliable, offer.latched, depth)
+        self._reader = DataReader(participant, Topic(participant, f"rt{topic}", dds_type(offer.kind)), qos)
+        condition = ReadCondition(self._reader, SampleState.NotRead | ViewState.Any | InstanceState.Any)
+        waitset.attach(condition)
+        self._condition = condition
+
+    def take(self) -> list[bytes]:
+        """Messages that came, as they were sent."""
+        return [sample.data_as_sent for sample in self._reader.take(N=100) if hasattr(sample, "data_as_sent")]
+
+    @property
+    def publishers(self) -> int:
+        """How many publish on it."""
+        return len(self._reader.get_matched_publications())
+
+
+class Publication:
+    """A topic that is published on."""
+
+    def __init__(self, participant: Any, topic: str, kind: str, depth: int) -> None:  # noqa: ANN401
+        """Advertise."""
+        from cyclonedds.pub import DataWriter
+        from cyclonedds.topic import Topic
+
+        self._type = dds_type(kind)
+        self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", self._type), _qos(True, False, depth))
+
+    @property
+    def key(self) -> str:
+        """What tells it from all others."""
+        return str(self._writer.guid)
+
+    def write(self, message: bytes) -> None:
+        """Publish a message (CDR with its header)."""
+        self._writer.write(message_of(self._type, message))
+
+    @property
+    def subscribers(self) -> int:
+        """How many listen."""
+        return len(self._writer.get_matched_subscriptions())

@@ -1,0 +1,297 @@
+"""From the messages of ROS 2 topics to arrivals; it knows nothing of the network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+from rosbags.typesys import Stores, get_typestore
+
+from voodoo.errors import RecordingError, reading
+from voodoo.live.clock import Clock
+from voodoo.live.faults import Fault, Faults, kind_of
+from voodoo.live.source import Arrival
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
+from voodoo.model.camera import Camera
+from voodoo.recordings.ros_messages import (
+    COLOR_CHANNELS,
+    DEPTH_ENCODINGS,
+    Message,
+    base_topic,
+    camera_of,
+    cloud_points,
+    color_image,
+    compressed_color_image,
+    compressed_depth_image,
+    depth_image,
+    frame_of,
+    scan_fields,
+    stamp_of,
+)
+from voodoo.recordings.transforms import TransformTree
+
+IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+CLOUD, SCAN = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan"
+CAMERA_INFO, TF = "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
+MEASURED = (IMAGE, COMPRESSED, CLOUD, SCAN)
+"""Types that are measurements."""
+STANDING = ("odom", "map", "base_link", "world")
+"""Root frames, best first: people and rooms stand still in the first two while a robot moves."""
+_KEPT_S = 10.0
+_JUMP_S = 1.0
+_TF_PATIENCE_S = 0.05
+ROOT_PATIENCE_S = 1.0
+"""How long the first frame waits for a chain of transforms to one of STANDING."""
+
+_STORE = get_typestore(Stores.ROS2_HUMBLE)
+
+
+@dataclass
+class _Calibrated:
+    """The calibration of an image topic, and what it was made of."""
+
+    key: tuple[object, ...]
+    camera: Camera
+
+
+class RosFeed:
+    """Turns messages into arrivals.
+
+    Args:
+        topics: what is measured; the first one makes the frames.
+        faults: counts what cannot be used.
+        clock: of the host.
+        root_frame: None: the best of STANDING that transforms lead to, else the frame of the first topic.
+        metres_per_unit: of 16-bit depth.
+        tf_max_age: how old a changing transform may be [s].
+        sensor_pose: root_from_sensor (4, 4) of the first topic instead of transforms, and the name of that root frame.
+
+    Attributes:
+        unusable: messages of the first topic that could not become an arrival.
+        expects_transforms: somebody publishes transforms; what comes before them waits for ROOT_PATIENCE_S, then it counts.
+    """
+
+    def __init__(
+        self,
+        topics: Sequence[str],
+        faults: Faults,
+        clock: Clock,
+        *,
+        root_frame: str | None = None,
+        metres_per_unit: float = 0.001,
+        tf_max_age: float = 0.5,
+        sensor_pose: tuple[str, FloatArray] | None = None,
+    ) -> None:
+        """Nothing came yet."""
+        self.unusable = 0
+        self._topics, self._faults, self._clock = tuple(topics), faults, clock
+        self._scale, self._pose = metres_per_unit, sensor_pose
+        self._tree = TransformTree("tf", max_age=tf_max_age)
+        self._newest = -math.inf
+        self._root = root_frame if sensor_pose is None else sensor_pose[0]
+        self._since: float | None = None
+        self._cameras: dict[str, _Calibrated] = {}
+        self.expects_transforms = True
+
+    @property
+    def root_frame(self) -> str:
+        """The frame that `root_from_sensor` leads to; "" until it is known."""
+        return self._root or ""
+
+    def info_topic(self, topic: str) -> str:
+        """Where the calibration of an image topic comes."""
+        return f"{base_topic(topic).rsplit('/', 1)[0]}/camera_info"
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """root_from_frame (4, 4) at a time [s].
+
+        Raises:
+            RecordingError: no chain of transforms, or none near that time.
+        """
+        return self._tree.lookup(self.root_frame, frame, stamp)
+
+    def take(self, topic: str, kind: str, raw: bytes) -> list[Arrival]:
+        """Take up a message.
+
+        Args:
+            topic: it came on.
+            kind: its type, e.g. "sensor_msgs/msg/Image".
+            raw: as it was sent (CDR, with its header of four bytes).
+        """
+        try:
+            with reading(topic, f"a {kind} message"):
+                message = _STORE.deserialize_cdr(raw, kind)
+        except RecordingError as error:
+            self._refuse(topic, error, "unreadable message")
+            return []
+        return self.take_message(topic, kind, message)
+
+    def take_message(self, topic: str, kind: str, message: Message) -> list[Arrival]:
+        """The same of a message that was read."""
+        now = self._clock.now()
+        try:
+            if kind == TF:
+                self._take_transforms(message, static=topic.endswith("tf_static"))
+            elif kind == CAMERA_INFO:
+                self._take_calibration(topic, message)
+            elif topic in self._topics and kind in MEASURED and self._knows_root(topic, message, now):
+                return [self._arrival(topic, kind, message)]
+        except RecordingError as error:
+            self._refuse(topic, error, kind_of(error, "unreadable message"))
+        return []
+
+    def _refuse(self, topic: str, error: RecordingError, kind: str) -> None:
+        self.unusable += topic == self._topics[0]
+        self._faults.add(kind, error, self._clock.now())
+
+    def _take_transforms(self, message: Message, *, static: bool) -> None:
+        for item in message.transforms:
+            stamp = float(item.header.stamp.sec) + float(item.header.stamp.nanosec) * 1e-9
+            if not static:
+                if stamp < self._newest - _JUMP_S:
+                    self._tree.keep(stamp - _KEPT_S, stamp)  # what is later is of a time that has not come
+                    self._newest = stamp
+                self._newest = max(self._newest, stamp)
+            try:
+                with reading("tf", "a transform"):
+                    self._tree.add(_one(item), static=static)
+            except RecordingError as error:
+                self._faults.add("transform unusable", error, self._clock.now())
+        if not static:
+            self._tree.keep(self._newest - _KEPT_S, math.inf)
+
+    def _take_calibration(self, topic: str, message: Message) -> None:
+        for image in self._topics:
+            if self.info_topic(image) != topic:
+                continue
+            key = (message.width, message.height, message.distortion_model, message.binning_x, message.binning_y)
+            key += tuple(values.tobytes() for values in (message.k, message.d, message.p))
+            known = self._cameras.get(image)
+            if known is not None and known.key == key:
+                continue
+            try:
+                self._cameras[image] = _Calibrated(key, camera_of(message, image, f"{topic}"))
+            except RecordingError as error:
+                self._cameras.pop(image, None)
+                raise Fault("calibration unusable", str(error)) from error
+
+    def _arrival(self, topic: str, kind: str, message: Message) -> Arrival:
+        stamp = stamp_of(message, topic)
+        measured = _measured_as(topic, kind, message)
+        drives = topic == self._topics[0]
+        frame = frame_of(message)
+        measure = partial(self._measure, topic, kind, measured, message, stamp, frame)
+        return Arrival(
+            sensor=topic,
+            kind=measured,
+            stamp=stamp,
+            measure=measure,
+            drives=drives,
+            ready=lambda: self._is_ready(frame, stamp),
+            patience=_TF_PATIENCE_S,
+        )
+
+    def _is_ready(self, frame: str, stamp: float) -> bool:
+        return self._pose is not None or self.root_frame == frame or self._tree.covers(self.root_frame, frame, stamp)
+
+    def _knows_root(self, topic: str, message: Message, now: float) -> bool:
+        """Choose the root frame, if that can be done by now; before, nothing is measured."""
+        if self._root is not None:
+            return True
+        if topic != self._topics[0]:
+            return False
+        frame = frame_of(message)
+        self._since = now if self._since is None else self._since
+        reached = [root for root in STANDING if root in self._tree.frames and self._leads(root, frame)]
+        if not reached and self.expects_transforms and now - self._since < ROOT_PATIENCE_S:
+            return False
+        self._root = next(iter(reached), frame)
+        self._faults.say(f"root frame {self._root!r}")
+        return True
+
+    def _leads(self, root: str, frame: str) -> bool:
+        try:
+            self._tree.path(root, frame)
+        except RecordingError:
+            return False
+        return True
+
+    def _root_from_sensor(self, topic: str, frame: str, stamp: float) -> FloatArray:
+        if self._pose is not None and topic == self._topics[0]:
+            return self._pose[1]
+        try:
+            return self._tree.lookup(self.root_frame, frame, stamp)
+        except RecordingError as error:
+            raise Fault(kind_of(error, "transform missing"), f"{topic}, stamp {stamp:.6f}: {error}") from error
+
+    def _measure(self, topic: str, kind: str, measured: str, message: Message, stamp: float, frame: str) -> Measurement:
+        where = f"{topic}, stamp {stamp:.6f}"
+        pose = self._root_from_sensor(topic, frame, stamp)
+        if measured == "scan":
+            return LaserScan(topic, stamp, **scan_fields(message, where), root_from_sensor=pose)
+        if measured == "points":
+            with _whole(message):
+                return PointCloud(topic, stamp, cloud_points(message, where), pose)
+        known = self._cameras.get(topic)
+        if known is None:
+            raise Fault(
+                "calibration missing", f"{where}: expected a calibration on {self.info_topic(topic)}, found none"
+            )
+        camera = known.camera
+        if measured == "color":
+            return ColorImage(topic, stamp, partial(_color, kind, message, camera, where), camera, pose)
+        if kind == COMPRESSED:
+            try:
+                image = compressed_depth_image(message, camera, where)
+            except RecordingError as error:
+                raise Fault(kind_of(error, "damaged picture"), str(error)) from error
+        else:
+            with _whole(message):
+                image = depth_image(message, camera, where)
+        return DepthImage(topic, stamp, image, self._scale if image.dtype.kind == "u" else 1.0, camera, pose)
+
+
+def _color(kind: str, message: Message, camera: Camera, where: str) -> npt.NDArray[np.uint8]:
+    with reading(where, "a readable picture"):
+        return (compressed_color_image if kind == COMPRESSED else color_image)(message, camera, where)
+
+
+def _measured_as(topic: str, kind: str, message: Message) -> str:
+    """What a message measures: "depth", "color", "points" or "scan".
+
+    Raises:
+        Fault: an image of neither depth nor colour.
+    """
+    if kind == CLOUD:
+        return "points"
+    if kind == SCAN:
+        return "scan"
+    if kind == COMPRESSED:
+        return "depth" if "compressedDepth" in topic or "compressedDepth" in message.format else "color"
+    if message.encoding in DEPTH_ENCODINGS:
+        return "depth"
+    if message.encoding in COLOR_CHANNELS:
+        return "color"
+    known = ", ".join((*DEPTH_ENCODINGS, *COLOR_CHANNELS))
+    raise Fault("unknown encoding", f"{topic}: expected one of {known}, found {message.encoding!r}")
+
+
+@contextmanager
+def _whole(message: Message) -> Iterator[None]:
+    """Name errors of sizes that do not fit together: of a message with fewer bytes than it announces."""
+    try:
+        yield
+    except RecordingError as error:
+        row = int(getattr(message, "row_step", 0)) or int(getattr(message, "step", 0))
+        cut = len(message.data) < row * int(message.height)
+        raise Fault(kind_of(error, "half a message" if cut else "unreadable message"), str(error)) from error
+
+
+def _one(item: Message) -> Message:
+    """A TFMessage of one transform: a bad one costs no other."""
+    return _STORE.types[TF](transforms=[item])

@@ -1,0 +1,115 @@
+"""ROS 2 message types for DDS, made from their definitions; messages themselves stay bytes.
+
+`cyclonedds` wants a class for each type, and would turn an image into a list of numbers. The classes here describe the type and
+hand its bytes (CDR) on, which rosbags reads and writes, as those of bags.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from voodoo.errors import VoodooError
+
+IDS = "hri_msgs/msg/IdsList"
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+"""Messages of other releases that are used here have the same fields."""
+STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
+
+_BASE = {
+    "int8": "int8", "int16": "int16", "int32": "int32", "int64": "int64", "uint8": "uint8", "uint16": "uint16",
+    "uint32": "uint32", "uint64": "uint64", "float32": "float32", "float64": "float64", "byte": "uint8", "char": "uint8",
+    "octet": "uint8",
+}  # fmt: skip
+
+
+def idl() -> Any:  # noqa: ANN401 - a module that may not be installed
+    """The module `cyclonedds.idl`.
+
+    Raises:
+        VoodooError: it is not installed.
+    """
+    try:
+        import cyclonedds.idl
+    except ImportError as error:
+        raise VoodooError(
+            "ROS 2 topics need Cyclone DDS, which is not installed: pip install 'voodoo-tracker[ros2]'"
+        ) from error
+    return cyclonedds.idl
+
+
+def dds_name(kind: str) -> str:
+    """The name of a type on the network: of "sensor_msgs/msg/Image" "sensor_msgs::msg::dds_::Image_"."""
+    package, _, name = kind.rsplit("/", 2)
+    return f"{package}::msg::dds_::{name}_"
+
+
+def ros_name(name: str) -> str:
+    """The other way; "" of what is no ROS message."""
+    parts = name.split("::")
+    if len(parts) != 4 or parts[1:3] != ["msg", "dds_"] or not parts[3].endswith("_"):
+        return ""
+    return f"{parts[0]}/msg/{parts[3][:-1]}"
+
+
+def _deserialize(kind: Any, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> Any:  # noqa: ANN401
+    return message_of(kind, data)
+
+
+def _serialize(
+    message: Any,  # noqa: ANN401
+    buffer: Any = None,  # noqa: ANN401
+    endianness: Any = None,  # noqa: ANN401
+    use_version_2: bool | None = None,
+) -> bytes:
+    return bytes(message.data_as_sent)
+
+
+def message_of(kind: Any, data: bytes) -> Any:  # noqa: ANN401
+    """A message of a class of `dds_type`, of its bytes (CDR with its header of four bytes), kept as `data_as_sent`."""
+    message = kind.__new__(kind)
+    message.data_as_sent = bytes(data)
+    return message
+
+
+@cache
+def dds_type(kind: str) -> Any:  # noqa: ANN401 - a class made at run time
+    """The class of a message type for `cyclonedds`.
+
+    Raises:
+        VoodooError: `cyclonedds` is not installed, or an unknown type.
+    """
+    made = _struct(kind, topic=True)
+    made.serialize = _serialize
+    made.deserialize = made.deserialize_key = classmethod(_deserialize)
+    return made
+
+
+@cache
+def _struct(kind: str, *, topic: bool = False) -> Any:  # noqa: ANN401
+    if kind not in STORE.fielddefs:
+        raise VoodooError(f"ROS 2: expected a type that is known here, found {kind!r}")
+    module = idl()
+    _, fields = STORE.fielddefs[kind]
+    found = {name: _field(node) for name, node in fields}
+    name = dds_name(kind).replace("::", ".")
+    return module.make_idl_struct(kind.replace("/", "_"), name, found, dataclassify=not topic)
+
+
+def _field(node: Any) -> Any:  # noqa: ANN401
+    kind, content = node
+    types = idl().types
+    if kind is Nodetype.NAME:
+        return _struct(content)
+    if kind is Nodetype.ARRAY:
+        return types.array[_field(content[0]), content[1]]
+    if kind is Nodetype.SEQUENCE:
+        inner = _field(content[0])
+        return types.sequence[inner, content[1]] if content[1] else types.sequence[inner]
+    name = content[0]
+    if name == "string":
+        return str
+    return bool if name == "bool" else getattr(types, _BASE[name])

@@ -1,0 +1,268 @@
+"""From live frames to published poses: track and publish are stages of their own, and what is late is dropped."""
+
+from __future__ import annotations
+
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from voodoo.errors import VoodooError
+from voodoo.live.assembly import LiveFrame
+from voodoo.live.follow import Follower, Step, without_damaged
+from voodoo.live.latencies import Latencies
+from voodoo.live.mailbox import Mailbox
+from voodoo.live.stream import Live
+
+_TICK_S = 0.05
+_RATE_S = 2.0
+
+
+class Output(ABC):
+    """Where poses go. A thread of its own calls it.
+
+    Attributes:
+        name: for messages.
+        prompt: latency counts until it has taken the pose; others may lag behind.
+        waiting: how many steps wait for it at most; the oldest is dropped and counted.
+    """
+
+    name: str
+    prompt: bool = False
+    waiting: int = 1
+
+    @abstractmethod
+    def publish(self, step: Step) -> None:
+        """Take a step.
+
+        Raises:
+            VoodooError, OSError: it cannot; the session ends.
+        """
+
+    def close(self) -> None:  # noqa: B027 - most have nothing to finish
+        """Finish files."""
+
+
+class _Lane:
+    """Outputs with a queue and a thread."""
+
+    def __init__(self, outputs: Sequence[Output], done: Callable[[Step], None] | None = None) -> None:
+        self.outputs = outputs
+        self.box: Mailbox[Step] = Mailbox(max((output.waiting for output in outputs), default=1))
+        self.error: BaseException | None = None
+        self._done = done
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            while not self.box.closed:
+                step = self.box.take(_TICK_S)
+                if step is None:
+                    continue
+                for output in self.outputs:
+                    output.publish(step)
+                if self._done is not None:
+                    self._done(step)
+        except BaseException as error:
+            self.error = error
+
+    def finish(self) -> None:
+        """Let it take what waits, and close the outputs."""
+        self.box.close()
+        self._thread.join()
+        for output in self.outputs:
+            try:
+                output.close()
+            except (VoodooError, OSError) as error:
+                self.error = self.error or error
+
+
+class Session:
+    """Tracks what live sources measure, and publishes it.
+
+    Args:
+        live: entered by whoever made it.
+        follower: makes a Follower of the first frame.
+        outputs: where poses go.
+
+    Attributes:
+        latency: from measurement to published pose.
+        tracking: what a step of the tracker took.
+        published: steps that were published.
+        with_pose: of them, those in which somebody was there.
+    """
+
+    def __init__(
+        self, live: Live, follower: Callable[[LiveFrame], Follower], *, outputs: Sequence[Output] = ()
+    ) -> None:
+        """Start the stages."""
+        self.live = live
+        self.latency, self.tracking = Latencies(), Latencies()
+        self.published = self.with_pose = self.refused = 0
+        self._make = follower
+        self._last: Step | None = None
+        self._times: deque[float] = deque(maxlen=512)
+        self._began = live.clock.now()
+        self._first: float | None = None
+        self._end = self._began
+        self._error: BaseException | None = None
+        prompt = [output for output in outputs if output.prompt]
+        self._prompt = _Lane(prompt, self._count)
+        self._lanes = [self._prompt, *(_Lane([output]) for output in outputs if not output.prompt)]
+        self._thread = threading.Thread(target=self._track, daemon=True)
+        self._thread.start()
+
+    def _track(self) -> None:
+        follower: Follower | None = None
+        try:
+            for frame in self.live:
+                if follower is None:
+                    follower = self._make(frame)
+                step = self._step(follower, frame)
+                if step is not None:
+                    self.tracking.add(step.seconds)
+                    for lane in self._lanes:
+                        lane.box.put(step)
+        except BaseException as error:
+            self._error = error
+            self.live.stop()
+
+    def _step(self, follower: Follower, frame: LiveFrame) -> Step | None:
+        faults, clock = self.live.faults, self.live.clock
+        try:
+            return follower.step(frame)
+        except VoodooError:
+            kept, damaged = without_damaged(frame)
+            for problem in damaged:
+                faults.add_error(problem, clock.now(), "damaged picture")
+            if damaged:
+                try:
+                    return follower.step(kept)
+                except VoodooError as again:
+                    error = again
+            faults.add_error(error, clock.now(), "refused")
+            self.refused += 1
+            return None
+
+    def _count(self, step: Step) -> None:
+        now = self.live.clock.now()
+        self.latency.add(now - step.frame.taken)
+        self.published += 1
+        self.with_pose += any(one.joints for one in step.estimates.values())
+        self._times.append(now)
+        self._first = now if self._first is None else self._first
+        self._end, self._last = now, step
+
+    # What is known
+
+    @property
+    def running(self) -> bool:
+        """Whether more is to come."""
+        return self._thread.is_alive()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for so long [s], or until it has ended; whether it goes on.
+
+        Raises:
+            VoodooError, OSError: a source or an output that failed.
+        """
+        self._thread.join(seconds)
+        self._raise()
+        return self.running
+
+    def _raise(self) -> None:
+        for error in (self._error, *(lane.error for lane in self._lanes)):
+            if error is not None:
+                self.live.stop()
+                raise error
+
+    def finish(self) -> None:
+        """Stop, let everything in hand be published, and finish files.
+
+        Raises:
+            VoodooError, OSError: a source or an output that failed.
+        """
+        self.live.stop()
+        self._thread.join()
+        for lane in self._lanes:
+            lane.finish()
+        self._raise()
+
+    @property
+    def dropped(self) -> int:
+        """Frames that a newer one overtook, in any stage before they were published."""
+        return self.live.dropped + self._prompt.box.dropped
+
+    def persons(self) -> dict[int, str]:
+        """Status of each person who is there; "lost" of all where the source is."""
+        if self._last is None:
+            return {}
+        lost = self.live.status == "lost"
+        return {number: "lost" if lost else str(one.status) for number, one in self._last.estimates.items()}
+
+    @property
+    def rate_hz(self) -> float:
+        """Published poses a second, of the last two seconds."""
+        now = self.live.clock.now()
+        return sum(at > now - _RATE_S for at in tuple(self._times)) / min(max(now - self._began, 0.1), _RATE_S)
+
+    def line(self) -> str:
+        """Rate, latency, drops and the status of each person, for people."""
+        persons = ", ".join(f"{number} {word}" for number, word in self.persons().items()) or "nobody"
+        status = self.live.status
+        if status == "waiting":
+            return "waiting for data"
+        parts = [
+            f"{self.rate_hz:.1f} Hz",
+            f"latency {1e3 * self.latency.last:.1f} ms (median {1e3 * self.latency.percentile(50):.1f})",
+            f"{self.dropped} dropped",
+            persons if status != "lost" else f"source lost for {self.live.silent:.1f} s: {persons}",
+        ]
+        if len(self.live.faults):
+            parts.append(f"{len(self.live.faults)} faults")
+        return "; ".join(parts)
+
+    def report(self) -> dict[str, Any]:
+        """What happened, for a JSON file."""
+        span = self._end - self._first if self._first is not None else 0.0
+        rate = (self.published - 1) / span if self.published > 1 and span > 0.0 else 0.0
+        refused = self.live.refused + self.refused
+        return {
+            "rate_hz": rate,
+            "latency_ms": _milliseconds(self.latency),
+            "latency_from": self.latency_from,
+            "tracking_ms": _milliseconds(self.tracking),
+            "received": self.live.received,
+            "tracked": self.tracking.count,
+            "published": self.published,
+            "with_pose": self.with_pose,
+            "dropped": self.dropped,
+            "refused": refused,
+            "faults": dict(sorted(self.live.faults.counts.items())),
+            "first_faults": dict(sorted(self.live.faults.first.items())),
+            "late_outputs": {
+                output.name: lane.box.dropped
+                for lane in self._lanes
+                if lane is not self._prompt
+                for output in lane.outputs
+            },
+            "seconds": self.live.clock.now() - self._began,
+            "status": self.live.status,
+            "sources": self.live.about(),
+            "time": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        }
+
+    @property
+    def latency_from(self) -> str:
+        """What latencies are counted from."""
+        if any(source.get("kind") == "recording" for source in self.live.about()):
+            return "when the frame was due"
+        return "the stamp" if self.live.by_host_clock else "the fastest arrival: stamps are by another clock"
+
+
+def _milliseconds(latencies: Latencies) -> dict[str, float | None]:
+    values = {"p50": latencies.percentile(50), "p99": latencies.percentile(99), "max": latencies.largest}
+    return {name: None if value != value else round(1e3 * value, 3) for name, value in values.items()}

@@ -1,0 +1,1 @@
+"""Kinds of live sources, one a file."""

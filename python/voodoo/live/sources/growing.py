@@ -1,0 +1,130 @@
+"""A folder of images that grows: each new depth image is a frame."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from voodoo.errors import RecordingError
+from voodoo.live.clock import Clock
+from voodoo.live.faults import Faults
+from voodoo.live.source import Arrival, Source, SourceGone
+from voodoo.measurements import ColorImage, DepthImage
+from voodoo.recordings.calibration import FolderCalibration, read_calibration
+from voodoo.recordings.folder import Clock as NameClock
+from voodoo.recordings.pictures import decode_color, decode_depth_png
+
+_LOOK_S = 0.005
+_PATIENCE_S = 0.5
+"""A picture that does not decode is looked at again for so long: somebody may be writing it."""
+_SUFFIXES = {"depth": (".png",), "rgb": (".png", ".jpg", ".jpeg")}
+
+
+class GrowingSource(Source):
+    """New images in depth/ and rgb/ of a folder, see `voodoo.recordings.folder.FolderRecording`; what lay there before is left.
+
+    Args:
+        path: the folder, with calibration.toml; it may come later.
+        rate: images per second where names are numbers of images; None: 30.
+        sleep: waits for so many seconds.
+    """
+
+    def __init__(self, path: Path, *, rate: float | None = None, sleep: Callable[[float], None] = time.sleep) -> None:
+        """Nothing is looked at yet."""
+        self.name, self._path = path.resolve().name, path
+        self._rate, self._sleep = rate, sleep
+        self._names: dict[str, set[str]] = {}
+        self._changed: dict[str, int] = {}
+        self._waiting: list[tuple[str, Path, float]] = []
+        self._calibration: FolderCalibration | None = None
+
+    @property
+    def root_frame(self) -> str:
+        """See Source."""
+        return "camera_depth_optical_frame" if self._calibration is None else self._calibration.root_frame
+
+    def open(self, clock: Clock, faults: Faults) -> None:
+        """See Source."""
+        self._clock, self._faults = clock, faults
+        if not (self._path / "calibration.toml").is_file():
+            raise SourceGone(f"{self._path}: expected a folder with calibration.toml, found none yet")
+        self._calibration = read_calibration(self._path / "calibration.toml")
+        if not self._names:
+            # What comes while the source is gone is looked at when it is there again.
+            self._names = {kind: set(self._listed(kind)) for kind in _SUFFIXES}
+
+    def _listed(self, kind: str) -> list[str]:
+        """Names of a kind's images, if the folder has changed since the last time."""
+        folder = self._path / kind
+        try:
+            changed = os.stat(folder).st_mtime_ns  # noqa: PTH116 - called hundreds of times a second
+            if self._changed.get(kind) == changed and time.time_ns() - changed > 50_000_000:
+                return []
+            self._changed[kind] = changed
+            return [entry.name for entry in os.scandir(folder) if entry.name.lower().endswith(_SUFFIXES[kind])]
+        except FileNotFoundError:
+            return []
+
+    def read(self, timeout: float) -> Sequence[Arrival]:
+        """See Source."""
+        until = self._clock.now() + timeout
+        while True:
+            if not self._path.is_dir():
+                raise SourceGone(f"{self._path}: expected a folder, found none: it was moved or unmounted")
+            arrivals = self._look()
+            if arrivals or self._clock.now() >= until:
+                return arrivals
+            self._sleep(_LOOK_S)
+
+    def _look(self) -> list[Arrival]:
+        now = self._clock.now()
+        for kind in ("rgb", "depth"):
+            new = sorted(name for name in self._listed(kind) if name not in self._names[kind])
+            self._names[kind].update(new)
+            self._waiting += [(kind, self._path / kind / name, now) for name in new]
+        arrivals, waiting = [], []
+        for kind, path, since in self._waiting:
+            arrival = self._arrival(kind, path, since, now)
+            if arrival is None:
+                waiting.append((kind, path, since))
+            else:
+                arrivals += arrival
+        self._waiting = waiting
+        return sorted(arrivals, key=lambda arrival: (arrival.stamp, arrival.drives))
+
+    def _arrival(self, kind: str, path: Path, since: float, now: float) -> list[Arrival] | None:
+        """The arrival of a file; none of one that cannot be used, None while it may still be written."""
+        assert self._calibration is not None
+        place = self._calibration.depth if kind == "depth" else self._calibration.color
+        if place is None:
+            return []
+        size = (place.camera.width, place.camera.height)
+        try:
+            stamp = NameClock(self._rate).of([path])[0]
+            data = path.read_bytes()
+            if kind == "rgb":
+                image = ColorImage(
+                    "rgb", stamp, partial(decode_color, data, path, size), place.camera, place.root_from_sensor
+                )
+                _ = image.image
+                return [Arrival("rgb", "color", stamp, lambda: image)]
+            depth = decode_depth_png(data, path, size)
+        except (RecordingError, OSError) as error:
+            if now - since < _PATIENCE_S:
+                return None
+            self._faults.add_error(error, now, "damaged picture") if isinstance(error, RecordingError) else None
+            return []
+        scale = 1.0 / self._calibration.depth_factor
+        item = DepthImage("depth", stamp, depth, scale, place.camera, place.root_from_sensor)
+        return [Arrival("depth", "depth", stamp, lambda: item, drives=True)]
+
+    def close(self) -> None:
+        """See Source."""
+
+    def about(self) -> dict[str, Any]:
+        """See Source."""
+        return {"name": self.name, "kind": "folder", "path": str(self._path)}

@@ -1,0 +1,119 @@
+"""A recording played at its own pace, as if its sensors were there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from voodoo.live.clock import Clock
+from voodoo.live.faults import Faults
+from voodoo.live.source import Arrival, Source, SourceEnded
+from voodoo.measurements import FloatArray, Measurement, RecordedFrame
+from voodoo.pipeline.pairing import paired
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.adapters import adapter_of
+
+
+class PlayedSource(Source):
+    """A recording, frame by frame when it is due; the time of measurement is when it is due.
+
+    Args:
+        recording: what is played.
+        rate: how many times as fast as it was recorded.
+        loop: begin again at its end; stamps go on.
+        sleep: waits for so many seconds.
+    """
+
+    stays = False
+
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        rate: float = 1.0,
+        loop: bool = False,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Nothing is read yet."""
+        self.name, self.recording = recording.name, recording
+        self._rate, self._loop, self._sleep = rate, loop, sleep
+        self._frames: Iterator[RecordedFrame] = iter(())
+        self._next: RecordedFrame | None = None
+        self._shift = 0.0
+        self._about = recording.info()
+        self._driver = self._about.sensors[0].name if self._about.sensors else ""
+
+    @property
+    def root_frame(self) -> str:
+        """See Source."""
+        return self.recording.root_frame
+
+    def open(self, clock: Clock, faults: Faults) -> None:
+        """See Source."""
+        self._clock = clock
+        self._frames = iter(paired(self.recording))
+        self._next = next(self._frames, None)
+        self._first = 0.0 if self._next is None else self._next.stamp
+        self._began = clock.now()
+        self._shift = 0.0
+
+    def read(self, timeout: float) -> Sequence[Arrival]:
+        """See Source."""
+        frame = self._next
+        if frame is None:
+            raise SourceEnded(f"{self.name}: it is at its end")
+        due = self._began + (frame.stamp + self._shift - self._first) / self._rate
+        wait = due - self._clock.now()
+        if wait > 0.0:
+            self._sleep(min(wait, timeout))
+            if wait > timeout:
+                return ()
+        arrivals = self._arrivals(frame, due)
+        self._advance(frame)
+        return arrivals
+
+    def _advance(self, frame: RecordedFrame) -> None:
+        self._next = next(self._frames, None)
+        if self._next is None and self._loop:
+            self._frames = iter(paired(self.recording))
+            self._next = next(self._frames, None)
+            period = self._about.duration / max(self._about.frames - 1, 1)
+            self._shift += frame.stamp - self._first + period
+
+    def _arrivals(self, frame: RecordedFrame, due: float) -> list[Arrival]:
+        arrivals = []
+        made_for = [item for item in frame.measurements if item.stamp == frame.stamp]
+        driver = next((item for item in made_for if item.sensor == self._driver), made_for[-1])
+        for item in (*(item for item in frame.measurements if item is not driver), driver):
+            adapter = adapter_of(item)
+            arrivals.append(
+                Arrival(
+                    sensor=item.sensor,
+                    kind=adapter.recorded_as or adapter.kind,
+                    stamp=item.stamp + self._shift,
+                    measure=_shifted(item, self._shift),
+                    drives=item is driver,
+                    taken=due,
+                )
+            )
+        return arrivals
+
+    def close(self) -> None:
+        """See Source."""
+        self._frames, self._next = iter(()), None
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray | None:
+        """See Source."""
+        return self.recording.root_from(frame, stamp - self._shift)
+
+    def about(self) -> dict[str, Any]:
+        """See Source."""
+        return {"name": self.name, "kind": "recording", "path": str(self.recording.path), "rate": self._rate}
+
+
+def _shifted(item: Measurement, shift: float) -> Callable[[], Measurement]:
+    if not shift:
+        return lambda: item
+    return lambda: replace(item, stamp=item.stamp + shift)

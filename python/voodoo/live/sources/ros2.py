@@ -1,0 +1,150 @@
+"""ROS 2 topics as a live source."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from voodoo.errors import VoodooError
+from voodoo.live.clock import Clock
+from voodoo.live.faults import Faults
+from voodoo.live.ros2.dds import Node, Offer, Subscription
+from voodoo.live.ros2.feed import CAMERA_INFO, COMPRESSED, IMAGE, MEASURED, TF, RosFeed
+from voodoo.live.source import Arrival, Source, SourceGone
+from voodoo.measurements import FloatArray
+from voodoo.recordings.calibration import read_calibration
+
+_DISCOVERY_S = 3.0
+_LOOK_S = 0.05
+_DEPTH = 5
+_TF_DEPTH = 100
+
+
+class Ros2Source(Source):
+    """Depth or colour images (raw, compressed), clouds and scans of ROS 2 topics, with CameraInfo and transforms.
+
+    Args:
+        topics: what is measured; the first one makes the frames.
+        root_frame: see RosFeed.
+        calibration: a calibration.toml that says where the first topic's camera is, instead of transforms.
+        metres_per_unit: of 16-bit depth.
+        tf_max_age: how old a changing transform may be [s].
+
+    Raises:
+        VoodooError: no topics.
+    """
+
+    def __init__(
+        self,
+        topics: Sequence[str],
+        *,
+        root_frame: str | None = None,
+        calibration: Path | None = None,
+        metres_per_unit: float = 0.001,
+        tf_max_age: float = 0.5,
+    ) -> None:
+        """Nothing is subscribed yet."""
+        if not topics:
+            raise VoodooError("ros2: expected ros2:TOPIC[,TOPIC...], found no topic")
+        self._topics = [topic if topic.startswith("/") else f"/{topic}" for topic in topics]
+        self.name = f"ros2:{self._topics[0]}"
+        self._options: dict[str, Any] = {
+            "root_frame": root_frame,
+            "metres_per_unit": metres_per_unit,
+            "tf_max_age": tf_max_age,
+        }
+        if calibration is not None:
+            place = read_calibration(calibration)
+            self._options["sensor_pose"] = (place.root_frame, place.depth.root_from_sensor)
+        self._node: Node | None = None
+        self._feed: RosFeed | None = None
+        self._subscriptions: dict[str, Subscription] = {}
+        self._gone = False
+
+    @property
+    def root_frame(self) -> str:
+        """See Source."""
+        return "" if self._feed is None else self._feed.root_frame
+
+    @property
+    def unusable(self) -> int:  # type: ignore[override]
+        """See Source."""
+        return 0 if self._feed is None else self._feed.unusable
+
+    def open(self, clock: Clock, faults: Faults) -> None:
+        """See Source."""
+        self._clock, self._faults = clock, faults
+        if self._feed is None:
+            self._feed = RosFeed(self._topics, faults, clock, **self._options)
+        if self._node is None:
+            self._node = Node()
+            self._subscribe("/tf", Offer(TF, reliable=True, latched=False), _TF_DEPTH)
+            self._subscribe("/tf_static", Offer(TF, reliable=True, latched=True), _TF_DEPTH)
+        until = time.monotonic() + _DISCOVERY_S
+        while not self._discover():
+            if time.monotonic() > until:
+                raise SourceGone(f"{self._topics[0]}: expected somebody who publishes it, found nobody yet")
+            self._node.wait(_LOOK_S)
+
+    def _discover(self) -> bool:
+        """Subscribe to what is offered by now; whether all topics are."""
+        assert self._node is not None
+        assert self._feed is not None
+        offers = self._node.offers()
+        self._feed.expects_transforms = bool({"/tf", "/tf_static"} & offers.keys())
+        for topic in self._topics:
+            offer = offers.get(topic)
+            if offer is None or topic in self._subscriptions:
+                continue
+            if offer.kind not in MEASURED:
+                raise VoodooError(
+                    f"{topic}: expected one of {', '.join(MEASURED)}, found {offer.kind or 'no ROS type'}"
+                )
+            if offer.kind in (IMAGE, COMPRESSED):
+                info = self._feed.info_topic(topic)
+                told = offers.get(info, Offer(CAMERA_INFO, reliable=False, latched=False))
+                self._subscribe(info, Offer(CAMERA_INFO, told.reliable, told.latched), _DEPTH)
+            self._subscribe(topic, offer, _DEPTH)
+        return self._topics[0] in self._subscriptions
+
+    def _subscribe(self, topic: str, offer: Offer, depth: int) -> None:
+        assert self._node is not None
+        if topic not in self._subscriptions:
+            self._subscriptions[topic] = self._node.subscribe(topic, offer, depth=depth)
+
+    def read(self, timeout: float) -> Sequence[Arrival]:
+        """See Source."""
+        assert self._node is not None
+        assert self._feed is not None
+        self._node.wait(timeout)
+        arrivals: list[Arrival] = []
+        # Transforms and calibrations first: they are what images wait for.
+        for subscription in sorted(self._subscriptions.values(), key=lambda one: one.kind in MEASURED):
+            for raw in subscription.take():
+                arrivals += self._feed.take(subscription.topic, subscription.kind, raw)
+        if not arrivals:
+            self._watch()
+        return arrivals
+
+    def _watch(self) -> None:
+        """Tell once that nobody publishes any more, and look for topics that come later."""
+        self._discover()
+        gone = self._subscriptions[self._topics[0]].publishers == 0
+        if gone and not self._gone:
+            self._faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", self._clock.now())
+        elif self._gone and not gone:
+            self._faults.say(f"{self.name}: it is there again")
+        self._gone = gone
+
+    def close(self) -> None:
+        """See Source."""
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray | None:
+        """See Source."""
+        return None if self._feed is None else self._feed.root_from(frame, stamp)
+
+    def about(self) -> dict[str, Any]:
+        """See Source."""
+        return {"name": self.name, "kind": "ros2", "topics": self._topics, "root_frame": self.root_frame}

@@ -1,0 +1,58 @@
+"""Which source a word means: realsense, ros2:TOPIC, grow:FOLDER, or a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from voodoo.errors import VoodooError
+from voodoo.live.source import Source
+from voodoo.recordings.loaders import open_recording
+
+REALSENSE, ROS2, GROW = "realsense", "ros2", "grow"
+
+
+def source_of(
+    word: str | Path,
+    *,
+    rate: float = 1.0,
+    loop: bool = False,
+    root_frame: str | None = None,
+    options: Mapping[str, Any] | None = None,
+    calibration: Path | None = None,
+) -> Source:
+    """The source that a word means.
+
+    Args:
+        word: "realsense", "realsense:SERIAL", "ros2:TOPIC[,TOPIC...]", "grow:FOLDER", or the path of a recording.
+        rate: of a recording: how many times as fast it is played.
+        loop: of a recording: begin again at its end.
+        root_frame: of a recording or of ROS 2, instead of its own.
+        options: of the recording's loader.
+        calibration: of a camera: a calibration.toml that says where it is; its `root_frame` and `root_from_sensor` are used.
+
+    Raises:
+        VoodooError: no such recording, or an option out of range.
+    """
+    kind, colon, rest = str(word).partition(":")
+    if kind == REALSENSE:
+        from voodoo.live.sources.realsense import RealSenseSource
+
+        return RealSenseSource(serial=rest or None, calibration=calibration)
+    if kind == ROS2 and colon:
+        from voodoo.live.sources.ros2 import Ros2Source
+
+        return Ros2Source([topic for topic in rest.split(",") if topic], root_frame=root_frame, calibration=calibration)
+    if kind == GROW and colon:
+        from voodoo.live.sources.growing import GrowingSource
+
+        return GrowingSource(Path(rest))
+    from voodoo.live.sources.played import PlayedSource
+
+    if not 0.0 < rate < 1e6:
+        raise VoodooError(f"rate: expected a number above 0, found {rate}")
+    chosen = dict(options or {})
+    if root_frame is not None:
+        chosen["root_frame"] = root_frame
+    return PlayedSource(open_recording(word, bare=True, **chosen), rate=rate, loop=loop)

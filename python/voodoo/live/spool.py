@@ -1,0 +1,116 @@
+"""Results that grow on disk, not in memory, and become files of any format at the end."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from voodoo.errors import VoodooError
+from voodoo.export.files import check_target, save
+from voodoo.export.people import PeopleTrack
+from voodoo.export.people_files import save_people
+from voodoo.export.track import Track
+from voodoo.live.follow import ONE, Step
+from voodoo.live.session import Output
+from voodoo.model.body import Body
+
+_TOGETHER = 30
+
+
+class Files(Output):
+    """Writes poses to files when the session ends; until then they lie in a folder beside the first.
+
+    Args:
+        paths: see `voodoo.export.files.FORMATS`.
+        root_frame: tells the frame of the poses, at the end.
+        several: several persons are followed.
+
+    Attributes:
+        written: files that are there after `close`.
+        frames: how many were taken.
+
+    Raises:
+        VoodooError: a path that cannot be written to.
+    """
+
+    name = "files"
+    waiting = 256
+
+    def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str], several: bool = False) -> None:
+        """Check the paths, and make the folder."""
+        for path in paths:
+            check_target(path)
+        self._paths, self._root, self._several = list(paths), root_frame, several
+        paths[0].parent.mkdir(parents=True, exist_ok=True)
+        self._folder = Path(tempfile.mkdtemp(dir=paths[0].parent, prefix=f".{paths[0].name}-"))
+        self._steps: list[Step] = []
+        self._parts = 0
+        self._bodies: dict[int, Body] = {}
+        self.written: list[Path] = []
+        self.frames = 0
+
+    def publish(self, step: Step) -> None:
+        """See Output."""
+        self._steps.append(step)
+        self._bodies.update(step.bodies)
+        self.frames += 1
+        if len(self._steps) >= _TOGETHER:
+            self._put_away()
+
+    def _put_away(self) -> None:
+        path = self._folder / f"{self._parts:08d}.npz"
+        if self._several:
+            PeopleTrack.of([step.people for step in self._steps], bodies=self._bodies).save(path)
+        else:
+            Track.of([step.estimates[ONE] for step in self._steps], body=self._bodies[ONE]).save(path)
+        self._parts += 1
+        self._steps.clear()
+
+    def close(self) -> None:
+        """Write the files.
+
+        Raises:
+            VoodooError: no frame came.
+            OSError: a file cannot be written.
+        """
+        try:
+            if self._steps:
+                self._put_away()
+            parts = sorted(self._folder.glob("*.npz"))
+            if not parts:
+                raise VoodooError("expected at least one frame to write, found none")
+            if self._several:
+                everybody = _joined_people([PeopleTrack.load(part) for part in parts])
+                for path in self._paths:
+                    self.written += save_people(everybody, path, bodies=self._bodies, root_frame=self._root())
+            else:
+                track = joined([Track.load(part) for part in parts])
+                for path in self._paths:
+                    save(track, path, body=self._bodies[ONE], root_frame=self._root())
+                    self.written.append(path)
+        finally:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def joined(tracks: Sequence[Track]) -> Track:
+    """One track of several that follow each other."""
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(track, name) for track in tracks])
+        for name in ("stamps", "residual", "joints", "world_from_limb", "angles")
+    }
+    limbs = tracks[0].limb_status
+    words = {limb: tuple(word for track in tracks for word in track.limb_status[limb]) for limb in limbs}
+    status = tuple(word for track in tracks for word in track.status)
+    return replace(tracks[0], status=status, limb_status=words, **arrays)
+
+
+def _joined_people(parts: Sequence[PeopleTrack]) -> PeopleTrack:
+    persons = sorted({person for part in parts for person in part.tracks})
+    tracks = {one: joined([part.tracks[one] for part in parts if one in part.tracks]) for one in persons}
+    return PeopleTrack(np.concatenate([part.stamps for part in parts]), tracks)

@@ -1,0 +1,286 @@
+"""Live sources as an iterator of recorded frames: capture and decoding run beside whoever takes the frames."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from types import TracebackType
+from typing import Any, Literal, TypeAlias
+
+from voodoo.errors import VoodooError
+from voodoo.live.assembly import WAIT_S, Assembler, LiveFrame
+from voodoo.live.clock import Clock, HostClock
+from voodoo.live.faults import Faults
+from voodoo.live.inbox import Inbox
+from voodoo.live.mailbox import Mailbox
+from voodoo.live.source import Arrival, Source, SourceEnded, SourceGone
+from voodoo.measurements import FloatArray
+
+Status: TypeAlias = Literal["waiting", "running", "lost", "ended"]
+
+LOST_S = 0.3
+"""A source that sent nothing usable for so long is lost; one that is slow anyway, after two and a half of its periods."""
+_PERIODS = 2.5
+_FIRST_S = 1.0
+"""Patience after the very first frame, when the period is not known."""
+_REOPEN_S = 0.5
+_TICK_S = 0.05
+
+
+class Live:
+    """What live sources measure, as recorded frames: the newest one each time; use it in a `with` block.
+
+    `FrontEnd` and `Tracker` take the frames like those of a recording. A frame that does not go on from the one before
+    (`LiveFrame.breaks`) needs a new search, see `voodoo.live.follow.Follower`.
+
+    Args:
+        sources: the first one's images make the frames; what the others measured joins them.
+        clock: of the host.
+        tell: is given a line for people at every fault.
+        wait: how long a frame waits for the pictures and transforms that belong to it [s].
+        eager: decode colour pictures at once, beside the tracker; False: when somebody looks at them.
+
+    Attributes:
+        faults: what went wrong, by name.
+    """
+
+    def __init__(
+        self,
+        sources: Sequence[Source],
+        *,
+        clock: Clock | None = None,
+        tell: Callable[[str], None] | None = None,
+        wait: float = WAIT_S,
+        eager: bool = True,
+    ) -> None:
+        """Nothing is opened yet; entering the `with` block does that."""
+        if not sources:
+            raise VoodooError("sources: expected at least one, found none")
+        self.sources = tuple(sources)
+        self.clock: Clock = clock if clock is not None else HostClock()
+        self.faults = Faults(tell)
+        self._delivered = 0
+        self._assembler = Assembler(self.faults, wait=wait, eager=eager)
+        self._inbox = Inbox()
+        self._frames: Mailbox[LiveFrame] = Mailbox()
+        self._stop = threading.Event()
+        self._threads: list[threading.Thread] = []
+        self._left = len(self.sources)
+        self._error: BaseException | None = None
+        self._good: float | None = None
+        self._stamp: float | None = None
+        self._period = _FIRST_S / _PERIODS
+        self._lost = False
+
+    # Using it
+
+    def __enter__(self) -> Live:
+        """Open the sources.
+
+        Raises:
+            VoodooError: a source that cannot be used at all.
+        """
+        there = [self._opened(source) for source in self.sources]
+        for source, is_open in zip(self.sources, there, strict=True):
+            self._run(self._capture, source, is_open)
+        self._run(self._decode)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the sources."""
+        self.close()
+
+    def __iter__(self) -> Iterator[LiveFrame]:
+        """The newest frame each time, until the sources end or `stop` is called.
+
+        Raises:
+            VoodooError: a source that cannot go on.
+        """
+        while not self._frames.closed:
+            frame = self.next(_TICK_S)
+            if frame is not None:
+                yield frame
+        self._raise()
+
+    def next(self, timeout: float) -> LiveFrame | None:
+        """The newest frame that nobody took; None where none comes within `timeout` [s].
+
+        Raises:
+            VoodooError: a source that cannot go on.
+        """
+        self._raise()
+        return self._frames.take(timeout)
+
+    def stop(self) -> None:
+        """Take up nothing more; who iterates comes to an end."""
+        self._stop.set()
+        self._inbox.close()
+
+    def close(self) -> None:
+        """Stop, and close the sources."""
+        self.stop()
+        for thread in self._threads:
+            thread.join()
+        self._threads.clear()
+        for source in self.sources:
+            source.close()
+        self._frames.close()
+
+    # What is known
+
+    @property
+    def status(self) -> Status:
+        """Whether usable measurements come: "lost" when there were none for LOST_S."""
+        if self._frames.closed:
+            return "ended"
+        if self._good is None:
+            return "waiting"
+        return "lost" if self.silent > self._patience else "running"
+
+    @property
+    def silent(self) -> float:
+        """Seconds since the last usable measurement arrived; infinite before the first."""
+        return float("inf") if self._good is None else self.clock.now() - self._good
+
+    @property
+    def root_frame(self) -> str:
+        """The frame of all poses: that of the first source."""
+        return self.sources[0].root_frame
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Sensor -> kind, of all that came."""
+        return dict(self._assembler.kinds)
+
+    @property
+    def received(self) -> int:
+        """Measurements that a frame was to be made for."""
+        return self._delivered + sum(source.unusable for source in self.sources)
+
+    @property
+    def dropped(self) -> int:
+        """Frames, or what would have become some, that a newer one overtook."""
+        return self._inbox.dropped + self._frames.dropped
+
+    @property
+    def refused(self) -> int:
+        """What was to become a frame and could not be used; `faults` says why."""
+        return self._assembler.refused + sum(source.unusable for source in self.sources)
+
+    @property
+    def by_host_clock(self) -> bool:
+        """Whether latencies are from the stamps; else from the fastest arrival, because stamps are by another clock."""
+        return self._assembler.host.by_host
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray | None:
+        """root_from_frame (4, 4) at a time [s]; None where no source knows."""
+        return self.sources[0].root_from(frame, stamp)
+
+    def about(self) -> list[dict[str, Any]]:
+        """What is known of the sources."""
+        return [source.about() for source in self.sources]
+
+    # The stages
+
+    def _run(self, stage: Callable[..., None], *arguments: object) -> None:
+        thread = threading.Thread(target=self._guarded, args=(stage, *arguments), daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _guarded(self, stage: Callable[..., None], *arguments: object) -> None:
+        try:
+            stage(*arguments)
+        except BaseException as error:
+            self._error = self._error or error
+            self.stop()
+            self._frames.close()
+
+    def _raise(self) -> None:
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+
+    def _opened(self, source: Source) -> bool:
+        """Open a source; whether it is there."""
+        try:
+            source.open(self.clock, self.faults)
+        except SourceGone as error:
+            source.close()
+            if not source.stays:
+                raise
+            self.faults.say(f"{source.name}: waiting for it: {error}")
+            return False
+        except BaseException:
+            self.close()
+            raise
+        return True
+
+    def _capture(self, source: Source, is_open: bool) -> None:
+        """Read a source until it ends; open it again when it was gone."""
+        while not self._stop.is_set():
+            try:
+                if not is_open:
+                    source.open(self.clock, self.faults)
+                    is_open = True
+                    self.faults.say(f"{source.name}: it is there again")
+                for arrival in source.read(_TICK_S):
+                    self.deliver(arrival)
+            except SourceEnded:
+                break
+            except SourceGone as error:
+                if not source.stays:
+                    raise
+                if is_open:
+                    self.faults.add("gone", error, self.clock.now())
+                is_open = False
+                source.close()
+                self._stop.wait(_REOPEN_S)
+        self._left -= 1
+        if not self._left:
+            self._inbox.close()
+
+    def _decode(self) -> None:
+        """Make frames of what came."""
+        while not self._inbox.closed:
+            self.turn(_TICK_S)
+        self._hand_on(self._assembler.flush(self.clock.now()))
+        self._frames.close()
+
+    def deliver(self, arrival: Arrival) -> None:
+        """Take up what just came from a source."""
+        self._delivered += arrival.drives
+        self._inbox.put(arrival, self.clock.now())
+
+    def turn(self, timeout: float) -> None:
+        """One turn of the decoding stage, which waits for arrivals for `timeout` [s] at most."""
+        assembler = self._assembler
+        for arrival, at in self._inbox.take(min(assembler.due(self.clock.now()), timeout, _TICK_S)):
+            if arrival.drives:
+                self._hand_on(assembler.flush(self.clock.now()))
+            assembler.feed(arrival, at)
+        self._hand_on(assembler.poll(self.clock.now()))
+        self._watch()
+
+    def _hand_on(self, frame: LiveFrame | None) -> None:
+        if frame is None:
+            return
+        now = self.clock.now()
+        if self._stamp is not None and not frame.breaks:
+            self._period = frame.stamp - self._stamp
+        self._stamp = frame.stamp
+        if self._lost:
+            self.faults.say(f"data again after {now - (self._good or now):.1f} s")
+        self._good, self._lost = now, False
+        self._frames.put(frame)
+
+    @property
+    def _patience(self) -> float:
+        return max(LOST_S, _PERIODS * self._period)
+
+    def _watch(self) -> None:
+        """Tell that a source stalls."""
+        if not self._lost and self._good is not None and self.silent > self._patience and not self._inbox.closed:
+            self._lost = True
+            self.faults.add("stalled", f"nothing usable for {self.silent:.1f} s: lost", self.clock.now())

@@ -1,0 +1,335 @@
+"""`voodoo live` with played recordings and growing folders: files, reports, signals, and what is read again."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import typer.testing
+
+import voodoo
+from live_rig import Rig, depth_of, follower_of
+from voodoo.cli import app
+from voodoo.errors import VoodooError
+from voodoo.export.people import PeopleTrack
+from voodoo.export.track import Track
+from voodoo.live import FAULTS, Follower
+from voodoo.live.session import Output, Session
+from voodoo.live.sources.growing import GrowingSource
+from voodoo.live.sources.played import PlayedSource
+from voodoo.recordings import open_recording, sample_path
+
+ROOT = Path(__file__).resolve().parent.parent
+FAST = ("--use", "depth")
+
+
+def live(*words):
+    result = typer.testing.CliRunner().invoke(app, ["live", *map(str, words)])
+    return result
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """One run with everything."""
+    folder = tmp_path_factory.mktemp("live")
+    files = [folder / name for name in ("pose.csv", "pose.npz", "pose.bvh", "pose.trc")]
+    words = [word for file in files for word in ("--out", file)]
+    result = live(sample_path(), "--rate", "2", *words, "--record", folder / "take.mcap", "--report", folder / "r.json")
+    assert result.exit_code == 0, result.output
+    return folder, result
+
+
+def test_the_report_counts_every_frame(run):
+    report = json.loads((run[0] / "r.json").read_text())
+    assert report["received"] == 90
+    assert report["published"] + report["dropped"] + report["refused"] == 90
+    assert report["published"] > 10
+    assert report["faults"] == {}
+    assert 0.0 < report["latency_ms"]["p50"] <= report["latency_ms"]["p99"] <= report["latency_ms"]["max"]
+    assert 5.0 < report["rate_hz"] < 65.0
+    assert report["latency_from"] == "when the frame was due"
+    assert "Hz; latency" in run[1].output
+
+
+def test_all_files_tell_the_same(run):
+    track = Track.load(run[0] / "pose.npz")
+    assert len(track) == json.loads((run[0] / "r.json").read_text())["tracked"]
+    assert (np.diff(track.stamps) > 0).all()
+    np.testing.assert_allclose(Track.load(run[0] / "pose.csv").joints, track.joints, atol=1e-6)
+    assert (run[0] / "pose.bvh").read_text().startswith("HIERARCHY")
+    assert {path.name for path in run[0].iterdir() if path.name.startswith(".")} == set()
+    stamps = {depth_of(frame).stamp for frame in open_recording(sample_path(), use=("depth",))}
+    assert set(track.stamps.tolist()) <= stamps, "stamps are those of the data"
+
+
+def test_what_was_recorded_is_tracked_again(run):
+    recording = open_recording(run[0] / "take.mcap")
+    assert recording.root_frame == "base_link"
+    before = {depth_of(frame).stamp: depth_of(frame) for frame in open_recording(sample_path(), use=("depth",))}
+    assert len(recording) == len(Track.load(run[0] / "pose.npz"))
+    for frame in recording:
+        again, first = depth_of(frame), before[frame.stamp]
+        assert np.array_equal(again.image, first.image)
+        assert again.camera == first.camera
+        np.testing.assert_allclose(again.root_from_sensor, first.root_from_sensor, atol=1e-12)
+    assert {sensor.kind for sensor in recording.info().sensors} == {"depth", "scan", "color"}
+    names = {topic.name for topic in recording._bag.topics}
+    assert {"/tf", "/humans/bodies/body_1/joint_states", "/humans/bodies/body_1/markers"} <= names
+
+
+def test_it_says_that_it_stores_pictures_of_people(run):
+    assert "stores pictures of people" in run[1].output
+
+
+def test_poses_are_those_of_the_recording(run):
+    """Every frame one after the other, without drops: bit by bit what the front end says of the recording."""
+    recording = open_recording(sample_path(), use=("depth", "scan"), bare=True)
+    rig = Rig(follower_of(), source=PlayedSource(recording))
+    rig.live.sources[0].open(rig.clock, rig.live.faults)
+    for number, _ in zip(range(25), recording, strict=False):
+        rig.clock.at = 1_700_000_000.0 + number / 30 + 1e-6
+        rig.deliver(*rig.live.sources[0].read(0.0))
+    from voodoo.pipeline.front_end import FrontEnd, FrontEndSettings
+    from voodoo.pipeline.pairing import paired
+
+    settings = FrontEndSettings(use=("depth", "points", "scan"), ground_z=0.0)
+    front_end = FrontEnd(voodoo.Tracker(voodoo.Body.human(model="measured")), settings=settings)
+    for recorded, step in zip(paired(recording), rig.steps, strict=False):
+        expected = front_end.step(recorded)
+        assert step.stamp == expected.stamp
+        assert np.array_equal(step.estimates[1].joint_positions, expected.joint_positions)
+    assert len(rig.steps) == 25
+    assert rig.counts == {}
+
+
+def test_several_people_have_ids(tmp_path):
+    result = live(sample_path(), "--rate", "4", "--people", "any", "--out", tmp_path / "all.csv", *FAST)
+    assert result.exit_code == 0, result.output
+    assert set(PeopleTrack.load(tmp_path / "all.csv").tracks) == {1}
+
+
+def test_a_loop_goes_on_in_time(tmp_path):
+    words = ("--rate", "8", "--loop", "--duration", "1.2", *FAST)
+    result = live(sample_path(), *words, "--out", tmp_path / "p.csv", "--report", tmp_path / "r.json")
+    assert result.exit_code == 0, result.output
+    stamps = Track.load(tmp_path / "p.csv").stamps
+    assert (np.diff(stamps) > 0).all()
+    assert stamps[-1] - stamps[0] > 5.0, "longer than the recording"
+    assert json.loads((tmp_path / "r.json").read_text())["faults"] == {}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_signals_finish_files(tmp_path, number):
+    code = "import sys; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
+    words = ["live", str(sample_path()), "--loop", "--out", "p.csv", "--record", "t.mcap", "--report", "r.json", *FAST]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
+    ) as process:
+        for line in process.stderr:
+            if "Hz" in line:
+                break
+        process.send_signal(number)
+        told = process.communicate(timeout=20)[1]
+    assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number], told
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert len(Track.load(tmp_path / "p.csv")) == report["tracked"] > 0
+    assert len(open_recording(tmp_path / "t.mcap")) == report["tracked"]
+    assert "wrote p.csv" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["nowhere"], "found no such file"),
+        (["ros2:"], "ros2:TOPIC"),
+        ([sample_path(), "--rate", "0"], "rate: expected a number above 0"),
+        ([sample_path(), "--out", "pose.xyz"], "expected a name that ends in"),
+        ([sample_path(), "--record", "take.bag"], "expected a name that ends in .mcap"),
+        ([sample_path(), "--calibration", "a.toml", "--calibration", "b.toml"], "one for each source at most"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_is_refused_in_a_line(words, told):
+    result = live(*words, "--duration", "0.1")
+    assert result.exit_code in (1, 2), result.output
+    assert told in " ".join(result.output.split())
+    assert "Traceback" not in result.output
+
+
+@pytest.mark.parametrize("word", ["browser", "0", "127.0.0.1", "65535", "host:"])
+def test_a_viewer_is_served_at_a_port(word):
+    from voodoo.visualization.rerun_server import Server
+
+    with pytest.raises(VoodooError, match="expected PORT or HOST:PORT"):
+        Server(word)
+
+
+def test_missing_libraries_are_named():
+    for word, extra, module in (("realsense", "realsense", "pyrealsense2"), ("ros2:/depth", "ros2", "cyclonedds")):
+        try:
+            __import__(module)
+        except ImportError:
+            result = live(word, "--duration", "0.1")
+            assert result.exit_code == 1
+            assert f"voodoo-tracker[{extra}]" in result.output
+
+
+# Stages
+
+
+class Slow(Output):
+    """Takes its time."""
+
+    name = "slow"
+    waiting = 1
+
+    def __init__(self, seconds, *, prompt=False, error=None):
+        self.seconds, self.prompt, self.error, self.stamps, self.closed = seconds, prompt, error, [], False
+
+    def publish(self, step):
+        time.sleep(self.seconds)
+        if self.error is not None:
+            raise self.error
+        self.stamps.append(step.stamp)
+
+    def close(self):
+        self.closed = True
+
+
+def played(rate, **options):
+    recording = open_recording(sample_path(), use=("depth",), bare=True)
+    return voodoo.live.open(PlayedSource(recording, rate=rate), **options)
+
+
+def follower(_frame):
+    return Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
+
+
+def test_a_slow_viewer_holds_nobody_up():
+    slow = Slow(0.3)
+    with played(3.0) as source:
+        session = Session(source, follower, outputs=[slow])
+        while session.wait(0.05):
+            pass
+        session.finish()
+    assert session.published > 2 * len(slow.stamps)
+    assert session.report()["late_outputs"] == {"slow": session.published - len(slow.stamps)}
+    assert slow.closed
+
+
+def test_an_output_that_fails_ends_the_session():
+    failing = Slow(0.0, prompt=True, error=VoodooError("disk full"))
+    with played(3.0) as source:
+        session = Session(source, follower, outputs=[failing])
+        with pytest.raises(VoodooError, match="disk full"):
+            while session.wait(0.05):
+                pass
+        session.live.stop()
+        with pytest.raises(VoodooError, match="disk full"):
+            session.finish()
+    assert failing.closed
+
+
+def test_in_overload_latency_stays_below_two_processing_times():
+    """Four times as many images as can be published."""
+    slow = Slow(0.044, prompt=True)
+    with played(3.0) as source:
+        session = Session(source, follower, outputs=[slow])
+        while session.wait(0.05):
+            pass
+        session.finish()
+    report = session.report()
+    assert report["received"] == 90
+    assert report["dropped"] > 45
+    assert report["published"] + report["dropped"] == 90
+    assert (np.diff(slow.stamps) > 0).all()
+
+
+# A folder that grows
+
+
+def grown(folder, frames, *, start=0):
+    for number, frame in enumerate(frames, start=start):
+        item = depth_of(frame)
+        done, data = cv2.imencode(".png", item.image)
+        assert done
+        yield folder / "depth" / f"{item.stamp:.6f}.png", data.tobytes(), number
+
+
+def calibration_of(item):
+    rows = ", ".join(str([float(value) for value in row]) for row in item.root_from_sensor)
+    camera = item.camera
+    return (
+        f"width = {camera.width}\nheight = {camera.height}\nfx = {camera.fx}\nfy = {camera.fy}\ncx = {camera.cx}\n"
+        f'cy = {camera.cy}\ndepth_factor = 1000.0\nroot_frame = "base_link"\nroot_from_sensor = [{rows}]\n'
+    )
+
+
+def test_new_images_of_a_folder_are_tracked(tmp_path):
+    frames = list(open_recording(sample_path(), use=("depth",)))[:12]
+    (tmp_path / "depth").mkdir()
+    (tmp_path / "calibration.toml").write_text(calibration_of(depth_of(frames[0])))
+    (tmp_path / "depth" / "1.000000.png").write_bytes(b"what lay there before is left")
+    rig = Rig(follower_of(), source=GrowingSource(tmp_path, sleep=lambda _: None))
+    source = rig.live.sources[0]
+    source.open(rig.clock, rig.live.faults)
+    for path, data, number in grown(tmp_path, frames):
+        half = len(data) // 2
+        if number % 3 == 0:  # it is looked at while it is written
+            path.write_bytes(data[:half])
+            rig.deliver(*source.read(0.0))
+        path.write_bytes(data)
+        rig.clock.at += 1 / 30
+        rig.deliver(*source.read(0.0))
+    assert [frame.stamp for frame in rig.frames] == pytest.approx([depth_of(frame).stamp for frame in frames], abs=1e-6)
+    assert np.array_equal(rig.frames[5].measurements[-1].image, depth_of(frames[5]).image)
+    assert rig.counts == {}
+    assert str(rig.steps[-1].estimates[1].status) == "tracking"
+    (tmp_path / "depth" / "1700201009.000000.png").write_bytes(b"no picture")
+    rig.deliver(*source.read(0.0))
+    rig.clock.at += 1.0
+    rig.deliver(*source.read(0.0))
+    assert rig.counts["damaged picture"] == 1
+
+
+def test_a_folder_may_come_later_and_go(tmp_path):
+    told, frames = [], list(open_recording(sample_path(), use=("depth",)))[:4]
+    folder = tmp_path / "later"
+    with voodoo.live.open(f"grow:{folder}", tell=told.append) as source:
+        assert source.next(0.05) is None
+        assert source.status == "waiting"
+        (folder / "depth").mkdir(parents=True)
+        (folder / "calibration.toml").write_text(calibration_of(depth_of(frames[0])))
+        until = time.monotonic() + 5.0
+        while not any("there again" in line for line in told) and time.monotonic() < until:
+            time.sleep(0.01)
+        for path, data, _ in grown(folder, frames[:1]):
+            path.write_bytes(data)
+        assert source.next(5.0).stamp == depth_of(frames[0]).stamp
+        shutil.rmtree(folder)
+        until = time.monotonic() + 5.0
+        while "gone" not in source.faults.counts and time.monotonic() < until:
+            time.sleep(0.01)
+    assert source.faults.counts["gone"] == 1
+    assert any("waiting for it" in line for line in told)
+
+
+def test_the_guide_names_every_fault():
+    text = (ROOT / "docs/how-to/live.md").read_text(encoding="utf-8")
+    assert [name for name in FAULTS if f"`{name}`" not in text] == []
+
+
+def test_threads_end():
+    before = threading.active_count()
+    with played(8.0) as source:
+        assert source.next(2.0) is not None
+    assert threading.active_count() == before
