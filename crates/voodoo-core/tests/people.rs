@@ -5,7 +5,8 @@ mod scene;
 
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{ColorImage, ColorPixels, Frame};
+use voodoo_core::observation::frame::Frame;
+use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 use voodoo_core::people::Options;
 use voodoo_core::{Body, Config, People, Status};
 

@@ -4,9 +4,8 @@ use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArra
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{
-    Cloud, ColorImage, ColorPixels, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope,
-};
+use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 
 use crate::arrays::{PointArray, PointView, contiguous};
 use crate::errors::IntoPy;

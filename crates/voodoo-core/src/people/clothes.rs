@@ -2,7 +2,8 @@
 
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
-use crate::observation::frame::{ColorImage, DepthImage, Frame};
+use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::picture::ColorImage;
 use crate::visibility::ALONG_LIMB;
 
 /// Limbs that show what is worn above the waist, and below it, by what their names hold.

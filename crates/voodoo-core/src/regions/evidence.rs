@@ -5,7 +5,7 @@ use crate::association::correspondence::RegionSupport;
 /// A mean log ratio beside the contour that is told from none.
 const TOLD: f32 = 0.15;
 /// The outer part of a limb begins at this share of its length.
-const OUTER: f64 = 0.6;
+const OUTER_FROM: f64 = 0.6;
 
 /// Sums over the lines of a limb.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,7 +23,7 @@ impl Evidence {
         self.lines += 1.0;
         let Some([inside, outside]) = beside else { return };
         self.told += 1.0;
-        let weights = [t.max(0.1), if t > OUTER { 1.0 } else { 0.0 }];
+        let weights = [t.max(0.1), if t > OUTER_FROM { 1.0 } else { 0.0 }];
         let own = inside > TOLD && outside < -TOLD;
         let against = inside < -TOLD;
         for (sum, counts) in self.sums.iter_mut().zip([true, own, against]) {

@@ -1,6 +1,6 @@
 //! How often colours are seen: 16 x 16 x 16 bins of colours, or 256 of grey, smoothed.
 
-use crate::observation::frame::ColorPixels;
+use crate::observation::picture::ColorPixels;
 
 /// Bits of each channel that tell its bin.
 const BITS: u32 = 4;

@@ -8,11 +8,11 @@ use crate::body::Body;
 use crate::math::{Pose, Vec3};
 
 /// Pixels of the picture, across and down, that one cell stands for.
-pub(super) const CELL: usize = 2;
+pub(super) const PIXELS_A_CELL: usize = 2;
 /// Corners of an end's outline.
 const CORNERS: usize = 8;
 /// A limb with an end nearer than this to the camera's plane is not drawn, metres.
-const NEAREST: f64 = 0.1;
+const NEAREST_END: f64 = 0.1;
 
 /// No limb is seen there.
 pub(super) const NOTHING: u16 = u16::MAX;
@@ -38,7 +38,7 @@ struct Axis {
 impl Labels {
     /// Draws all limbs as a camera sees them.
     pub(super) fn draw(&mut self, body: &Body, camera_from_limb: &[Pose], lens: &Lens) {
-        (self.columns, self.rows) = (lens.width.div_ceil(CELL), lens.height.div_ceil(CELL));
+        (self.columns, self.rows) = (lens.width.div_ceil(PIXELS_A_CELL), lens.height.div_ceil(PIXELS_A_CELL));
         self.limb.clear();
         self.limb.resize(self.columns * self.rows, NOTHING);
         self.depth.resize(self.columns * self.rows, 0.0);
@@ -46,7 +46,7 @@ impl Labels {
             let shape = &limb.shape;
             let ends = [(shape.a0(), shape.b0(), 0.0), (shape.a1(), shape.b1(), shape.length())];
             let centres = ends.map(|(_, _, z)| *pose * (Vec3::Z * z));
-            if ends.iter().zip(centres).any(|((a, b, _), centre)| centre.z - a.max(*b) < NEAREST) {
+            if ends.iter().zip(centres).any(|((a, b, _), centre)| centre.z - a.max(*b) < NEAREST_END) {
                 continue;
             }
             self.corners.clear();
@@ -54,10 +54,11 @@ impl Labels {
                 for corner in 0..CORNERS {
                     let (s, c) = f64::sin_cos(std::f64::consts::TAU * corner as f64 / CORNERS as f64);
                     let place = lens.project(*pose * Vec3::new(a * c, b * s, z));
-                    self.corners.push(place.map(|value| (value / CELL as f64) as f32));
+                    self.corners.push(place.map(|value| (value / PIXELS_A_CELL as f64) as f32));
                 }
             }
-            let [start, end] = centres.map(|centre| lens.project(centre).map(|value| (value / CELL as f64) as f32));
+            let [start, end] =
+                centres.map(|centre| lens.project(centre).map(|value| (value / PIXELS_A_CELL as f64) as f32));
             let front = |end: usize| (centres[end].z - 0.5 * (ends[end].0 + ends[end].1)) as f32;
             let along = [end[0] - start[0], end[1] - start[1]];
             let square = (along[0] * along[0] + along[1] * along[1]).max(1.0);
@@ -70,7 +71,7 @@ impl Labels {
     /// The limb that a cell shows and its depth, metres.
     #[inline]
     pub(super) fn at(&self, u: f32, v: f32) -> (u16, f32) {
-        let (column, row) = ((u * (1.0 / CELL as f32)) as usize, (v * (1.0 / CELL as f32)) as usize);
+        let (column, row) = ((u * (1.0 / PIXELS_A_CELL as f32)) as usize, (v * (1.0 / PIXELS_A_CELL as f32)) as usize);
         let index = row * self.columns + column;
         match self.limb.get(index) {
             Some(limb) if column < self.columns => (*limb, self.depth[index]),

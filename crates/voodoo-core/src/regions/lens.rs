@@ -1,7 +1,7 @@
 //! A camera's picture plane.
 
 use crate::math::Vec3;
-use crate::observation::frame::ColorImage;
+use crate::observation::picture::ColorImage;
 
 /// Size and lens of a picture; straight lines are straight in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

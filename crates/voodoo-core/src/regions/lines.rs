@@ -10,9 +10,9 @@ const RIM: usize = 8;
 /// So far inside and outside of the contour one looks which limb is seen, units: labels are coarse.
 pub(super) const BESIDE: f32 = 3.0;
 /// A limb that lies behind by less than this is no background to one that it is joined to, metres.
-const BEHIND: f32 = 0.10;
+const FAR_BEHIND: f32 = 0.10;
 /// A limb this much nearer than another hides it, metres.
-pub(super) const BEFORE: f32 = 0.03;
+pub(super) const NEARER_BY: f32 = 0.03;
 
 /// A line across the contour.
 #[derive(Clone, Copy, Debug)]
@@ -145,7 +145,7 @@ impl Viewer<'_> {
         let clear = usize::from(own) == limb
             && usize::from(outside) != limb
             && (outside == NOTHING || {
-                let far = if self.body.adjacent(limb, usize::from(outside)) { BEHIND } else { -BEFORE };
+                let far = if self.body.adjacent(limb, usize::from(outside)) { FAR_BEHIND } else { -NEARER_BY };
                 behind > depth + far
             });
         Some(Border { outside, depth, clear })

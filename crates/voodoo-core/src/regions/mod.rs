@@ -19,7 +19,8 @@ use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::{Body, Limb};
 use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
-use crate::observation::frame::{ColorImage, ColorPixels, Frame};
+use crate::observation::frame::Frame;
+use crate::observation::picture::{ColorImage, ColorPixels};
 use evidence::Evidence;
 use histogram::Kind;
 use labels::Labels;
@@ -30,7 +31,7 @@ use scan::Scanner;
 use scene::Scene;
 
 /// How far from the contour its edge is looked for in the steps of a frame, units.
-const REACH: [usize; 4] = [15, 10, 6, 5];
+const REACHES: [usize; 4] = [15, 10, 6, 5];
 /// Lines stand about so far apart along a limb, metres, and so many on each side at least and at most.
 const SPACING: f64 = 0.035;
 const LEAST_LINES: usize = 3;
@@ -140,7 +141,7 @@ impl Regions {
 
     /// The edges of all limbs in all pictures, in the given step of a frame.
     pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
-        let reach = REACH[step.min(REACH.len() - 1)];
+        let reach = REACHES[step.min(REACHES.len() - 1)];
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, reach, true, &mut found.regions);
@@ -150,7 +151,7 @@ impl Regions {
 
     /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
     pub fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
-        self.find_within(frame, posed, REACH[1], false, pairs);
+        self.find_within(frame, posed, REACHES[1], false, pairs);
     }
 
     fn find_within(&mut self, frame: &Frame, posed: Posed, reach: usize, together: bool, pairs: &mut Vec<RegionPair>) {

@@ -5,7 +5,7 @@ use super::histogram::{Histogram, Kind};
 /// Share of a new frame in what is known of a limb's colours, and of those around it: a body keeps its clothes.
 const RATES: [f32; 2] = [0.05, 0.2];
 /// Fewer pixels than this teach nothing.
-const LEAST: f32 = 30.0;
+const LEAST_PIXELS: f32 = 30.0;
 
 /// Colours by group of limbs: the two of a pair have the same.
 #[derive(Clone, Debug, Default)]
@@ -30,7 +30,7 @@ impl ColorModel {
     pub(super) fn learn(&mut self) {
         let Self { kind, limbs, around, room } = self;
         for (histograms, rate) in [limbs, around].into_iter().zip(RATES) {
-            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, LEAST, room));
+            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, LEAST_PIXELS, room));
         }
     }
 

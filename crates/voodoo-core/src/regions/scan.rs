@@ -2,18 +2,18 @@
 
 use super::histogram::bin_of;
 use super::labels::{Labels, NOTHING};
-use super::lines::{BEFORE, BESIDE, Line};
+use super::lines::{BESIDE, Line, NEARER_BY};
 use super::models::ColorModel;
 use super::posterior::{Edge, MOST_REACH, edge};
 use super::scene::Scene;
-use crate::observation::frame::ColorImage;
+use crate::observation::picture::ColorImage;
 
 /// Log ratios are held to this: a colour never seen before proves little.
 const MOST_RATIO: f32 = 2.0;
 /// A limb wider than this is looked for by one edge alone, units.
 const WIDEST: usize = 48;
 /// What is beside the contour is so many samples wide.
-const NEAR: usize = 5;
+const NEXT_TO: usize = 5;
 /// Colours are learnt from this far inside and outside of the contour, units.
 const LEARN_FROM: f32 = 2.0;
 /// As far outside of it the surroundings are learnt, units.
@@ -65,7 +65,7 @@ impl Scanner {
         }
         let (inside, outside) = self.ratios[..count].split_at(reach + width);
         let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
-        let near = NEAR.min(reach);
+        let near = NEXT_TO.min(reach);
         let beside = [mean(&inside[inside.len() - near..]), mean(&outside[..near])];
         Some(Found { edge: edge(&self.ratios[..count], reach, width), beside })
     }
@@ -92,7 +92,7 @@ impl View<'_> {
             line.opposite
         } else if label == line.limb {
             line.outside
-        } else if label != NOTHING && depth < line.depth - BEFORE {
+        } else if label != NOTHING && depth < line.depth - NEARER_BY {
             return 0.0;
         } else {
             label

@@ -2,7 +2,7 @@
 
 use super::histogram::Kind;
 use crate::error::TrackError;
-use crate::observation::frame::{ColorImage, ColorPixels};
+use crate::observation::picture::{ColorImage, ColorPixels};
 
 /// Least standard deviation of a channel, of 255: noise, and what compression makes of it.
 const LEAST_SIGMA: f32 = 6.0;

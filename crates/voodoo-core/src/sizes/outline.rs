@@ -8,10 +8,10 @@ use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Edges of neighbouring lines, and of following frames, err alike: so many tell as much as one.
-const ALIKE: f64 = 3.0;
+const LINES_ALIKE: f64 = 3.0;
 const FRAMES_ALIKE: f64 = 10.0;
 /// How far the axis of a tracked limb is off across itself, metres.
-const ASIDE_SIGMA: f64 = 0.02;
+const AXIS_SIGMA: f64 = 0.02;
 
 /// What anthropometry leaves open of the length of hands, feet and heads, metres.
 const TIP_SIGMA: f64 = 0.03;
@@ -50,7 +50,7 @@ fn asked<'a>(
         let n = working_from_limb.inverse_transform_vector(pair.normal);
         let girth = girth_row(shape, foot, n);
         let row = SVector::from([n.x, n.y, girth.x, girth.y, girth.z]);
-        let weight = kernel(pair.distance) * pair.information / ALIKE;
+        let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
         h += weight * row * row.transpose();
         g += weight * pair.distance * row;
     }
@@ -89,7 +89,7 @@ impl Outline {
             if foot.z < shape.length() * 0.999 {
                 continue;
             }
-            let weight = kernel(pair.distance) * pair.information / ALIKE;
+            let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
             h += weight * along * along;
             g += weight * along * pair.distance;
         }
@@ -109,7 +109,7 @@ impl Outline {
             return None;
         }
         let (h, g) = (h / FRAMES_ALIKE, g / FRAMES_ALIKE);
-        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (ASIDE_SIGMA * ASIDE_SIGMA * FRAMES_ALIKE);
+        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * FRAMES_ALIKE);
         let mixed = h.fixed_view::<3, 2>(2, 0);
         let inverse = aside.try_inverse()?;
         let own = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();

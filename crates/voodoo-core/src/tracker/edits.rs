@@ -4,7 +4,7 @@ use super::Tracker;
 use crate::body::Joint;
 use crate::error::{BodyError, TrackError};
 use crate::math::Vec3;
-use crate::observation::frame::ColorPixels;
+use crate::observation::picture::ColorPixels;
 use crate::shape::TaperedEllipticCylinder;
 
 impl Tracker {
