@@ -33,6 +33,12 @@ impl Evidence {
         }
     }
 
+    /// The limb may not be where it is thought to be: too little speaks for it, or too much against it.
+    pub(super) fn doubts(&self) -> bool {
+        let RegionSupport { own, against, .. } = self.support();
+        self.told > 0.0 && (own[0] < crate::tune!("DOWN", 0.15) || against[0] > crate::tune!("DAG", 2.0))
+    }
+
     pub(super) fn support(&self) -> RegionSupport {
         let [all, own, against] = self.sums;
         let share = |part: [f64; 2]| [0, 1].map(|index| if all[index] > 0.0 { part[index] / all[index] } else { 0.0 });

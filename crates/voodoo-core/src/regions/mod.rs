@@ -66,6 +66,7 @@ pub struct Regions {
     stamp: Option<f64>,
     scanner: Scanner,
     evidence: Vec<Evidence>,
+    doubts: Vec<bool>,
 }
 
 /// The body at the time of a frame, in the working frame.
@@ -134,6 +135,7 @@ impl Regions {
             }
             camera.model.clear(kind, groups);
             camera.known = true;
+            self.evidence.clear();
             self.look(frame, picture, posed);
             self.teach(picture);
         }
@@ -142,6 +144,11 @@ impl Regions {
     /// The edges of all limbs in all pictures, in the given step of a frame.
     pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
         let reach = REACHES[step.min(REACHES.len() - 1)];
+        if step == 0 {
+            self.doubts.clear();
+            self.doubts.extend(self.evidence.iter().map(Evidence::doubts));
+            self.doubts.resize(posed.poses.len(), false);
+        }
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, reach, true, &mut found.regions);
@@ -158,7 +165,7 @@ impl Regions {
         pairs.clear();
         for picture in frame.colors {
             self.look(frame, picture, posed);
-            let Self { cameras, groups, scanner, evidence, .. } = self;
+            let Self { cameras, groups, scanner, evidence, doubts, .. } = self;
             let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera && camera.known) else {
                 continue;
             };
@@ -168,6 +175,8 @@ impl Regions {
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
             for line in &*lines {
+                let far = if together && reach > 5 && doubts[usize::from(line.limb)] { crate::tune!("FAR", 1.0) } else { 1.0 };
+                let reach = ((reach as f64 * far) as usize).min(posterior::MOST_REACH);
                 let found = scanner.edge(&view, line, reach, together);
                 edges.push(found);
                 if together {
@@ -210,11 +219,8 @@ impl Regions {
     }
 
     /// Learns colours where the body was found.
-    pub fn learn(&mut self, frame: &Frame, posed: Posed) {
-        for picture in frame.colors {
-            self.look(frame, picture, posed);
-            self.teach(picture);
-        }
+    pub fn learn(&mut self, frame: &Frame) {
+        frame.colors.iter().for_each(|picture| self.teach(picture));
         self.stamp = Some(frame.stamp);
     }
 
@@ -251,13 +257,16 @@ impl Regions {
         }
     }
 
-    /// Learns the colours along the lines of one picture.
+    /// Learns the colours along the lines of one picture, of limbs that are not in doubt.
     fn teach(&mut self, picture: &ColorImage) {
-        let Self { cameras, groups, .. } = self;
+        let Self { cameras, groups, evidence, .. } = self;
         let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera) else { return };
         let unit = unit_of(&camera.lens);
         for line in &camera.lines {
-            scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
+            let doubtful = evidence.get(usize::from(line.limb)).is_some_and(|evidence| evidence.doubts());
+            if !doubtful {
+                scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
+            }
         }
         camera.model.learn();
     }

@@ -74,6 +74,8 @@ impl Sizes {
         self.open && self.rough
     }
 
+    /// x
+    pub fn open_colors(&self, frame: &crate::observation::frame::Frame) -> bool { self.open && !frame.colors.is_empty() && frame.images.is_empty() }
     /// The sizes are known: no frame changes them.
     pub fn known(&self) -> bool {
         self.set.is_none()
@@ -165,6 +167,16 @@ impl Sizes {
             return;
         }
         self.outlines = vec![Outline::default(); poses.len()];
+        if self.set.is_some() && crate::tune!("SYM", 1.0) > 0.0 {
+            for pair in model.body.pairs().iter().filter(|pair| pair.len() == 2) {
+                let lengths = [0, 1].map(|side| model.body.limbs()[pair[side]].shape.length());
+                let mean = 0.5 * (lengths[0] + lengths[1]);
+                for (limb, length) in pair.iter().zip(lengths) {
+                    model.body.change_length(*limb, mean / length);
+                }
+            }
+            model.body.close_joints(poses);
+        }
         for _ in 0..GIRTH_STEPS {
             fit.match_outline(setting.of(model), poses);
             for (limb, outline) in self.outlines.iter_mut().enumerate() {

@@ -25,7 +25,7 @@ pub(super) struct Outline {
 
 impl Default for Outline {
     fn default() -> Self {
-        let sigmas = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA]);
+        let sh = crate::tune!("SHIFTS", SHIFT_SIGMA); let sigmas = SVector::from([sh, sh, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA]);
         Self {
             information: SMatrix::from_diagonal(&sigmas.map(|sigma: f64| 1.0 / (sigma * sigma))),
             total: GirthFit::default(),

@@ -193,7 +193,7 @@ impl Tracker {
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
         fit.begin_regions(setting.of(model), poses);
-        if sizes.wait_for_pose() {
+        if sizes.wait_for_pose() || (sizes.open_colors(frame) && crate::tune!("PREFIT", 0.0) > 0.0) {
             steps += fit.run(setting.of(model), predicted, poses);
         }
         sizes.initialise(setting, model, poses, fit);
@@ -216,7 +216,7 @@ impl Tracker {
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
-        fit.learn_regions(setting.of(model), poses);
+        fit.learn_regions(setting.of(model));
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
         if relocalizes && self.relocalize(frame, known, share.is_some()) {
