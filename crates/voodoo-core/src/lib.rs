@@ -53,14 +53,6 @@
 //! Robots, New Developments", 2007). [`Tracker::step`] reads like the list in K06 IV-B. The modules are its stages;
 //! the order in which they may use each other is in ARCHITECTURE.md.
 
-#[macro_export]
-#[allow(missing_docs)]
-macro_rules! tune {
-    ($name:literal, $default:expr) => {{
-        static V: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
-        *V.get_or_init(|| std::env::var(concat!("TUNE_", $name)).ok().and_then(|v| v.parse().ok()).unwrap_or($default))
-    }};
-}
 pub mod association;
 pub mod body;
 pub mod config;

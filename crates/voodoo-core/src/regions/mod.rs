@@ -66,7 +66,6 @@ pub struct Regions {
     stamp: Option<f64>,
     scanner: Scanner,
     evidence: Vec<Evidence>,
-    doubts: Vec<bool>,
 }
 
 /// The body at the time of a frame, in the working frame.
@@ -144,11 +143,6 @@ impl Regions {
     /// The edges of all limbs in all pictures, in the given step of a frame.
     pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
         let reach = REACHES[step.min(REACHES.len() - 1)];
-        if step == 0 {
-            self.doubts.clear();
-            self.doubts.extend(self.evidence.iter().map(Evidence::doubts));
-            self.doubts.resize(posed.poses.len(), false);
-        }
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, reach, true, &mut found.regions);
@@ -165,7 +159,7 @@ impl Regions {
         pairs.clear();
         for picture in frame.colors {
             self.look(frame, picture, posed);
-            let Self { cameras, groups, scanner, evidence, doubts, .. } = self;
+            let Self { cameras, groups, scanner, evidence, .. } = self;
             let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera && camera.known) else {
                 continue;
             };
@@ -175,8 +169,6 @@ impl Regions {
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
             for line in &*lines {
-                let far = if together && reach > 5 && doubts[usize::from(line.limb)] { crate::tune!("FAR", 1.0) } else { 1.0 };
-                let reach = ((reach as f64 * far) as usize).min(posterior::MOST_REACH);
                 let found = scanner.edge(&view, line, reach, together);
                 edges.push(found);
                 if together {

@@ -30,7 +30,7 @@ impl ColorModel {
     pub(super) fn learn(&mut self) {
         let Self { kind, limbs, around, room } = self;
         for (histograms, rate) in [limbs, around].into_iter().zip(RATES) {
-            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, if rate < 0.1 { crate::tune!("RF", 0.05) as f32 } else { crate::tune!("RB", 0.2) as f32 }, LEAST_PIXELS, room));
+            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, LEAST_PIXELS, room));
         }
     }
 

@@ -12,6 +12,8 @@ use crate::observation::picture::ColorImage;
 const MOST_RATIO: f32 = 2.0;
 /// A limb wider than this is looked for by one edge alone, units.
 const WIDEST: usize = 48;
+/// How far from the contour brightness is compared, units.
+const LOCAL: f32 = 12.0;
 /// Least standard deviation of brightness beside the contour, of 255.
 const LEAST_SPREAD: f32 = 6.0;
 /// What is beside the contour is so many samples wide.
@@ -65,7 +67,7 @@ impl Scanner {
         for (index, ratio) in self.ratios[..count].iter_mut().enumerate() {
             *ratio = view.ratio(line, group, start + index as f32);
         }
-        if view.model.kind == Kind::Grey && crate::tune!("LG", 1.0) > 0.0 {
+        if view.model.kind == Kind::Grey {
             self.compare_locally(view, line, start, count);
         }
         let (inside, outside) = self.ratios[..count].split_at(reach + width);
@@ -112,16 +114,14 @@ impl Scanner {
             let steps = (to - from).max(0.0) as usize;
             Local::of((0..steps).filter_map(|step| value(from + step as f32)))
         };
-        let n = crate::tune!("LGN", 12.0) as f32;
-        let (inside, outside) = (side(-line.width.min(n), -1.0), side(1.0, n));
+        let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
         if inside.count < 3.0 || outside.count < 3.0 {
             return;
         }
-        let w = crate::tune!("LGW", 0.5) as f32;
         for (index, ratio) in self.ratios[..count].iter_mut().enumerate().filter(|(_, ratio)| **ratio != 0.0) {
             let Some(value) = value(start + index as f32) else { continue };
             let local = (inside.log(value) - outside.log(value)).clamp(-MOST_RATIO, MOST_RATIO);
-            *ratio = (1.0 - w) * *ratio + w * local;
+            *ratio = 0.5 * (*ratio + local);
         }
     }
 }

@@ -59,7 +59,7 @@ impl Solver for WholeBody {
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], change: &mut [f64]) -> bool {
         self.sum_terms(problem, poses, false);
         let Self { normal, chain, lengths, .. } = self;
-        chain.lengths(problem.body, normal, poses, pairs, [crate::tune!("LHOLD", 1e4), crate::tune!("LPULL", 5e2)], change, lengths)
+        chain.lengths(problem.body, normal, poses, pairs, LENGTH_INFORMATION, change, lengths)
     }
 
     fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {

@@ -193,7 +193,7 @@ impl Tracker {
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
         fit.begin_regions(setting.of(model), poses);
-        if sizes.wait_for_pose() || (sizes.open_colors(frame) && crate::tune!("PREFIT", 0.0) > 0.0) {
+        if sizes.wait_for_pose() {
             steps += fit.run(setting.of(model), predicted, poses);
         }
         sizes.initialise(setting, model, poses, fit);
