@@ -34,6 +34,7 @@ class Skeletons(Node):
         depth = self.resolve_topic_name("depth")
         faults = Faults(self.get_logger().warning)
         self.feed, self.frames = RosFeed([depth], faults, HostClock()), Assembler(faults)
+        self.feed.expects_transforms = TFMessage is not None
         self.follower = Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
         types = {f"{BODY}/joint_states": JointState, f"{BODY}/markers": MarkerArray}
         latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -182,9 +182,20 @@ def test_all_types_arrive_and_transforms_are_interpolated():
 
 
 def test_the_node_for_those_who_have_ros(images):
-    """examples/ros2_node.py cannot run without voodoo in ROS's Python; its messages are those of `instant`."""
-    text = (HERE.parent.parent / "examples" / "ros2_node.py").read_text()
-    compile(text, "ros2_node.py", "exec")
+    """Depth from one node of rclpy to examples/ros2_node.py, which is another, and its skeletons back."""
+    example = HERE.parent.parent / "examples" / "ros2_node.py"
+    command = [os.environ["VOODOO_PEER"], str(example), "--ros-args", "-r", f"depth:={TOPIC}"]
+    node = subprocess.Popen(command)
+    try:
+        theirs = json.loads(peer(images, "--count", str(COUNT)).communicate(timeout=90)[0])
+        assert node.poll() is None
+    finally:
+        node.kill()
+        node.wait()
+    stamps = [stamp for stamp, _ in theirs["states"]]
+    assert len(stamps) == len(theirs["markers"]) > 0.2 * COUNT
+    assert set(stamps) <= set(theirs["sent"])
+    assert "l_elbow_1" in theirs["names"]
 
 
 def test_offers_are_seen_with_their_quality():
