@@ -137,7 +137,12 @@ class Live:
             return "ended"
         if self._good is None:
             return "waiting"
-        return "lost" if self.silent > self._patience else "running"
+        return "lost" if self.lost else "running"
+
+    @property
+    def lost(self) -> bool:
+        """Whether there was nothing usable for LOST_S, or two and a half periods of a slow source; also at its end."""
+        return self._good is not None and self.silent > self._patience
 
     @property
     def silent(self) -> float:
@@ -281,6 +286,6 @@ class Live:
 
     def _watch(self) -> None:
         """Tell that a source stalls."""
-        if not self._lost and self._good is not None and self.silent > self._patience and not self._inbox.closed:
+        if not self._lost and self.lost and not self._inbox.closed:
             self._lost = True
             self.faults.add("stalled", f"nothing usable for {self.silent:.1f} s: lost", self.clock.now())

@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from rosbags.typesys import Stores, get_typestore
 
 from voodoo.errors import RecordingError, reading
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Fault, Faults, kind_of
+from voodoo.live.ros2.types import STORE
 from voodoo.live.source import Arrival
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
@@ -47,8 +47,6 @@ _JUMP_S = 1.0
 _TF_PATIENCE_S = 0.05
 ROOT_PATIENCE_S = 1.0
 """How long the first frame waits for a chain of transforms to one of STANDING."""
-
-_STORE = get_typestore(Stores.ROS2_HUMBLE)
 
 
 @dataclass
@@ -97,6 +95,8 @@ class RosFeed:
         self._since: float | None = None
         self._cameras: dict[str, _Calibrated] = {}
         self.expects_transforms = True
+        for kind in (*MEASURED, CAMERA_INFO, TF):
+            STORE.get_msgdef(kind)  # else the first message of a type takes tens of milliseconds
 
     @property
     def root_frame(self) -> str:
@@ -125,7 +125,7 @@ class RosFeed:
         """
         try:
             with reading(topic, f"a {kind} message"):
-                message = _STORE.deserialize_cdr(raw, kind)
+                message = STORE.deserialize_cdr(raw, kind)
         except RecordingError as error:
             self._refuse(topic, error, "unreadable message")
             return []
@@ -294,4 +294,4 @@ def _whole(message: Message) -> Iterator[None]:
 
 def _one(item: Message) -> Message:
     """A TFMessage of one transform: a bad one costs no other."""
-    return _STORE.types[TF](transforms=[item])
+    return STORE.types[TF](transforms=[item])

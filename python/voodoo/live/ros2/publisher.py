@@ -67,6 +67,7 @@ class Ros2Output(Output):
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
+            STORE.get_msgdef(kind)
             self._topics[topic] = self._node.advertise(topic, kind, depth=depth)
         return self._topics[topic]
 
