@@ -4,7 +4,7 @@
 
 The first run starts from init.json, the others with 4 mm of noise on its joints. Prints mean error, class (K06 Table I made
 automatic) and the joints that are still lost at the end, run by run; and how many of the limbs that were off by 10 cm, and of
-the others, were not called measured. Against a reference skeleton, which leads the depth by some
+the others, were not called measured; and how errors compare with their standard deviations. Against a reference skeleton, which leads the depth by some
 frames, errors are at the recording's best lag and 15 cm count as lost, as in `voodoo eval`.
 
 `--backwards` plays the recordings from their end, starting from the true joints there, and `--every 2` leaves out every second
@@ -20,7 +20,8 @@ import numpy as np
 
 import voodoo
 from voodoo.evaluation import metrics
-from voodoo.evaluation.evaluate import called_measured, compare, limb_ends
+from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown, sigma_of
+from voodoo.evaluation.evaluate import called_measured, compare, differences, limb_ends
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M
 from voodoo.export.track import Track
 from voodoo.pipeline.run import track
@@ -74,9 +75,9 @@ def mirrored(frame: RecordedFrame, ends: float) -> RecordedFrame:
 
 def run(
     recording: Recording, chance: np.random.Generator, noise: float
-) -> tuple[float, int, list[str], list[tuple[int, int]]]:
+) -> tuple[float, int, list[str], list[tuple[int, int]], Deviations]:
     """Mean error [m], class, the joints lost at the end; of limbs off by 10 cm, and of the others, how many were not called
-    measured and how many there were."""
+    measured and how many there were; and the errors by coordinate."""
     start, reference = known(recording)
     height = start.get("height_m")
     tracker = voodoo.Tracker(voodoo.Body.human() if height is None else voodoo.Body.human(height))
@@ -86,6 +87,7 @@ def run(
     estimates = [step.estimate for step in track(recording, tracker, settings=settings)]
     result = Track.of(estimates, body=tracker.body)
     errors = compare(recording, result, at_best_lag=not reference.exact)
+    off = differences(recording, result, at_best_lag=not reference.exact)
     limit = LIMIT_EXACT_M if reference.exact else LIMIT_REFERENCE_M
     kind, lost = metrics.tracking_class(errors, result.stamps, limit=limit)
     measured = np.array([called_measured(estimate) for estimate in estimates])
@@ -95,6 +97,7 @@ def run(
         kind,
         [name for name, gone in zip(metrics.JOINTS, lost[-1], strict=True) if gone],
         [(int((group & ~measured).sum()), int(group.sum())) for group in groups],
+        Deviations(off, np.array([sigma_of(estimate) for estimate in estimates]), measured),
     )
 
 
@@ -107,7 +110,8 @@ def main() -> None:
     options = parser.parse_args()
     if options.every < 1:
         parser.error(f"--every: expected at least 1, found {options.every}")
-    ended, means, counts = 0, [], np.zeros((2, 2), dtype=int)
+    ended, means, counts, exact = 0, [], np.zeros((2, 2), dtype=int), True
+    deviations: list[Deviations] = []
     print("| recording | error, cm | mean | class | lost at the end |\n|---|---|---|---|---|")
     for path in options.recordings:
         recording: Recording = voodoo.open_recording(path)
@@ -116,8 +120,10 @@ def main() -> None:
         chance = np.random.default_rng(0)
         runs = [run(recording, chance, NOISE_M if start else 0.0) for start in range(options.starts)]
         errors = [100.0 * error for error, *_ in runs]
-        gone = [", ".join(names) for _, _, names, _ in runs if names]
-        counts += np.sum([count for *_, count in runs], axis=0)
+        gone = [", ".join(names) for _, _, names, *_ in runs if names]
+        counts += np.sum([count for *_, count, _ in runs], axis=0)
+        deviations += [each for *_, each in runs]
+        exact &= known(recording)[1].exact
         ended += len(gone)
         means.append(np.mean(errors))
         cells = [
@@ -131,6 +137,9 @@ def main() -> None:
     for (told, all_of_them), which in zip(counts, ("off by 10 cm", "nearer"), strict=True):
         share = f"{100.0 * told / all_of_them:.1f} %" if all_of_them else "none"
         print(f"{all_of_them} limbs {which}: {share} not called measured")
+    calibration = calibrate(deviations)
+    if calibration is not None:
+        print("\n" + calibration_markdown(calibration, "exact truth" if exact else "reference skeleton"))
 
 
 if __name__ == "__main__":

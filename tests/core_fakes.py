@@ -61,6 +61,9 @@ class Estimate:
     residual: float = 0.012
     limb_points: dict = field(default_factory=dict)
     limb_status: dict = field(default_factory=dict)
+    joint_covariances: np.ndarray = field(default_factory=lambda: np.empty((0, 3, 3)))
+    limb_covariance: dict = field(default_factory=dict)
+    joint_sigma: dict = field(default_factory=dict)
 
 
 def searching(stamp):

@@ -207,6 +207,19 @@ def test_the_command_line_draws_every_frame(run, monkeypatch):
     assert "nobody was found in 2 frames" in told.stderr
 
 
+def test_a_frame_that_is_refused_costs_no_other_one(run, monkeypatch):
+    def with_one_twice(own, every=MadeUpRecording.__iter__):
+        first, second, third = islice(every(own), 3)
+        return iter((first, second, second, third))
+
+    monkeypatch.setattr(MadeUpRecording, "__iter__", with_one_twice)
+    refused = run("--people", "any", "--out", "a.csv", "--strict")
+    assert refused.exit_code == 1 and "frame 2" in refused.stderr
+    told = run("--people", "any", "--out", "a.csv")
+    assert told.exit_code == 0 and told.stdout.startswith("3 frames"), told.output
+    assert "left out 1 that the tracker refuses" in told.stderr
+
+
 def test_boxes_and_the_floor_reach_the_frame():
     recording = two_people()
     everywhere = FrontEndSettings(use=("depth",), exclude=(((0.0, -5.0, -1.0), (9.0, 5.0, 3.0)),))

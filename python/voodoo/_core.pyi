@@ -142,8 +142,10 @@ def nearest_surface(
         MeasurementError: other shapes.
     """
 
-def _estimate(head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...]) -> Estimate:
-    """An estimate of what pickle and copy keep of it."""
+def _estimate(
+    head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...], spread: tuple[Any, ...] | None = None
+) -> Estimate:
+    """An estimate of what pickle and copy keep of it; earlier ones kept no `spread`."""
 
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""
@@ -512,6 +514,28 @@ class Estimate:
         """What the frame says about every limb: "measured", "inferred" (hidden, out of view, or nothing seen that another
         limb would not explain as well: carried by joints and prediction) or "lost" (it should show where it is, and does
         not)."""
+    @property
+    def covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """Covariance (3, 3) [m^2] of the position of every joint and site, world frame; NaN before the first frame."""
+    @property
+    def joint_covariances(self) -> npt.NDArray[np.float64]:
+        """The same as an array (J, 3, 3) in the order of joint_names."""
+    @property
+    def joint_sigma(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """Standard deviation (3,) [m] of every joint's and site's x, y and z in the world."""
+    @property
+    def limb_covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the
+        origin of the limb's frame, as in geometry_msgs/PoseWithCovariance."""
+    @property
+    def angle_covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """Covariance (3, 3) [rad^2] of the turn of every joint about the world's axes."""
+    @property
+    def length_sigma(self) -> Mapping[str, float]:
+        """Standard deviation of every limb's length [m]; NaN where lengths are not refined."""
+    @property
+    def girth_sigma(self) -> Mapping[str, float]:
+        """Standard deviation of every limb's mean radius [m]; NaN where girths are not refined."""
     @property
     def limb_points(self) -> Mapping[str, int]:
         """Matched points of every limb."""

@@ -72,6 +72,7 @@ pub mod terms;
 #[cfg(test)]
 mod testing;
 pub mod tracker;
+pub mod uncertainty;
 pub mod visibility;
 
 pub use body::Body;

@@ -6,8 +6,9 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
 use voodoo_core::Body;
-use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
+use voodoo_core::uncertainty::Covariances;
 
 use crate::arrays::{frozen, matrix};
 use crate::errors::exception;
@@ -51,6 +52,18 @@ fn mapping<'py, 'a, T: IntoPyObject<'py>>(
     Ok(PyMappingProxy::new(py, dict.as_mapping()))
 }
 
+fn matrices<'py, 'a>(
+    py: Python<'py>,
+    items: impl Iterator<Item = (&'a String, &'a Mat3)>,
+) -> PyResult<Bound<'py, PyMappingProxy>> {
+    let dict = PyDict::new(py);
+    for (name, matrix) in items {
+        // Symmetric: columns are rows.
+        dict.set_item(name, frozen(py, matrix.to_cols_array().to_vec(), &[3, 3])?)?;
+    }
+    Ok(PyMappingProxy::new(py, dict.as_mapping()))
+}
+
 pub fn status_word(status: Status) -> &'static str {
     match status {
         Status::Tracking => "tracking",
@@ -83,9 +96,37 @@ type Found = (
     Vec<(usize, usize, f64, f64)>,
 );
 
-/// An estimate of what pickle and copy keep of it.
+/// Covariances of sites (nine numbers each), limbs (36) and joints (nine); standard deviations of lengths and girths.
+type Spread = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
+
+fn spread_of(found: &Covariances) -> Spread {
+    let flat = |all: &[Mat3]| all.iter().flat_map(Mat3::to_cols_array).collect();
+    let limbs = found.limbs.iter().flatten().flatten().copied().collect();
+    (flat(&found.sites), limbs, flat(&found.turns), found.lengths.clone(), found.girths.clone())
+}
+
+fn covariances((sites, limbs, turns, lengths, girths): Spread) -> Covariances {
+    let matrices = |flat: &[f64]| flat.as_chunks::<9>().0.iter().map(Mat3::from_cols_array).collect();
+    let limb = |flat: &[f64; 36]| std::array::from_fn(|row| std::array::from_fn(|column| flat[6 * row + column]));
+    Covariances {
+        sites: matrices(&sites),
+        limbs: limbs.as_chunks::<36>().0.iter().map(limb).collect(),
+        turns: matrices(&turns),
+        lengths,
+        girths,
+    }
+}
+
+/// An estimate of what pickle and copy keep of it; earlier ones kept no `spread`.
 #[pyfunction]
-pub fn _estimate(py: Python<'_>, head: Head, names: AllNames, found: Found) -> PyResult<PyEstimate> {
+#[pyo3(signature = (head, names, found, spread=None))]
+pub fn _estimate(
+    py: Python<'_>,
+    head: Head,
+    names: AllNames,
+    found: Found,
+    spread: Option<Spread>,
+) -> PyResult<PyEstimate> {
     let wrong = |word: &str| exception(py, "MeasurementError", format!("estimate: found the unknown status {word:?}"));
     let (stamp, status, mean_squared_distance, steps) = head;
     let (limbs, sites, joints, sources) = names;
@@ -114,6 +155,7 @@ pub fn _estimate(py: Python<'_>, head: Head, names: AllNames, found: Found) -> P
             .into_iter()
             .map(|(count, inliers, weight, residual)| SourceReport { count, inliers, weight, residual })
             .collect(),
+        covariances: spread.map(covariances).unwrap_or_default(),
     };
     Ok(PyEstimate { estimate, names: Arc::new(Names { limbs, sites, joints }), sources })
 }
@@ -207,6 +249,66 @@ impl PyEstimate {
         Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
+    /// Covariance (3, 3) [m^2] of the position of every joint and site, world frame; NaN before the first frame.
+    #[getter]
+    fn covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let this = slf.get();
+        matrices(slf.py(), this.names.sites.iter().zip(&this.estimate.covariances.sites))
+    }
+
+    /// The same as an array (J, 3, 3) in the order of joint_names.
+    #[getter]
+    fn joint_covariances<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let sites = &self.estimate.covariances.sites;
+        frozen(py, sites.iter().flat_map(Mat3::to_cols_array).collect(), &[sites.len(), 3, 3])
+    }
+
+    /// Standard deviation (3,) [m] of every joint's and site's x, y and z in the world.
+    #[getter]
+    fn joint_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let (py, this) = (slf.py(), slf.get());
+        let dict = PyDict::new(py);
+        for (name, covariance) in this.names.sites.iter().zip(&this.estimate.covariances.sites) {
+            let sigma = (0..3).map(|axis| covariance.col(axis)[axis].sqrt()).collect();
+            dict.set_item(name, frozen(py, sigma, &[3])?)?;
+        }
+        Ok(PyMappingProxy::new(py, dict.as_mapping()))
+    }
+
+    /// Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the origin
+    /// of the limb's frame, as in geometry_msgs/PoseWithCovariance.
+    #[getter]
+    fn limb_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let (py, this) = (slf.py(), slf.get());
+        let dict = PyDict::new(py);
+        for (name, covariance) in this.names.limbs.iter().zip(&this.estimate.covariances.limbs) {
+            dict.set_item(name, frozen(py, covariance.iter().flatten().copied().collect(), &[6, 6])?)?;
+        }
+        Ok(PyMappingProxy::new(py, dict.as_mapping()))
+    }
+
+    /// Covariance (3, 3) [rad^2] of the turn of every joint about the world's axes.
+    #[getter]
+    fn angle_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let this = slf.get();
+        let turns = this.names.joints.iter().zip(&this.estimate.covariances.turns);
+        matrices(slf.py(), turns.filter_map(|(name, turn)| Some((name.as_ref()?, turn))))
+    }
+
+    /// Standard deviation of every limb's length [m]; NaN where lengths are not refined.
+    #[getter]
+    fn length_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let this = slf.get();
+        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.lengths.iter().copied()))
+    }
+
+    /// Standard deviation of every limb's mean radius [m]; NaN where girths are not refined.
+    #[getter]
+    fn girth_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let this = slf.get();
+        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.girths.iter().copied()))
+    }
+
     /// Matched points of every limb.
     #[getter]
     fn limb_points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
@@ -242,7 +344,7 @@ impl PyEstimate {
     }
 
     /// For pickle and copy.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Head, AllNames, Found))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Head, AllNames, Found, Spread))> {
         let (found, names) = (&self.estimate, &*self.names);
         let pose = |pose: &Pose| (pose.translation.to_array(), pose.rotation.to_array());
         let source = |report: &SourceReport| (report.count, report.inliers, report.weight, report.residual);
@@ -257,7 +359,7 @@ impl PyEstimate {
             found.joint_gaps.clone(),
             found.sources.iter().map(source).collect(),
         );
-        Ok((py.import("voodoo._core")?.getattr("_estimate")?, (head, all, rest)))
+        Ok((py.import("voodoo._core")?.getattr("_estimate")?, (head, all, rest, spread_of(&found.covariances))))
     }
 
     pub fn __repr__(&self) -> String {

@@ -47,7 +47,7 @@ def eval_command(
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
 
     Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
-    summary.csv, summary.md and errors.png. Ends with exit code 1 if a recording could not be tracked to its end. Ctrl-C keeps
+    summary.csv, summary.md, errors.png and calibration.png. Ends with exit code 1 if a recording could not be tracked to its end. Ctrl-C keeps
     the recordings that are done and ends with exit code 130.
 
     With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
@@ -121,7 +121,7 @@ def eval_command(
         ordered = sorted(finished, key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
         if scores:
-            typer.echo(markdown(scores))
+            typer.echo(markdown(scores, tables))
         if out is not None and scores:
             files = write_reports(out, scores, tables, picture=not interrupted)
             typer.echo("wrote " + ", ".join(str(file) for file in files))

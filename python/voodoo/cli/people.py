@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from voodoo.names import HumanModel
     from voodoo.people import People
     from voodoo.pipeline.start import Automatic
+    from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.recording import Recording
     from voodoo.sensors.settings import FrontEndSettings
     from voodoo.visualization.rerun_viewer import Viewer
@@ -76,11 +77,13 @@ class Outputs:
     viewer: Viewer | None
 
 
-def follow_people(source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs) -> None:
+def follow_people(
+    source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
+) -> None:
     """Track everybody in a recording, and write what was asked for."""
     from voodoo.export.people_files import save_people
 
-    result, bodies, interrupted = _run(source, people, settings, outputs)
+    result, bodies, interrupted = _run(source, people, settings, outputs, left_out)
     written = [
         file
         for target in outputs.targets
@@ -105,7 +108,9 @@ class _Followed(NamedTuple):
     interrupted: bool
 
 
-def _run(source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs) -> _Followed:
+def _run(
+    source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
+) -> _Followed:
     """Track and draw. Ctrl-C ends it with the frames up to there, if any."""
     from voodoo.export.people import PeopleTrack
     from voodoo.pipeline.people import track_people
@@ -121,7 +126,7 @@ def _run(source: Recording, people: People, settings: FrontEndSettings, outputs:
     )
     with writer or nullcontext():
         try:
-            steps = track_people(source, people, settings=settings)
+            steps = track_people(source, people, settings=settings, left_out=left_out)
             for step in progressing(steps, source.name, len(source)):
                 estimates.append(step.estimate)
                 bodies |= {person.id: people.body(person.id) for person in step.estimate}

@@ -166,7 +166,7 @@ def track_command(
             everybody = People(body_of(body, height=height, model=model), config=config_of(config), limit=limit)
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
             with viewer_of(view, save, source.name) as viewer:
-                follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer))
+                follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer), left_out)
             _say_left_out(source, left_out)
             return
         tracker = start_tracker(

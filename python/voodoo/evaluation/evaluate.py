@@ -22,6 +22,7 @@ from voodoo._core import Estimate
 from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
+from voodoo.evaluation.calibration import Deviations, sigma_of
 from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
@@ -79,7 +80,17 @@ def evaluate(
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
         seen = witness(frame.recorded, tracker, estimate, truth, selection)
         measured = called_measured(estimate)
-        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, joints, measured, seen))
+        steps.append(
+            _Step(
+                float(estimate.stamp),
+                str(estimate.status),
+                frame.seconds,
+                joints,
+                measured,
+                seen,
+                sigma_of(estimate),
+            )
+        )
     if not steps:
         raise RecordingError(f"{path}: expected at least one frame, found none")
     return _score(recording, path, selection, steps)
@@ -88,6 +99,11 @@ def evaluate(
 def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
     """Errors (F, 12) [m] of metrics.JOINTS against the recording's reference, at lag 0 or at the best one; NaN where it is
     missing."""
+    return np.asarray(np.linalg.norm(differences(recording, result, at_best_lag=at_best_lag), axis=2))
+
+
+def differences(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
+    """The same by coordinate, (F, 12, 3): estimate less reference."""
     column = {name: index for index, name in enumerate(result.joint_names)}
     positions = np.full((len(result), len(metrics.JOINTS), 3), np.nan)
     for index, name in enumerate(metrics.JOINTS):
@@ -95,7 +111,7 @@ def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -
             positions[:, index] = result.joints[:, column[name]]
     reference = _reference_positions(recording, result.stamps)
     lag = metrics.best_lag(positions, reference) if at_best_lag else 0
-    return metrics.joint_errors(positions, reference, lag=lag)
+    return np.asarray(positions - metrics.shifted(reference, lag))
 
 
 def called_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
@@ -225,6 +241,7 @@ class _Step:
     joints: FloatArray
     measured: npt.NDArray[np.bool_]
     witness: FrameWitness
+    sigma: FloatArray
 
 
 def _score(recording: Recording, path: Path, selection: Selection, steps: Sequence[_Step]) -> tuple[Score, FrameTable]:
@@ -292,7 +309,9 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         step_s=float(seconds.mean()),
     )
     within = np.array([step.witness.within for step in steps])
-    return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
+    sigma = np.array([step.sigma for step in steps])
+    deviations = None if exact is None else Deviations(positions - compared, sigma, measured)
+    return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds, deviations)
 
 
 def _first_pose(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from voodoo.evaluation import metrics
+from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown, plot_calibration
 from voodoo.evaluation.plot import plot_errors
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.evaluation.summary import summarize
@@ -45,9 +46,11 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
 )
 
 
-def markdown(scores: Sequence[Score]) -> str:
-    """The table over all sequences, the joints, and a line for each sequence, as Markdown."""
+def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) -> str:
+    """The table over all sequences, the joints, and a line for each sequence, as Markdown; of `tables` (one a score) also how
+    errors compare with their standard deviations."""
     text = []
+    deviations = deviations_of(scores, tables)
     for summary in summarize(scores):
         text += [
             f"## Against {summary.kind}: {summary.sequences} sequences\n" if summary.sequences else "## Not tracked\n"
@@ -61,6 +64,9 @@ def markdown(scores: Sequence[Score]) -> str:
             text += [f"| best lag in frames: sequences | {lags} |", ""]
             group = [s for s in scores if not s.failure and _kind(s) == summary.kind]
             text += _joint_table(group)
+            calibration = calibrate(deviations.get(summary.kind, ()))
+            if calibration is not None:
+                text += [calibration_markdown(calibration, summary.kind)]
         if summary.failures:
             text += [f"{summary.failures} sequences could not be tracked to their end.\n"]
     text += [
@@ -89,10 +95,20 @@ def markdown(scores: Sequence[Score]) -> str:
     return "\n".join(text) + "\n"
 
 
+def deviations_of(scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> dict[str, list[Deviations]]:
+    """Errors and what was said of them, by what they were measured with."""
+    found: dict[str, list[Deviations]] = {}
+    for score, table in zip(scores, tables, strict=False):
+        if table is not None and table.deviations is not None:
+            found.setdefault(_kind(score), []).append(table.deviations)
+    return found
+
+
 def write_reports(
     folder: Path, scores: Sequence[Score], tables: Sequence[FrameTable | None], *, picture: bool = True
 ) -> list[Path]:
-    """Write sequences.csv, summary.csv, summary.md, errors.png (the `picture`) and frames/NAME.csv; returns the first four.
+    """Write sequences.csv, summary.csv, summary.md, with `picture` errors.png and calibration.png (the latter where joints were
+    compared with a reference), and frames/NAME.csv; returns all but the last.
 
     Raises:
         OSError: a file cannot be written.
@@ -106,11 +122,16 @@ def write_reports(
     )
     write_sequences(sequences, scores)
     write_summary(summary, summarize(scores))
-    text.write_text(markdown(scores), encoding="utf-8")
+    text.write_text(markdown(scores, tables), encoding="utf-8")
     if not picture:
         return [sequences, summary, text]
     plot_errors(plot, scores)
-    return [sequences, summary, text, plot]
+    files = [sequences, summary, text, plot]
+    known = [each for group in deviations_of(scores, tables).values() for each in group]
+    if calibrate(known) is not None:
+        plot_calibration(folder / "calibration.png", known)
+        files.append(folder / "calibration.png")
+    return files
 
 
 def _joint_table(scores: Sequence[Score]) -> list[str]:

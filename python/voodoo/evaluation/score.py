@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.evaluation.calibration import Deviations
 from voodoo.evaluation.depth_agreement import Selection
 from voodoo.evaluation.metrics import FloatArray
 
@@ -100,6 +101,7 @@ class FrameTable:
         errors: (F, 12) of metrics.JOINTS [m] at the lag of the score.
         lost: (F, 12).
         depth_within_5cm, silhouette_iou, step_s: (F,).
+        deviations: errors by coordinate and what was said of them; None where there is no reference.
     """
 
     stamps: FloatArray
@@ -109,3 +111,4 @@ class FrameTable:
     depth_within_5cm: FloatArray
     silhouette_iou: FloatArray
     step_s: FloatArray
+    deviations: Deviations | None = None

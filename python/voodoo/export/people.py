@@ -109,6 +109,8 @@ class PeopleTrack:
             joints=spread(track.joints),
             world_from_limb=spread(track.world_from_limb),
             angles=spread(track.angles),
+            covariance=spread(track.covariance),
+            root_covariance=spread(track.root_covariance),
         )
 
     def save(self, path: str | Path) -> None:

@@ -34,7 +34,8 @@ FRAMES = {"pelvis": "waist", "thorax": "torso", "torso": "torso", "head": "head"
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
 _TF = "tf2_msgs/msg/TFMessage"
-_CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 1, 7, 0, 3
+_POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+_SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
 
 
 def write_bag(
@@ -43,8 +44,10 @@ def write_bag(
     """Write a new bag folder.
 
     Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
-    `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints).
-    Searching frames have no transforms and no joint states; their markers delete those of the frame before.
+    `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints, and
+    where these are known ellipsoids of one standard deviation about them). Where it is known how far the body may be off,
+    `/humans/bodies/<person>/pose` (geometry_msgs/PoseWithCovarianceStamped) is the pose of `body_<person>` with its covariance.
+    Searching frames have no transforms, no joint states and no pose; their markers delete those of the frame before.
 
     Args:
         path: the folder, which must not exist.
@@ -101,6 +104,7 @@ class _Human:
     def kinds(self, markers: bool) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
         kinds = {f"{self.topic}/joint_states": "sensor_msgs/msg/JointState"}
+        kinds |= {f"{self.topic}/pose": _POSE} if np.isfinite(self.track.root_covariance).any() else {}
         return kinds | ({f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"} if markers else {})
 
     def messages(self, index: int, root_frame: str, *, markers: bool) -> dict[str, Any]:
@@ -120,6 +124,9 @@ class _Human:
                 velocity=np.empty(0),
                 effort=np.empty(0),
             )
+            if np.isfinite(self.track.root_covariance[index]).all():
+                pose = _body_pose(self.track, self._posed, index, self.person)
+                messages[f"{self.topic}/pose"] = _new(_POSE, header=header, pose=pose)
         if markers:
             drawn = _markers(self.track, self.body, index, header) if self._shown[index] else [_no_markers(header)]
             messages[f"{self.topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
@@ -200,6 +207,24 @@ def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, pers
     return result
 
 
+def _body_pose(track: Track, posed: Skeleton, index: int, person: str) -> Any:  # noqa: ANN401
+    """The pose of the body's frame with its covariance, moved there from the origin of the first limb's frame."""
+    _, pose = frame_poses(track, posed, index, person)[f"body_{person}"]
+    x, y, z = pose[:3, 3] - track.world_from_limb[index, 0, :3, 3]
+    moved = np.eye(6)
+    moved[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    turn = [float(value) for value in Rotation.from_matrix(pose[:3, :3]).as_quat()]
+    return _new(
+        "geometry_msgs/msg/PoseWithCovariance",
+        pose=_new(
+            "geometry_msgs/msg/Pose",
+            position=_point(pose[:3, 3]),
+            orientation=_new("geometry_msgs/msg/Quaternion", x=turn[0], y=turn[1], z=turn[2], w=turn[3]),
+        ),
+        covariance=(moved @ track.root_covariance[index] @ moved.T).ravel(),
+    )
+
+
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
     result = []
     poses = track.world_from_limb[index]
@@ -212,6 +237,14 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
     points = [_point(position) for position in track.joints[index]]
     still = np.array([0.0, 0.0, 0.0, 1.0])
     result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
+    for number, covariance in enumerate(track.covariance[index]):
+        if np.isfinite(covariance).all():
+            variances, axes = np.linalg.eigh(covariance)
+            axes[:, 0] *= np.sign(np.linalg.det(axes))
+            turn, radii = Rotation.from_matrix(axes).as_quat(), np.sqrt(np.maximum(variances, 0.0))
+            size = (2.0 * radii[0], 2.0 * radii[1], 2.0 * radii[2])
+            place = track.joints[index, number]
+            result.append(_marker(header, "uncertainty", number, _SPHERE, place, turn, size, (0.9, 0.9, 0.9), [], 0.3))
     return result
 
 
@@ -233,6 +266,7 @@ def _marker(
     size: tuple[float, float, float],
     rgb: tuple[float, float, float],
     points: list[Any],
+    opacity: float = 0.6,
 ) -> Any:  # noqa: ANN401
     x, y, z, w = (float(value) for value in turn)
     no_image = _new(
@@ -251,7 +285,7 @@ def _marker(
             orientation=_new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
         ),
         scale=_new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
-        color=_new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=0.6),
+        color=_new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
         lifetime=_new("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
         frame_locked=False,
         points=points,

@@ -13,11 +13,9 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, reading
+from voodoo.export.collected import angles_of_estimates, covariances_of
 from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
 from voodoo.export.result_file import appearing_whole, check_suffix
-from voodoo.ik.angles import angle_names as angle_names_of
-from voodoo.ik.angles import angles_of
-from voodoo.ik.chain import Chain
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 
@@ -28,7 +26,9 @@ FORMAT_VERSION = 2
 """Of .npz. It rises when earlier readers would misread a file; further arrays and columns do not raise it."""
 _STATUS = "_status"
 """Ends the name of a limb's column in .csv."""
-_BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles")
+_SIGMA = "_sigma_m"
+"""Ends the name of a joint's column in .csv."""
+_BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", "covariance", "root_covariance")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,6 +49,10 @@ class Track:
         limb_status: limb -> F of "measured", "inferred" and so on, see Estimate.limb_status, "" while searching; {} when not
             known.
         left_out: what of the recording could not be used: reason -> how many. Not in .csv.
+        covariance: (F, J, 3, 3) [m^2] of the joints, NaN where unknown; (F, 0, 3, 3) when there is none. In .csv a column
+            NAME_sigma_m each: the root mean square of the standard deviations of x, y and z; they are not read again.
+        root_covariance: (F, 6, 6) of the pose of the first limb: x, y, z [m], then turns about the axes of the root frame
+            [rad]; NaN where unknown. Not in .csv.
 
     Positions, poses, angles and residual of a searching frame are NaN: there is no body (empty cells in .csv).
     """
@@ -64,12 +68,18 @@ class Track:
     angles: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     limb_status: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     left_out: Mapping[str, int] = field(default_factory=dict)
+    covariance: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3, 3)))
+    root_covariance: FloatArray = field(default_factory=lambda: np.empty((0, 6, 6)))
 
     def __post_init__(self) -> None:
         """Check that the arrays belong together, and that what says it has a pose has one."""
         frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
         if not self.angle_names:
             object.__setattr__(self, "angles", np.empty((frames, 0)))
+        if not self.covariance.size:
+            object.__setattr__(self, "covariance", np.empty((frames, 0, 3, 3)))
+        if not self.root_covariance.size:
+            object.__setattr__(self, "root_covariance", np.full((frames, 6, 6), np.nan))
         if len(self.status) != frames:
             raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
         for limb, words in self.limb_status.items():
@@ -81,6 +91,8 @@ class Track:
             "residual": (frames,),
             "joints": (frames, joints, 3),
             "world_from_limb": (frames, limbs, 4, 4),
+            "covariance": (frames, joints if self.covariance.size else 0, 3, 3),
+            "root_covariance": (frames, 6, 6),
         }
         for name, shape in expected.items():
             array = getattr(self, name)
@@ -93,6 +105,9 @@ class Track:
 
     def _check_numbers(self, name: str, array: FloatArray) -> None:
         """Refuse poses that are NaN, and poses of nobody."""
+        if name in ("covariance", "root_covariance"):
+            # How sure a pose is may not be known.
+            return
         searching = ~self.found.reshape(-1, *[1] * (array.ndim - 1))
         finite = np.isfinite(array)
         if name == "stamps":
@@ -165,8 +180,11 @@ class Track:
                 raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
             joints.append(np.array(list(estimate.joints.values()), dtype=np.float64))
             poses.append(np.array(list(estimate.world_from_limb.values()), dtype=np.float64))
-        angle_names, angles = _angles(estimates, body)
+        angle_names, angles = angles_of_estimates(estimates, body)
+        covariance, root_covariance = covariances_of(estimates, joint_names, limb_names)
         return cls(
+            covariance=covariance,
+            root_covariance=root_covariance,
             angle_names=angle_names,
             angles=angles,
             stamps=np.array([estimate.stamp for estimate in estimates], dtype=np.float64),
@@ -201,14 +219,17 @@ class Track:
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             limbs = [f"{limb}{_STATUS}" for limb in self.limb_status]
-            writer.writerow(_header(self.joint_names, self.angle_names) + limbs)
+            sure = [f"{name}{_SIGMA}" for name in self.joint_names if self.covariance.size]
+            writer.writerow(_header(self.joint_names, self.angle_names) + limbs + sure)
             words = zip(*self.limb_status.values(), strict=True) if limbs else [()] * len(self)
-            for stamp, status, residual, joints, angles, support in zip(
-                self.stamps, self.status, self.residual, self.joints, self.angles, words, strict=True
+            sigmas = np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3.0)
+            for stamp, status, residual, joints, angles, support, sigma in zip(
+                self.stamps, self.status, self.residual, self.joints, self.angles, words, sigmas, strict=True
             ):
                 # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
                 row = [repr(float(stamp)), status]
-                writer.writerow([*row, *(_cell(value) for value in (residual, *joints.ravel(), *angles)), *support])
+                row += [_cell(value) for value in (residual, *joints.ravel(), *angles)]
+                writer.writerow([*row, *support, *(_cell(value) for value in sigma)])
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as file:
@@ -310,6 +331,7 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         # Files of earlier versions have no angles.
         angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
         angles=content["angles"] if "angles" in content else np.empty((0, 0)),
+        **{name: content[name] for name in ("covariance", "root_covariance") if name in content},
         **_told(content),
     )
 
@@ -365,16 +387,6 @@ def _told(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
         "limb_status": {str(limb): tuple(map(str, row)) for limb, row in zip(limbs, words, strict=True)},
         "left_out": {str(reason): int(count) for reason, count in zip(reasons, counts, strict=True)},
     }
-
-
-def _angles(estimates: Sequence[Estimate], body: Body | None) -> tuple[tuple[str, ...], FloatArray]:
-    """Names of the joint angles, and the angles (F, A) [rad]; none without a body."""
-    if body is None:
-        return (), np.empty((len(estimates), 0))
-    chain, names = Chain(body), angle_names_of(body)
-    unknown = np.full(len(names), np.nan)
-    rows = [unknown if str(each.status) == SEARCHING else angles_of(chain, each) for each in estimates]
-    return names, np.array(rows, dtype=np.float64)
 
 
 def _cell(value: float) -> str:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
 
 from voodoo._core import Frame
-from voodoo.errors import MeasurementError, VoodooError
+from voodoo.errors import MeasurementError
 from voodoo.measurements import ColorImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate
 from voodoo.pipeline.frozen import FrozenSensors
-from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.people_keypoints import PeopleKeypoints
+from voodoo.pipeline.run import stepped
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import Context, Memory, adapter_of
 from voodoo.sensors.gating import SiteGate, SitePredictor
@@ -62,7 +62,10 @@ class PeopleFrontEnd:
     def frame(self, recorded: RecordedFrame) -> Frame:
         """The frame of all persons, without stepping."""
         chosen = self.settings
-        alive = self._alive = self._frozen.without(recorded.measurements, use=chosen.use)
+        colored = self.people.wants_color
+        alive = self._alive = self._frozen.without(
+            recorded.measurements, use=chosen.use, idle=lambda item: isinstance(item, ColorImage) and not colored
+        )
         frame = Frame(stamp=recorded.stamp)
         for low, high in chosen.exclude:
             frame.exclude(low, high)
@@ -83,7 +86,7 @@ class PeopleFrontEnd:
             adapter = adapter_of(item)
             if adapter.kind in chosen.use and adapter.while_searching:
                 adapter.add(frame, item, context)
-            elif isinstance(item, ColorImage) and adapter.kind in chosen.use and self.people.wants_color:
+            elif isinstance(item, ColorImage) and adapter.kind in chosen.use and colored:
                 # Clothes tell persons apart.
                 frame.add_color(item.image, camera=item.camera, world_from_sensor=item.root_from_sensor)
         return frame
@@ -107,7 +110,11 @@ class TrackedPeople:
 
 
 def track_people(
-    recording: Recording, people: People, *, settings: FrontEndSettings | None = None
+    recording: Recording,
+    people: People,
+    *,
+    settings: FrontEndSettings | None = None,
+    left_out: LeftOut | None = None,
 ) -> Iterator[TrackedPeople]:
     """Step through a recording; between two yields `people` holds the bodies of the frame yielded last.
 
@@ -115,6 +122,7 @@ def track_people(
         recording: read while iterating.
         people: who is followed; somebody new is found in depth images, and in keypoints of several cameras.
         settings: what is used and how; None means all there is, see FrontEndSettings.of.
+        left_out: counts pictures that do not decode and frames that are refused, which are left out then; None: they are errors.
 
     Raises:
         VoodooError: a recording without depth images, damage in it, or a frame that is refused; names the frame.
@@ -127,10 +135,5 @@ def track_people(
             f"{', '.join(sorted(has & set(chosen.use))) or 'none'}"
         )
     front_end = PeopleFrontEnd(people, settings=chosen)
-    for index, recorded in enumerate(paired(recording)):
-        began = time.perf_counter()
-        try:
-            estimate = front_end.step(recorded)
-        except VoodooError as error:
-            raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
-        yield TrackedPeople(index, recorded, estimate, time.perf_counter() - began)
+    for index, recorded, estimate, seconds in stepped(recording, front_end.step, left_out):
+        yield TrackedPeople(index, recorded, estimate, seconds)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
@@ -18,7 +19,9 @@ from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
-__all__ = ["Init", "TrackedFrame", "start_tracker", "track"]
+__all__ = ["Init", "TrackedFrame", "start_tracker", "stepped", "track"]
+
+T = TypeVar("T")
 
 
 def _readable(recorded: RecordedFrame, left_out: LeftOut) -> RecordedFrame:
@@ -77,17 +80,34 @@ def track(
         VoodooError: damage in the recording, or a frame that the tracker refuses; names the frame.
     """
     front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
+    for index, recorded, estimate, seconds in stepped(recording, front_end.step, left_out):
+        yield TrackedFrame(index, recorded, estimate, seconds, front_end)
+
+
+def stepped(
+    recording: Recording, step: Callable[[RecordedFrame], T], left_out: LeftOut | None
+) -> Iterator[tuple[int, RecordedFrame, T, float]]:
+    """Number, measurements, result and seconds of every frame that could be stepped.
+
+    Args:
+        recording: read while iterating.
+        step: a front end's.
+        left_out: see track.
+
+    Raises:
+        VoodooError: see track.
+    """
     for index, recorded in enumerate(paired(recording)):
         began = time.perf_counter()
         try:
-            estimate = front_end.step(recorded)
+            estimate = step(recorded)
         except VoodooError as error:
             if left_out is None:
                 raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
             recorded = _readable(recorded, left_out)
             try:
-                estimate = front_end.step(recorded)
+                estimate = step(recorded)
             except VoodooError as refusal:
                 left_out.add("that the tracker refuses", f"{recording.name}, frame {index}: {refusal}")
                 continue
-        yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began, front_end)
+        yield index, recorded, estimate, time.perf_counter() - began

@@ -13,10 +13,14 @@ from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Pi
 
 _OPACITY = 0.62
 _FACETS = 64
+_DEVIATIONS = 2.0
+"""Ellipses reach so many standard deviations."""
+_STEP_M = 1e-4
 
 
 def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View, *, color: Color | None = None) -> None:
-    """Draw limbs as shaded, half transparent solids with outlines, far ones first, then joints and sites.
+    """Draw limbs as shaded, half transparent solids with outlines, far ones first, then joints and sites, and about them the
+    ellipses within which they are to two standard deviations.
 
     Nothing is drawn while nobody is tracked.
 
@@ -47,6 +51,7 @@ def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View, *, c
     picture[inside] = mixed[inside]
     for _, limb, _, outline in limbs:
         cv2.polylines(picture, [fixed(outline)], True, color or side_color(limb.name), 1, cv2.LINE_AA, SUBPIXEL)
+    _draw_spread(picture, estimate, view, color)
     _draw_sites(picture, estimate, view, color)
 
 
@@ -84,6 +89,31 @@ def _ahead(facets: FloatArray) -> npt.NDArray[np.bool_]:
     """Which polygons (K, N, 2) in pixels run clockwise, and so face the viewer."""
     x, y = facets[..., 0], facets[..., 1]
     return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) > 0.0)
+
+
+def _draw_spread(picture: Picture, estimate: Estimate, view: View, color: Color | None) -> None:
+    """Draw where every joint and site may be: ellipses of two standard deviations, where they are known."""
+    covariances = estimate.joint_covariances
+    if len(covariances) != len(estimate.joints) or not np.isfinite(covariances).all():
+        return
+    places = np.array(list(estimate.joints.values()), dtype=np.float64)
+    pixels, depths = view.project(places)
+    # How pixels move with a place.
+    moved = np.stack([view.project(places + _STEP_M * axis)[0] for axis in np.eye(3)], axis=2)
+    jacobians = (moved - pixels[:, :, None]) / _STEP_M
+    layer = picture.copy()
+    shown = (depths > 0.0) & np.isfinite(jacobians).all(axis=(1, 2)) & (np.abs(pixels).max(axis=1) < 1e5)
+    for index, name in enumerate(estimate.joints):
+        if shown[index]:
+            spread = jacobians[index] @ covariances[index] @ jacobians[index].T
+            variances, axes = np.linalg.eigh(spread)
+            radii = _DEVIATIONS * np.sqrt(np.maximum(variances[::-1], 0.0))
+            angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))
+            if radii[0] < max(picture.shape[:2]):
+                size = (max(1, round(radii[0] * 2**SUBPIXEL)), max(1, round(radii[1] * 2**SUBPIXEL)))
+                outline = (point(pixels[index]), size, angle, 0.0, 360.0)
+                cv2.ellipse(layer, *outline, color or side_color(name), 1, cv2.LINE_AA, SUBPIXEL)
+    picture[:] = cv2.addWeighted(layer, 0.7, picture, 0.3, 0.0)
 
 
 def _draw_sites(picture: Picture, estimate: Estimate, view: View, color: Color | None) -> None:

@@ -14,6 +14,7 @@ from types import ModuleType, TracebackType
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.errors import VoodooError
@@ -37,7 +38,8 @@ _SEEN_M = 0.002
 class Viewer:
     """Writes what happens in a step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
-    Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/bands`, `world/points/<source>` (coloured by
+    Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/uncertainty` (one standard
+    deviation of each joint), `world/body/bands`, `world/points/<source>` (coloured by
     the limb they lie on), `world/laser/<source>`, `world/markers/<source>`, `world/rays`, `world/cameras/<source>`
     (pictures with the outlines of the projected limbs, skin candidates and keypoints; in depth images the person's
     silhouette, limb by limb), `plots/...`; the timeline is `time`.
@@ -225,7 +227,25 @@ class Viewer:
             f"{path}/joints",
             rr.Points3D(estimate.joint_positions, radii=0.012, labels=list(estimate.joint_names), show_labels=False),
         )
+        self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
+
+    def _log_spread(self, path: str, estimate: Estimate) -> None:
+        """Ellipsoids within which joints are to one standard deviation."""
+        covariances = estimate.joint_covariances
+        if not hasattr(self._rr, "Ellipsoids3D") or not len(covariances) or not np.isfinite(covariances).all():
+            return
+        variances, axes = np.linalg.eigh(covariances)
+        axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
+        self._stream.log(
+            path,
+            self._rr.Ellipsoids3D(
+                centers=estimate.joint_positions,
+                half_sizes=np.sqrt(np.maximum(variances, 0.0)),
+                quaternions=Rotation.from_matrix(axes).as_quat(),
+                colors=(255, 255, 255, 90),
+            ),
+        )
 
     def _log_rays(self, front_end: FrontEnd, estimate: Estimate) -> None:
         strips, colours, labels = [], [], []

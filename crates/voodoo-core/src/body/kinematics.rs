@@ -28,7 +28,7 @@ impl Chain {
         for limb in body.limbs() {
             let (parent, count) = match &limb.parent {
                 None => (0, 6),
-                Some((parent, joint)) => (*parent, if joint.kind() == JointKind::Hinge { 1 } else { 3 }),
+                Some((parent, joint)) => (*parent, freedoms(joint)),
             };
             self.start.push(self.freedoms);
             self.count.push(count);
@@ -36,6 +36,11 @@ impl Chain {
             self.freedoms += count;
         }
     }
+}
+
+/// Number of a joint's freedoms: 1 of a hinge, else 3.
+pub fn freedoms(joint: &Joint) -> usize {
+    if joint.kind() == JointKind::Hinge { 1 } else { 3 }
 }
 
 /// Below this angle, radians, the series stand in for quotients whose numerators lose all digits.

@@ -121,6 +121,12 @@ impl Hypotheses {
         }
     }
 
+    /// The body, world, as this frame wants it where the next one has to ask for it as well.
+    pub fn rivals(&self) -> impl Iterator<Item = &[Pose]> {
+        let asking = self.history.iter().filter(|own| own.persistence.asks() && !own.last_proposal.is_empty());
+        asking.map(|own| &own.last_proposal[..])
+    }
+
     /// Room for the worst case at once, not when the first hard frame comes.
     fn make_room(&mut self, context: Context, fit: &Fit) {
         let most = context.seen.candidates.len();

@@ -45,6 +45,11 @@ impl Persistence {
         self.voted_before
     }
 
+    /// This frame asks for a change.
+    pub(super) fn asks(&self) -> bool {
+        self.voted
+    }
+
     /// Nothing speaks against the chain.
     pub(super) fn is_clear(&self) -> bool {
         self.frames == 0

@@ -33,7 +33,7 @@ pub use wanted::Options;
 /// The detector looks at what nobody explains this often at most, seconds.
 const LOOK_EVERY: f64 = 0.06;
 /// Two bodies whose roots are nearer than this are one, metres.
-const ONE_BODY: f64 = 0.25;
+const ONE_BODY: f64 = 0.3;
 /// Who was there for less than this is not remembered, seconds.
 const KNOWN_AFTER: f64 = 1.0;
 
@@ -313,7 +313,11 @@ impl People {
             person.measure(&stranger.detection);
         }
         person.note(frame, share);
-        came
+        // Who was lost may have been found by their own tracker in this very frame.
+        let place = person.place;
+        let twice = self.others_than(Some(number)).iter().any(|(_, other)| other.distance(place) < ONE_BODY);
+        self.persons[number].there &= !twice;
+        came && !twice
     }
 
     /// Forgets who has been away for too long, and who was there for a moment only.

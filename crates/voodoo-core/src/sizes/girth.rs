@@ -21,7 +21,7 @@ const EDGE_SIGMA: f64 = 0.01;
 /// How far the axis of a tracked limb is off across the line of sight, metres.
 const ASIDE_SIGMA: f64 = 0.01;
 /// Edges of following frames err alike: this many frames tell as much as one.
-const ALIKE: f64 = 10.0;
+pub const ALIKE: f64 = 10.0;
 /// So many frames are remembered: clothes move.
 const REMEMBERED: f64 = 100.0;
 /// Fewer matched points than this tell nothing.
@@ -164,6 +164,15 @@ impl Girth {
         let (total, step) = self.total.then(&step);
         self.total = total;
         Some(step.axes())
+    }
+}
+
+impl Girth {
+    /// Standard deviation of the mean radius of a limb of this shape, metres.
+    pub fn sigma(&self, shape: &TaperedEllipticCylinder) -> f64 {
+        let radii = 0.25 * Vector3::new(shape.a0() + shape.a1(), shape.b0() + shape.b1(), shape.a1() + shape.b1());
+        let known = self.information.cholesky().map(|factor| factor.solve(&radii));
+        known.map_or(f64::NAN, |known| radii.dot(&known).max(0.0).sqrt())
     }
 }
 

@@ -74,6 +74,16 @@ impl Sizes {
         self.set.is_none()
     }
 
+    /// Limbs of one length whose lengths are refined; none where they are known.
+    pub fn followed(&self) -> &[Pair] {
+        &self.pairs
+    }
+
+    /// Standard deviation of the mean radius of a limb, metres; NaN where it was given.
+    pub fn girth_sigma(&self, body: &Body, limb: usize) -> f64 {
+        self.girths.get(limb).map_or(f64::NAN, |girth| girth.sigma(&body.limbs()[limb].shape))
+    }
+
     /// The body as it was set, before frames changed its sizes.
     pub fn as_set(&self) -> Option<&Body> {
         self.set.as_ref()

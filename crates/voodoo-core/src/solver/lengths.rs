@@ -57,6 +57,30 @@ fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
 }
 
 impl Lengths {
+    /// Information of the relative length of each of `pairs` by itself, pose's unknowns eliminated, from what
+    /// [`ChainSolver::factor_information`] left; one a pair, into `information`.
+    pub fn information(
+        &mut self,
+        solver: &ChainSolver,
+        body: &Body,
+        poses: &[Pose],
+        pairs: &[Pair],
+        information: &mut Vec<f64>,
+    ) {
+        self.couple(solver, body, poses, pairs);
+        let (n, count) = (solver.chain.freedoms, pairs.len());
+        let Self { mixed, column, reduced, .. } = self;
+        information.clear();
+        for row in 0..count {
+            let own = &mixed[row * n..(row + 1) * n];
+            column.clear();
+            column.extend_from_slice(own);
+            let known = substitute(&solver.h, column, n);
+            let taken: f64 = own.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
+            information.push(if known { (reduced[row * count + row] - taken).max(0.0) } else { 0.0 });
+        }
+    }
+
     /// Second derivatives and gradient of the lengths, and the mixed ones with the pose's unknowns.
     fn couple(&mut self, solver: &ChainSolver, body: &Body, poses: &[Pose], pairs: &[Pair]) {
         let ChainSolver { chain, screws, composite, .. } = solver;

@@ -4,16 +4,19 @@ mod chain;
 mod lengths;
 mod limbwise;
 mod schedule;
+mod spread;
 mod tree;
 mod warm_start;
 mod whole_body;
 
 pub use chain::ChainSolver;
+pub use lengths::Lengths;
 pub use limbwise::Limbwise;
 pub use schedule::{Gate, Reassociation, Schedule, WarmStartInput};
+pub use spread::Spread;
 pub use tree::TreeSolver;
 pub use warm_start::WarmStart;
-pub use whole_body::WholeBody;
+pub use whole_body::{LENGTH_INFORMATION, SITE_SCALE, WholeBody};
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Pair};

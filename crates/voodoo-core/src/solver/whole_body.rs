@@ -22,9 +22,9 @@ const STILL_FROM: usize = 3;
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
-const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
+pub const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
-const SITE_SCALE: f64 = 0.15;
+pub const SITE_SCALE: f64 = 0.15;
 /// Sites farther than this from their measurement drive the chain before the points are assigned, metres; rounds of it.
 const DRIVEN_FROM: f64 = 0.25;
 const WARM_START_ROUNDS: usize = 4;

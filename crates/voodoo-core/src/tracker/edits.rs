@@ -70,6 +70,6 @@ impl Tracker {
         sizes.edited(model);
         relocalizer.restart(model, &motion.poses);
         assessor.edited(estimate.status);
-        self.report(self.motion.stamp.unwrap_or(f64::NAN), 0);
+        self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);
     }
 }

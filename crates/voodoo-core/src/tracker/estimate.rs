@@ -1,6 +1,7 @@
 //! What a step found.
 
 use crate::math::{Pose, Vec3};
+use crate::uncertainty::Covariances;
 
 /// How much a pose can be relied on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,6 +68,8 @@ pub struct Estimate {
     pub joint_gaps: Vec<f64>,
     /// What each source gave.
     pub sources: Vec<SourceReport>,
+    /// How far the pose may be off.
+    pub covariances: Covariances,
 }
 
 impl Default for Estimate {
@@ -84,6 +87,7 @@ impl Default for Estimate {
             limb_residual: Vec::new(),
             joint_gaps: Vec::new(),
             sources: Vec::new(),
+            covariances: Covariances::default(),
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::observation::observer::{Expectation, Observer};
 use crate::observation::share::Share;
 use crate::relocalize::{Relocalizer, Sighting};
 use crate::sizes::{Reliance, Sizes, Start};
+use crate::uncertainty::Found;
 use assess::Assessor;
 use estimate::{Estimate, Status};
 
@@ -87,7 +88,7 @@ impl Tracker {
         let start = if fit_sizes { Start::Positions } else { Start::SizesKnown };
         self.sizes.restart(&self.model, start, &self.config);
         self.assessor.trust_pose();
-        self.report(f64::NAN, 0);
+        self.report(f64::NAN, 0, None);
     }
 
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
@@ -218,7 +219,7 @@ impl Tracker {
             return self.follow(frame, share);
         }
         self.remember();
-        self.report(frame.stamp, steps);
+        self.report(frame.stamp, steps, Some(time_scale));
         let lost = self.estimate.status == Status::Lost;
         if self.relocalizer.nobody(frame.stamp, lost) {
             self.stop(frame.stamp);
@@ -329,11 +330,20 @@ impl Tracker {
         hypotheses.remember(model, motion, assessor.status() == Status::Lost, |limb| assessor.relied_on(limb));
     }
 
-    fn report(&mut self, stamp: f64, steps: usize) {
-        let Self { model, motion, observer, fit, assessor, estimate, .. } = self;
+    /// Fills the estimate in: of a frame `time_scale` after the last one, or of a pose that was set.
+    fn report(&mut self, stamp: f64, steps: usize, time_scale: Option<f64>) {
+        let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, estimate, .. } = self;
         estimate.fill(&model.body, motion, fit.correspondences(), observer.candidates());
         (estimate.stamp, estimate.steps) = (stamp, steps);
         assessor.report_status(model, estimate);
+        match time_scale {
+            None => assessor.forget_spread(&model.body, estimate),
+            Some(time_scale) => {
+                let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
+                let found = Found { body, poses, correspondences, pairs: sizes.followed(), time_scale, config };
+                assessor.report_spread(found, hypotheses.rivals(), |limb| sizes.girth_sigma(body, limb), estimate);
+            }
+        }
     }
 }
 

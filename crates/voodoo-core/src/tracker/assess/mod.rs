@@ -15,6 +15,7 @@
 
 mod exclusive;
 mod limb_history;
+mod spread;
 
 use super::estimate::{Estimate, LimbStatus, Status};
 use crate::association::correspondence::SitePair;
@@ -22,6 +23,7 @@ use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::fit::{Context, Matched};
 use crate::math::Pose;
+use crate::uncertainty::Uncertainty;
 use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
@@ -58,6 +60,7 @@ pub(super) struct Assessor {
     exclusive: Exclusive,
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
+    uncertainty: Uncertainty,
 }
 
 impl Assessor {

@@ -1,0 +1,137 @@
+//! What is said of a frame: covariances of sites, limbs and joints.
+
+use nalgebra::Matrix6;
+
+use crate::body::Body;
+use crate::math::{Mat3, Vec3};
+
+/// How far a joint or site lies from its place in the limb: models and persons differ by that, metres.
+const SITE_SIGMA: f64 = 0.01;
+
+/// Covariances of a frame's pose. World frame, metres, radians; NaN before the first frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Covariances {
+    /// Of the position of every site.
+    pub sites: Vec<Mat3>,
+    /// Of the pose of every limb's frame: its position, then its turn about world axes through there.
+    pub limbs: Vec<[[f64; 6]; 6]>,
+    /// Of the turn of the joint to the parent, about world axes, a limb each; of the root: of its own.
+    pub turns: Vec<Mat3>,
+    /// Standard deviation of every limb's length and of its mean radius, metres; NaN where they are not refined.
+    pub lengths: Vec<f64>,
+    /// See `lengths`.
+    pub girths: Vec<f64>,
+}
+
+impl Covariances {
+    /// Nothing is known of this body.
+    pub fn forget(&mut self, body: &Body) {
+        self.clear();
+        self.sites.resize(body.sites().len(), Mat3::NAN);
+        self.limbs.resize(body.limbs().len(), [[f64::NAN; 6]; 6]);
+        self.turns.resize(body.limbs().len(), Mat3::NAN);
+        self.lengths.resize(body.limbs().len(), f64::NAN);
+        self.girths.resize(body.limbs().len(), f64::NAN);
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.sites.clear();
+        self.limbs.clear();
+        self.turns.clear();
+        self.lengths.clear();
+        self.girths.clear();
+    }
+
+    /// Adds a limb: the covariance of its turn and shift, and that of its joint's turns about `axes`.
+    pub(super) fn push_limb(&mut self, limb: &Matrix6<f64>, joint: &Matrix6<f64>, axes: [Vec3; 3]) {
+        let place = |index: usize| (index + 3) % 6;
+        let mut own = [[0.0; 6]; 6];
+        for (i, row) in own.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = limb[(place(i), place(j))];
+            }
+        }
+        (0..3).for_each(|axis| own[axis][axis] += SITE_SIGMA * SITE_SIGMA);
+        self.limbs.push(own);
+        let axes = Mat3::from_cols_array_2d(&axes.map(|axis| axis.to_array()));
+        let turns = Mat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| joint[(i, j)])));
+        self.turns.push(symmetric(axes * turns * axes.transpose()));
+        self.lengths.push(f64::NAN);
+        self.girths.push(f64::NAN);
+    }
+
+    /// Adds a site at `lever` from the origin of its limb's frame, world axes.
+    pub(super) fn push_site(&mut self, limb: usize, lever: Vec3) {
+        let own = &self.limbs[limb];
+        let block = |row: usize, column: usize| {
+            Mat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| own[row + i][column + j])))
+        };
+        // A turn moves the site by `turn x lever`.
+        let turned = Mat3::from_cols(Vec3::X.cross(lever), Vec3::Y.cross(lever), Vec3::Z.cross(lever));
+        let mixed = turned * block(3, 0);
+        let covariance = block(0, 0) + mixed + mixed.transpose() + turned * block(3, 3) * turned.transpose();
+        self.sites.push(symmetric(covariance));
+    }
+
+    /// The site may as well be elsewhere: the covariance of both places together, each as likely as the other.
+    pub(crate) fn widen(&mut self, site: usize, aside: Vec3) {
+        let half = 0.5 * aside;
+        self.sites[site] += Mat3::from_cols(half * half.x, half * half.y, half * half.z);
+    }
+}
+
+fn symmetric(matrix: Mat3) -> Mat3 {
+    0.5 * (matrix + matrix.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Quat;
+
+    #[test]
+    fn a_site_moves_as_its_limb_shifts_and_turns() {
+        let lever = Vec3::new(0.1, -0.3, 0.2);
+        let limb = Matrix6::from_fn(|i, j| ((i * 5 + j * 3) % 7) as f64 - 3.0);
+        let limb = limb * limb.transpose() * 1e-4;
+        let mut told = Covariances::default();
+        told.push_limb(&limb, &Matrix6::zeros(), [Vec3::X, Vec3::Y, Vec3::Z]);
+        told.push_site(0, lever);
+        // Differences of where the site goes when the limb turns or shifts a little.
+        let h = 1e-6;
+        let column = |index: usize| match index {
+            0..3 => (Quat::from_axis_angle(Vec3::AXES[index], h) * lever - lever) / h,
+            _ => Vec3::AXES[index - 3],
+        };
+        for i in 0..3 {
+            for j in 0..3 {
+                let mut expected = if i == j { SITE_SIGMA * SITE_SIGMA } else { 0.0 };
+                for a in 0..6 {
+                    for b in 0..6 {
+                        expected += column(a)[i] * limb[(a, b)] * column(b)[j];
+                    }
+                }
+                assert!((told.sites[0].col(j)[i] - expected).abs() < 1e-7, "{i}, {j}");
+            }
+        }
+        // Position first, as in a message.
+        assert!((told.limbs[0][0][4] - limb[(3, 1)]).abs() < 1e-15);
+    }
+
+    #[test]
+    fn two_places_as_likely_as_each_other_have_the_covariance_of_both() {
+        let mut told = Covariances { sites: vec![Mat3::from_diagonal(Vec3::splat(1e-4))], ..Covariances::default() };
+        let aside = Vec3::new(0.2, 0.0, -0.4);
+        told.widen(0, aside);
+        // Of two points a mean of squares about their middle.
+        let points = [Vec3::ZERO, aside];
+        let middle = 0.5 * aside;
+        for i in 0..3 {
+            for j in 0..3 {
+                let spread: f64 = points.iter().map(|point| (point - middle)[i] * (point - middle)[j] / 2.0).sum();
+                let own = if i == j { 1e-4 } else { 0.0 };
+                assert!((told.sites[0].col(j)[i] - own - spread).abs() < 1e-15);
+            }
+        }
+    }
+}
