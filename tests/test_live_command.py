@@ -153,6 +153,7 @@ def test_signals_finish_files(tmp_path, number):
         (["ros2:"], "ros2:TOPIC"),
         ([sample_path(), "--rate", "0"], "rate: expected a number above 0"),
         ([sample_path(), "--out", "pose.xyz"], "expected a name that ends in"),
+        ([sample_path(), "--calibration", "a.toml"], "a recording brings its own"),
         ([sample_path(), "--record", "take.bag"], "expected a name that ends in .mcap"),
         ([sample_path(), "--calibration", "a.toml", "--calibration", "b.toml"], "one for each source at most"),
     ],
