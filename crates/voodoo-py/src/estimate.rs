@@ -275,8 +275,8 @@ impl PyEstimate {
         Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
-    /// Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the origin
-    /// of the limb's frame, as in geometry_msgs/PoseWithCovariance.
+    /// Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the
+    /// origin of the limb's frame, as in geometry_msgs/PoseWithCovariance.
     #[getter]
     fn limb_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let (py, this) = (slf.py(), slf.get());

@@ -204,4 +204,3 @@ def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     for axes in (left, right):
         axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=130)
-

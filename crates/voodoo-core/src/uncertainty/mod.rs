@@ -27,7 +27,7 @@ const UNPROVEN: f64 = 0.01;
 /// Unexpected motion of a joint in 1/30 s, as a share of what its `motion` allows.
 const USUAL_MOTION: f64 = 0.35;
 /// Standard deviation of an unknown at most: radians of a turn, metres of the root's place.
-const UNKNOWN: f64 = 0.5;
+const MOST_UNSURE: f64 = 0.5;
 
 /// What is known of a pose, from frame to frame.
 #[derive(Debug, Default)]
@@ -119,7 +119,7 @@ impl Uncertainty {
         let mut expect = |sigma: f64| {
             let moved = (sigma * time_scale).powi(2);
             let before = variance.get(information.len()).copied().unwrap_or(moved);
-            information.push(1.0 / (before + moved).min(UNKNOWN * UNKNOWN));
+            information.push(1.0 / (before + moved).min(MOST_UNSURE * MOST_UNSURE));
         };
         for limb in body.limbs() {
             match &limb.parent {
