@@ -99,6 +99,9 @@ type Found = (
 /// Covariances of sites (nine numbers each), limbs (36) and joints (nine); standard deviations of lengths and girths.
 type Spread = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
 
+/// All of an estimate.
+type Kept = (Head, AllNames, Found, Spread);
+
 fn spread_of(found: &Covariances) -> Spread {
     let flat = |all: &[Mat3]| all.iter().flat_map(Mat3::to_cols_array).collect();
     let limbs = found.limbs.iter().flatten().flatten().copied().collect();
@@ -344,7 +347,7 @@ impl PyEstimate {
     }
 
     /// For pickle and copy.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Head, AllNames, Found, Spread))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
         let (found, names) = (&self.estimate, &*self.names);
         let pose = |pose: &Pose| (pose.translation.to_array(), pose.rotation.to_array());
         let source = |report: &SourceReport| (report.count, report.inliers, report.weight, report.residual);
