@@ -26,6 +26,7 @@ from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
 from voodoo.names import SEARCHING, HumanModel
+from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import Automatic, start_tracker
 from voodoo.recordings.loaders import open_recording
@@ -69,7 +70,7 @@ def evaluate(
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, loader=loader)
+    recording = open_recording(path, **{"loader": loader} | pictures_alone(path, loader, use))
     tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
     steps = []

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.measurements import Measurement
-from voodoo.sensors.adapters import adapter_of
+from voodoo.sensors.adapters import adapters_of
 
 
 class FrozenSensors:
@@ -34,8 +34,8 @@ class FrozenSensors:
         """
         repeats, changes = [], False
         for item in measurements:
-            adapter = adapter_of(item)
-            content = adapter.content(item) if adapter.kind in use else None
+            adapter = next((known for known in adapters_of(item) if known.kind in use), None)
+            content = None if adapter is None else adapter.content(item)
             if content is None:
                 continue
             before = self._contents.get(item.sensor)

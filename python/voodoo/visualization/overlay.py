@@ -18,7 +18,7 @@ from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
-from voodoo.sensors.adapters import Memory, adapter_of
+from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
 from voodoo.sensors.adapters.drawing import Pictured
 from voodoo.visualization.body_drawing import draw_body
 from voodoo.visualization.canvas import OverlayCanvas, same_place
@@ -154,7 +154,8 @@ def _drawn(
     draw_body(canvas.picture, body, estimate, canvas.view)
     memory = Memory() if front_end is None else front_end.memory
     for item in recorded.measurements:
-        adapter_of(item).draw(item, canvas, memory)
+        for adapter in adapters_of(item):
+            adapter.draw(item, canvas, memory)
     if front_end is not None:
         canvas.rays(front_end.rays, estimate)
     canvas.finish()
