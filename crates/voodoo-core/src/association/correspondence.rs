@@ -56,6 +56,23 @@ pub struct ContourPair {
     pub distance: f64,
 }
 
+/// A point of a limb's contour and the edge of its colours in a picture: a distance along one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegionPair {
+    /// The limb.
+    pub limb: usize,
+    /// The contour's point.
+    pub x: Vec3,
+    /// Direction in which the point is seen to move across the contour, outward, length one.
+    pub normal: Vec3,
+    /// The edge lies so far out along it, metres.
+    pub distance: f64,
+    /// What the colours say of it, 1/m^2.
+    pub information: f64,
+    /// Number of the source.
+    pub source: u16,
+}
+
 /// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
@@ -82,6 +99,8 @@ pub struct Correspondences {
     pub sites: Vec<SitePair>,
     /// Rims of limbs and the contour of the body in depth images.
     pub contour: Vec<ContourPair>,
+    /// Contours of limbs and edges of colours.
+    pub regions: Vec<RegionPair>,
     /// Elastic bands.
     pub bands: Vec<Band>,
 }

@@ -4,6 +4,9 @@ use crate::body::Body;
 use crate::error::TrackError;
 use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
 
+/// A picture is taken at most so long before or after its frame, seconds: beyond, nobody knows where the body was.
+const LONGEST_ASIDE: f64 = 0.25;
+
 /// Three-dimensional points as they lie in memory, in metres.
 #[derive(Clone, Copy, Debug)]
 pub enum PointSlice<'a> {
@@ -130,11 +133,45 @@ impl DepthImage<'_> {
     }
 }
 
-/// A colour picture, for telling persons apart by their clothes. What bends straight lines is not corrected: it is little there.
+/// The pixels of a picture, row by row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ColorPixels<'a> {
+    /// Three channels in any order that is always the same.
+    Color(&'a [[u8; 3]]),
+    /// Brightness alone.
+    Grey(&'a [u8]),
+}
+
+impl ColorPixels<'_> {
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Color(pixels) => pixels.len(),
+            Self::Grey(pixels) => pixels.len(),
+        }
+    }
+
+    /// True when there is no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The colour of a pixel.
+    #[inline(always)]
+    pub fn get(&self, index: usize) -> [u8; 3] {
+        match self {
+            Self::Color(pixels) => pixels[index],
+            Self::Grey(pixels) => [pixels[index]; 3],
+        }
+    }
+}
+
+/// A colour or grey picture: its regions tell where limbs end (R07 section 3), and clothes tell persons apart. Straight lines
+/// have to be straight in it.
 #[derive(Clone, Copy, Debug)]
 pub struct ColorImage<'a> {
-    /// `width * height` pixels, the colours in any order that is always the same.
-    pub pixels: &'a [[u8; 3]],
+    /// `width * height` pixels.
+    pub pixels: ColorPixels<'a>,
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -143,6 +180,12 @@ pub struct ColorImage<'a> {
     pub intrinsics: [f64; 4],
     /// Pose of the camera's optical frame (x right, y down, z forward).
     pub world_from_sensor: Pose,
+    /// When it was taken, seconds.
+    pub stamp: f64,
+    /// Number of the camera, the same in every frame.
+    pub camera: u16,
+    /// Number of the source, for the report.
+    pub source: u16,
 }
 
 /// A named site was seen at a position (K06 IV-A: 3-D point-to-point relation).
@@ -195,7 +238,7 @@ pub struct Frame<'a> {
     pub clouds: &'a [Cloud<'a>],
     /// Depth images.
     pub images: &'a [DepthImage<'a>],
-    /// Colour pictures; one person alone is tracked without them.
+    /// Colour pictures.
     pub colors: &'a [ColorImage<'a>],
     /// Sites with positions.
     pub positions: &'a [PositionRelation],
@@ -248,7 +291,11 @@ impl<'a> Frame<'a> {
             check_image(index, image)?;
         }
         for (index, picture) in self.colors.iter().enumerate() {
-            check_color(index, picture)?;
+            check_color(index, picture, self.stamp)?;
+            if self.colors[..index].iter().any(|other| other.camera == picture.camera) {
+                let what = format!("color[{index}].source");
+                return Err(TrackError::measurement(what, "one picture of each camera", "a second one of this"));
+            }
         }
         for (index, relation) in self.positions.iter().enumerate() {
             let what = |part: &str| format!("positions[{index}].{part}");
@@ -320,8 +367,13 @@ fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
     check_pose(|| format!("depth[{index}].world_from_sensor"), &image.world_from_sensor)
 }
 
-fn check_color(index: usize, picture: &ColorImage) -> Result<(), TrackError> {
-    if picture.pixels.len() != picture.width * picture.height || picture.pixels.is_empty() {
+fn check_color(index: usize, picture: &ColorImage, stamp: f64) -> Result<(), TrackError> {
+    let aside = (picture.stamp - stamp).abs();
+    if !(aside <= LONGEST_ASIDE) {
+        let (what, found) = (format!("color[{index}].stamp"), picture.stamp.to_string());
+        return Err(TrackError::measurement(what, "a time within 0.25 s of the frame's", found));
+    }
+    if picture.pixels.len() != picture.width.saturating_mul(picture.height) || picture.pixels.is_empty() {
         let found = format!("{} for {}x{}", picture.pixels.len(), picture.width, picture.height);
         return Err(TrackError::measurement(format!("color[{index}].image"), "width x height pixels", found));
     }

@@ -102,7 +102,7 @@ fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Opti
 fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
     let place = picture.world_from_sensor.inverse_transform_point(world);
     let pixel = pixel_of(picture.intrinsics, [picture.width, picture.height], place)?;
-    picture.pixels.get(pixel).copied()
+    Some(picture.pixels.get(pixel))
 }
 
 /// The pixel in which a point of the camera's frame is seen.

@@ -10,7 +10,7 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Limits, Penetration, Prior, Sites, Surface, Term};
+use crate::terms::{Contour, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
 
 /// Standard deviation of an axis that lies in another limb, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
@@ -99,15 +99,17 @@ impl WholeBody {
         let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
         let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
         let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
+        let regions = Regions { pairs: &correspondences.regions };
         let still_gain = still_prior_gain(problem, information);
         let prior = Prior { predicted, root, joints: &self.joint_sigmas, still_gain };
         let limits = Limits { sigma: LIMIT_SIGMA };
         let penetration = Penetration { sigma: OVERLAP_SIGMA };
         // The objective: one more term is a file and a line here.
-        let terms: [Option<&dyn Term>; 6] = [
+        let terms: [Option<&dyn Term>; 7] = [
             Some(&surface),
             Some(&sites),
             Some(&contour),
+            Some(&regions),
             Some(&prior),
             config.limits.then_some(&limits),
             config.penetration.then_some(&penetration),

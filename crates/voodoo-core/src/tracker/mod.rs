@@ -154,6 +154,8 @@ impl Tracker {
 
     /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
     pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detection: &Detection, known: bool) -> bool {
+        // Colours tell persons apart; they are none's alone.
+        let frame = &Frame { colors: &[], ..*frame };
         let Some((body, poses)) = self.relocalizer.placed(&self.model, detection, known) else { return false };
         self.restart(body, poses, !known);
         self.assessor.doubt_pose();
@@ -189,6 +191,7 @@ impl Tracker {
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
+        fit.begin_regions(setting.of(model), poses);
         if sizes.wait_for_pose() {
             steps += fit.run(setting.of(model), predicted, poses);
         }
@@ -212,6 +215,7 @@ impl Tracker {
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
+        fit.learn_regions(setting.of(model), poses);
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
         if relocalizes && self.relocalize(frame, known, share.is_some()) {
@@ -228,7 +232,7 @@ impl Tracker {
     /// The pose at the next instant by its share of a frame, which was checked.
     pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
         if self.is_started() {
-            self.follow(frame, Some(share));
+            self.follow(&Frame { colors: &[], ..*frame }, Some(share));
         }
         &self.estimate
     }
