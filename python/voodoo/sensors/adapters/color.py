@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy.typing as npt
@@ -10,10 +11,22 @@ from voodoo._core import Frame
 from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context
 from voodoo.sensors.pinhole import Pinhole
+from voodoo.tracker import Tracker
+
+_FARTHEST_S = 0.25
+"""A picture that is older or newer than its frame by more [s] shows another pose; the tracker would refuse the frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What is kept of a camera: its lens, and the tracker that was told of the empty scene."""
+
+    lens: Pinhole
+    told: object
 
 
 class ColorAdapter(Adapter[ColorImage]):
-    """Pictures as they are; `Memory` keeps the lens of each camera under "color"."""
+    """Pictures as a pinhole camera would have taken them; `Memory` keeps what is known of each camera under "color"."""
 
     kind = "color"
     measurement = ColorImage
@@ -23,13 +36,20 @@ class ColorAdapter(Adapter[ColorImage]):
         return item.image
 
     def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
-        """As a picture of a pinhole camera, with its own stamp."""
-        lens = context.memory.all(self.kind).get(item.sensor)
-        if lens is None or lens.original != item.camera:
-            lens = Pinhole(item.camera)
-            context.memory.put(self.kind, item.sensor, lens)
+        """As a picture with its own stamp; the first one of a camera after pictures of the empty scene, if there are some."""
+        if not isinstance(context.tracker, Tracker) or abs(item.stamp - context.stamp) > _FARTHEST_S:
+            return
+        known = context.memory.all(self.kind).get(item.sensor)
+        if known is None or known.lens.original != item.camera or known.told is not context.tracker:
+            known = _Known(Pinhole(item.camera), context.tracker)
+            empty = context.settings.empty_scene.get(item.sensor)
+            if empty is not None:
+                context.tracker.set_background(item.sensor, [known.lens.apply(picture) for picture in empty])
+            context.memory.put(self.kind, item.sensor, known)
         frame.add_color(
-            lens.apply(item.image),
-            camera=lens.camera,
+            known.lens.apply(item.image),
+            camera=known.lens.camera,
             world_from_sensor=item.root_from_sensor,
+            stamp=item.stamp,
+            source=item.sensor,
         )
