@@ -118,7 +118,11 @@ def test_grey_cameras_count_where_none_sees_colours(tmp_path):
         grey = scene.wall(n)[:, :, 0]
         entries.append((f"/g_{n}/camera_info", scene.START, scene.info_of(scene.START, n)))
         entries.append(
-            (f"/g_{n}/image_raw", scene.START, scene.M.image(scene.START, grey, "mono8", frame=f"cam_{n}_optical_frame"))
+            (
+                f"/g_{n}/image_raw",
+                scene.START,
+                scene.M.image(scene.START, grey, "mono8", frame=f"cam_{n}_optical_frame"),
+            )
         )
     frame = next(iter(open_recording(write_bag(tmp_path / "b", entries))))
     assert [item.sensor for item in frame.measurements] == ["/g_1/image_raw", "/g_0/image_raw"]
@@ -213,7 +217,9 @@ def copy(films, tmp_path):
 
 def test_videos_without_a_calibration_say_what_is_needed(copy):
     (copy / "Calib_scene.toml").unlink()
-    with pytest.raises(RecordingError, match=r"expected one Calib\*\.toml, the calibration of the cameras, found none") as told:
+    with pytest.raises(
+        RecordingError, match=r"expected one Calib\*\.toml, the calibration of the cameras, found none"
+    ) as told:
         open_recording(copy)
     assert "[cam0]" in told.value.hint and "translation" in told.value.hint
     with pytest.raises(RecordingError, match=r"films of several cameras and their calibration"):
@@ -250,8 +256,12 @@ def test_image_folders(copy):
     frames = list(recording)
     assert [frame.stamp for frame in frames] == pytest.approx([(7 + k) / 30.0 for k in range(FRAMES)])
     np.testing.assert_array_equal(frames[2].measurements[-1].image, scene.pictures(FRAMES, 4, 0.0)[2][0])
-    (copy / "images" / "cam_1" / "other_0007.png").write_bytes((copy / "images" / "cam_1" / "frame_0007.png").read_bytes())
-    with pytest.raises(RecordingError, match=r"images/cam_1: expected a number or stamp for each picture, found one twice"):
+    (copy / "images" / "cam_1" / "other_0007.png").write_bytes(
+        (copy / "images" / "cam_1" / "frame_0007.png").read_bytes()
+    )
+    with pytest.raises(
+        RecordingError, match=r"images/cam_1: expected a number or stamp for each picture, found one twice"
+    ):
         open_recording(copy)
 
 
@@ -263,7 +273,9 @@ def test_a_video_of_another_size_and_one_that_is_damaged(copy):
     assert (item.camera.width, item.camera.cx) == (232, scene.CAMERA.cx), "cut at the right by its coder"
     assert item.image.shape[1] == 232
     scene.write_video(copy / "videos" / "cam0.avi", [cv2.resize(row[0], None, fx=0.5, fy=0.5) for row in rows])
-    with pytest.raises(RecordingError, match=r"videos/cam0.avi: expected 240x180 px, as cam_0 is calibrated, found 120x90"):
+    with pytest.raises(
+        RecordingError, match=r"videos/cam0.avi: expected 240x180 px, as cam_0 is calibrated, found 120x90"
+    ):
         open_recording(copy)
     (copy / "videos" / "cam0.avi").write_bytes(b"RIFF")
     with pytest.raises(RecordingError, match=r"cam0.avi: expected a video that FFmpeg reads"):

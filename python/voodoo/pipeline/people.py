@@ -86,7 +86,9 @@ class PeopleFrontEnd:
                     adapter.add(frame, item, context)
             if used and isinstance(item, ColorImage) and self.people.wants_color:
                 # Clothes tell persons apart.
-                frame.add_color(item.image, camera=item.camera, world_from_sensor=item.root_from_sensor)
+                frame.add_color(
+                    item.image, camera=item.camera, world_from_sensor=item.root_from_sensor, source=item.sensor
+                )
         return frame
 
 

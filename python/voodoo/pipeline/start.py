@@ -28,9 +28,9 @@ from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
-from voodoo.sensors.kinds import inputs, inputs_of
+from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
-from voodoo.sensors.settings import FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings, inputs_for
 from voodoo.tracker import Tracker
 
 Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
@@ -268,7 +268,7 @@ def _upright(body: Body) -> float:
 def _kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
     """Kinds of inputs that a recording has and that are in use."""
     has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
-    return has & set(use if use is not None else inputs())
+    return has & set(use if use is not None else inputs_for(recording))
 
 
 def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:

@@ -99,7 +99,7 @@ class FrontEndSettings:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
         """
         has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
-        settings = cls(use=_chosen(has) if use is None else tuple(use))
+        settings = cls(use=inputs_for(recording) if use is None else tuple(use))
         if has and not has & set(settings.use):
             raise MeasurementError(
                 f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(settings.use)}"
@@ -108,8 +108,9 @@ class FrontEndSettings:
         return replace(settings, empty_scene=scene, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
 
 
-def _chosen(has: set[str]) -> tuple[str, ...]:
-    """The inputs used of those a recording has, where nobody says which."""
+def inputs_for(recording: Recording) -> tuple[str, ...]:
+    """The inputs by which a recording is tracked unless somebody says otherwise, see `FrontEndSettings.of`."""
+    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
     if has & set(WHOLE_BODY) or "color" not in has:
         return default_inputs()
     alone = has == {"skin", "color"}
