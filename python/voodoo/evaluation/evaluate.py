@@ -252,6 +252,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     distances = np.concatenate([step.witness.distances for step in steps])
     about_joints = np.concatenate([step.witness.about_joints for step in steps])
     measured = np.array([step.measured for step in steps])
+    angle_error, angle_spread = metrics.angle_error(positions, compared)
     first_wait, first_error = _first_pose(stamps, status, reference, errors0)
     far, near = (limb_ends(errors, far=which) for which in (True, False))
     score = Score(
@@ -291,6 +292,8 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         far_ends=int(far.sum()),
         near_ends=int(near.sum()),
         step_s=float(seconds.mean()),
+        angle_error_deg=angle_error,
+        angle_spread_deg=angle_spread,
     )
     within = np.array([step.witness.within for step in steps])
     return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds)
