@@ -68,7 +68,13 @@ def test_info_says_what_is_there(bag, films):
     for folder, loader in ((bag, "ros2"), (films, "videos")):
         done = run("info", folder)
         assert done.exit_code == 0, done.stderr
-        for words in (loader, "root frame world", "12 joints, 10 stamps, exact", "pictures of the empty scene", "240x180"):
+        for words in (
+            loader,
+            "root frame world",
+            "12 joints, 10 stamps, exact",
+            "pictures of the empty scene",
+            "240x180",
+        ):
             assert words in done.stdout
 
 
@@ -103,7 +109,9 @@ def test_errors_say_what_is_needed(films, tmp_path, monkeypatch):
 
 def test_cameras_are_chosen_by_topic_and_pictures_by_use(bag, films, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = run("track", films, "--topic", "color=cam_1", "--topic", "color=cam_2", "--overlay", "look", "--out", "p.csv")
+    done = run(
+        "track", films, "--topic", "color=cam_1", "--topic", "color=cam_2", "--overlay", "look", "--out", "p.csv"
+    )
     assert done.exit_code == 0, done.stderr
     height, width = cv2.imread(str(next(Path("look").iterdir()))).shape[:2]
     assert width / height == pytest.approx(8 / 3, abs=0.01)
@@ -111,7 +119,9 @@ def test_cameras_are_chosen_by_topic_and_pictures_by_use(bag, films, tmp_path, m
     entries = scene.bag_entries(3, 2)
     depth = np.full((scene.CAMERA.height, scene.CAMERA.width), 2000, np.uint16)
     entries.append(("/d/depth/camera_info", scene.START, scene.info_of(scene.START, 0)))
-    entries.append(("/d/depth/image", scene.START, scene.M.image(scene.START, depth, "16UC1", frame="cam_0_optical_frame")))
+    entries.append(
+        ("/d/depth/image", scene.START, scene.M.image(scene.START, depth, "16UC1", frame="cam_0_optical_frame"))
+    )
     write_bag(tmp_path / "both", entries)
     init = bag / "init.json"
     assert run("track", "both", "--init", init, "--use", "color", "--out", "c.csv").exit_code == 0
