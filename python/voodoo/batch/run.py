@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import logging
+import queue
 import tempfile
+import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
@@ -21,7 +24,7 @@ _EVERY_S = 2.0
 """The table of summaries is written anew at most so often [s]."""
 _AHEAD = 4
 """So many tasks a worker are known to the scheduler: a million at once would fill its memory."""
-_CONNECT_S = 30
+_CONNECT_S, _LOOK_S = 30, 0.3
 
 
 class Batch:
@@ -84,7 +87,9 @@ class Batch:
         self._written = time.monotonic()
 
 
-def run(jobs: Sequence[Job], *, workers: int, scheduler: str | None = None) -> Iterator[Row]:
+def run(
+    jobs: Sequence[Job], *, workers: int, scheduler: str | None = None, stop: threading.Event | None = None
+) -> Iterator[Row]:
     """Do the jobs, one task each; their rows as they come, in any order.
 
     A task whose worker dies is done once more, by another one; if that one dies, too, it has failed. What is done is taken off
@@ -94,30 +99,34 @@ def run(jobs: Sequence[Job], *, workers: int, scheduler: str | None = None) -> I
         jobs: what is to be done.
         workers: processes on this machine; not used with a scheduler.
         scheduler: address of a Dask scheduler that runs already.
+        stop: once it is set, nothing more is begun, and what was begun is given up.
 
     Raises:
-        VoodooError: Dask is not installed, or the scheduler does not answer.
+        VoodooError: Dask is not installed, the scheduler does not answer, or it has no worker.
     """
     distributed = _distributed()
     with _client(distributed, workers, scheduler) as client:
         threads = sum(client.nthreads().values()) or workers
         waiting = iter(jobs)
-        running: dict[str, Job] = {}
+        running: dict[Any, Job] = {}
+        finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
         prefix = f"voodoo-{time.time_ns():x}"
 
-        def submit(job: Job) -> Any:  # noqa: ANN401 - Dask has no types
-            key = f"{prefix}-{job.name}"
-            running[key] = job
-            return client.submit(do, job, key=key, pure=False)
+        def submit(some: Iterable[Job]) -> None:
+            for job in some:
+                task = client.submit(do, job, key=f"{prefix}-{job.name}", pure=False)
+                running[task] = job
+                task.add_done_callback(finished.put)
 
-        tasks = distributed.as_completed([submit(job) for job in itertools.islice(waiting, _AHEAD * threads)])
-        for task in tasks:
-            job = running.pop(task.key)
-            yield _row(task, job)
-            task.release()
-            following = next(waiting, None)
-            if following is not None:
-                tasks.add(submit(following))
+        submit(itertools.islice(waiting, _AHEAD * threads))
+        while running and not (stop is not None and stop.is_set()):
+            with contextlib.suppress(queue.Empty):
+                task = finished.get(timeout=_LOOK_S)
+                job = running.pop(task)
+                yield _row(task, job)
+                task.release()
+                submit(itertools.islice(waiting, 1))
+        client.cancel(list(running))
 
 
 def _row(task: Any, job: Job) -> Row:  # noqa: ANN401 - Dask has no types
@@ -159,6 +168,10 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
             client = stack.enter_context(distributed.Client(place, timeout=_CONNECT_S))
         except (OSError, TimeoutError, ValueError) as error:
             raise VoodooError(f"--scheduler: expected a Dask scheduler at {scheduler}, found: {error}") from error
+        try:
+            client.wait_for_workers(1, timeout=_CONNECT_S)
+        except TimeoutError as error:
+            raise VoodooError(f"--scheduler: expected a worker at {scheduler}, found none in {_CONNECT_S} s") from error
         yield client
 
 

@@ -82,7 +82,7 @@ def _remote(url: str, only: Sequence[str]) -> list[str]:
             tops = [path.rstrip("/")]
         found: list[str] = []
         for top in tops:
-            found += [top] if not files.isdir(top) else _in_folder(files, top)
+            found += _in_folder(files, top) if files.isdir(top) else [top] if files.exists(top) else []
     kept = [one for one in found if not only or any(fnmatch(one.rsplit("/", 1)[-1], pattern) for pattern in only)]
     if not kept:
         raise RecordingError(f"{url}: expected a recording or a folder of recordings, found none")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.names import HumanModel
-from voodoo.people import People
+from voodoo.people import People, PeopleEstimate
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track
@@ -32,6 +33,10 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
+
+T = TypeVar("T")
+_TOGETHER = 500
+"""Frames whose estimates are held at a time."""
 
 
 @dataclass(frozen=True)
@@ -127,25 +132,12 @@ def _track(job: Job, path: Path) -> tuple[Row, Mapping[int, Track]]:
     settings = FrontEndSettings.of(recording, use=chosen.use)
     config = Config(**dict(chosen.config or {}))
     error = float("nan")
+    tracks: Mapping[int, Track]
     if chosen.people == 1:
-        model = cast(HumanModel | None, chosen.model)
-        init = AUTO if chosen.init == AUTO else None
-        tracker = start_tracker(recording, init=init, model=model, config=config, use=chosen.use)
-        estimates = [step.estimate for step in track(recording, tracker, settings=settings, left_out=left_out)]
-        if not estimates:
-            raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
-        result = Track.of(estimates, body=tracker.body)
-        tracks = {1: result}
-        error = _error(recording, result)
+        tracks = _one_person(job, recording, settings, config, left_out)
+        error = _error(recording, tracks[1])
     else:
-        body = None if chosen.model is None else Body.human(model=cast(HumanModel, chosen.model))
-        people = People(body, config=config, limit=chosen.people)
-        bodies: dict[int, Body] = {}
-        found = []
-        for step in track_people(recording, people, settings=settings):
-            found.append(step.estimate)
-            bodies |= {person.id: people.body(person.id) for person in step.estimate}
-        tracks = dict(PeopleTrack.of(found, bodies=bodies).tracks)
+        tracks = _people(job, recording, settings, config)
     words = [word for one in tracks.values() for word in one.status]
     row = Row(
         recording=job.name,
@@ -158,6 +150,63 @@ def _track(job: Job, path: Path) -> tuple[Row, Mapping[int, Track]]:
         source=job.source,
     )
     return row, tracks
+
+
+def _one_person(
+    job: Job, recording: Recording, settings: FrontEndSettings, config: Config, left_out: LeftOut | None
+) -> Mapping[int, Track]:
+    model = cast(HumanModel | None, job.settings.model)
+    init = AUTO if job.settings.init == AUTO else None
+    tracker = start_tracker(recording, init=init, model=model, config=config, use=job.settings.use)
+    steps = track(recording, tracker, settings=settings, left_out=left_out)
+    parts = [Track.of(part, body=tracker.body) for part in _parts(step.estimate for step in steps)]
+    if not parts:
+        raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
+    return {1: joined(parts)}
+
+
+def _people(job: Job, recording: Recording, settings: FrontEndSettings, config: Config) -> Mapping[int, Track]:
+    body = None if job.settings.model is None else Body.human(model=cast(HumanModel, job.settings.model))
+    people = People(body, config=config, limit=job.settings.people)
+    bodies: dict[int, Body] = {}
+
+    def estimates() -> Iterator[PeopleEstimate]:
+        for step in track_people(recording, people, settings=settings):
+            bodies.update({person.id: people.body(person.id) for person in step.estimate})
+            yield step.estimate
+
+    found: dict[int, list[Track]] = {}
+    for part in _parts(estimates()):
+        for one, own in PeopleTrack.of(part, bodies=bodies).tracks.items():
+            found.setdefault(one, []).append(own)
+    return {one: joined(parts) for one, parts in sorted(found.items())}
+
+
+def _parts(items: Iterable[T]) -> Iterator[list[T]]:
+    """Lists of some hundred of them: the estimates of hours would fill the memory."""
+    stream = iter(items)
+    while part := list(itertools.islice(stream, _TOGETHER)):
+        yield part
+
+
+def joined(parts: Sequence[Track]) -> Track:
+    """The frames of several tracks of one body, one after the other, without the poses of the limbs, which no table has."""
+    first = next((part for part in parts if part.found.any()), parts[0])
+    return Track(
+        stamps=np.concatenate([part.stamps for part in parts]),
+        status=tuple(word for part in parts for word in part.status),
+        residual=np.concatenate([part.residual for part in parts]),
+        joint_names=first.joint_names,
+        joints=np.concatenate([part.joints for part in parts]),
+        limb_names=(),
+        world_from_limb=np.empty((sum(map(len, parts)), 0, 4, 4)),
+        angle_names=first.angle_names,
+        angles=np.concatenate([part.angles for part in parts]),
+        limb_status={
+            limb: tuple(itertools.chain.from_iterable(part.limb_status[limb] for part in parts))
+            for limb in first.limb_status
+        },
+    )
 
 
 def _error(recording: Recording, result: Track) -> float:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -89,22 +93,41 @@ def batch_command(
             count = workers or (
                 len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
             )
-            try:
-                for row in progressing(
-                    run(batch.jobs, workers=count, scheduler=scheduler), "tracking", len(batch.jobs)
-                ):
-                    batch.take(row)
-                    if row.status == FAILED:
-                        say(f"{row.recording}: {row.error}")
-            except KeyboardInterrupt:
-                interrupted = True
-            finally:
-                batch.save()
-        rows = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
-        done = sum(row.status == DONE for row in rows)
+            with _ctrl_c() as stop:
+                rows = run(batch.jobs, workers=count, scheduler=scheduler, stop=stop)
+                try:
+                    for row in progressing(rows, "tracking", len(batch.jobs)):
+                        batch.take(row)
+                        if row.status == FAILED:
+                            say(f"{row.recording}: {row.error}")
+                finally:
+                    batch.save()
+                interrupted = stop.is_set()
+        ours = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
+        done = sum(row.status == DONE for row in ours)
         told = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
         say_interrupted(interrupted, told)
         typer.echo(told)
-        broken = [row for row in rows if row.status == FAILED]
+        broken = [row for row in ours if row.status == FAILED]
         if broken:
             raise VoodooError(f"{len(broken)} recordings failed, the first: {broken[0].recording}: {broken[0].error}")
+
+
+@contextmanager
+def _ctrl_c() -> Iterator[threading.Event]:
+    """Ctrl-C within sets the event, so that the engine ends in order; a second one ends the program."""
+    stop = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def set_once(*_: object) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    signal.signal(signal.SIGINT, set_once)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -108,6 +108,7 @@ class RosRecording(Recording):
         scale = number_option(path, "metres_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
+        self._info: RecordingInfo | None = None
         self._bag = Bag(path, left_out=left_out)
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices: dict[TopicKind, TopicChoice] = {
@@ -193,7 +194,12 @@ class RosRecording(Recording):
         return measured
 
     def info(self) -> RecordingInfo:
-        """Summarize; reads the first and last message of every topic in use."""
+        """Summarize; reads the first and last message of every topic in use, once."""
+        if self._info is None:
+            self._info = self._summary()
+        return self._info
+
+    def _summary(self) -> RecordingInfo:
         sensors = []
         duration = 0.0
         for source in self._sources.values():
