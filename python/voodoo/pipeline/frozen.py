@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,16 +26,31 @@ class FrozenSensors:
         twin.names, twin._contents = self.names, dict(self._contents)
         return twin
 
-    def without(self, measurements: Sequence[Measurement], *, use: Sequence[str]) -> list[Measurement]:
+    def without(
+        self,
+        measurements: Sequence[Measurement],
+        *,
+        use: Sequence[str],
+        idle: Callable[[Measurement], bool] = lambda item: False,
+    ) -> list[Measurement]:
         """Those measurements whose sensor is not frozen.
 
         A sensor is frozen when it repeats its last measurement bit by bit while another one measures something new:
-        real sensors have noise. Only kinds in `use` count.
+        real sensors have noise. Only kinds in `use` count. What is `idle` is not used in this frame; pictures would have to be
+        decoded for it, so it is looked at only where another sensor repeats itself.
         """
         repeats, changes = [], False
+<<<<<<< HEAD
         for item in measurements:
             adapter = next((known for known in adapters_of(item) if known.kind in use), None)
             content = None if adapter is None else adapter.content(item)
+=======
+        for item in sorted(measurements, key=idle):
+            adapter = adapter_of(item)
+            if idle(item) and not repeats:
+                continue
+            content = adapter.content(item) if adapter.kind in use else None
+>>>>>>> origin/main
             if content is None:
                 continue
             before = self._contents.get(item.sensor)

@@ -62,7 +62,10 @@ class PeopleFrontEnd:
     def frame(self, recorded: RecordedFrame) -> Frame:
         """The frame of all persons, without stepping."""
         chosen = self.settings
-        alive = self._alive = self._frozen.without(recorded.measurements, use=chosen.use)
+        colored = self.people.wants_color
+        alive = self._alive = self._frozen.without(
+            recorded.measurements, use=chosen.use, idle=lambda item: isinstance(item, ColorImage) and not colored
+        )
         frame = Frame(stamp=recorded.stamp)
         for low, high in chosen.exclude:
             frame.exclude(low, high)
@@ -84,7 +87,7 @@ class PeopleFrontEnd:
             for adapter in used:
                 if adapter.while_searching:
                     adapter.add(frame, item, context)
-            if used and isinstance(item, ColorImage) and self.people.wants_color:
+            if used and isinstance(item, ColorImage) and colored:
                 # Clothes tell persons apart.
                 frame.add_color(
                     item.image, camera=item.camera, world_from_sensor=item.root_from_sensor, source=item.sensor

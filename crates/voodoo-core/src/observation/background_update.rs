@@ -1,6 +1,6 @@
 //! What is not the body: the still scene, learnt around it.
 
-use super::background::Backgrounds;
+use super::background::{Background, Backgrounds};
 use super::candidates::image_window;
 use super::frame::{DepthImage, Frame};
 use super::observer::{Expectation, Own};
@@ -30,10 +30,20 @@ impl Backgrounds {
 
     /// Forgets, and returns, what was learnt at pixels that show the body.
     pub(super) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
-        let Some(depth) = frame.images.get(own.image).and_then(|image| self.depth_mut(image)) else {
-            return Vec::new();
+        let Some(image) = frame.images.get(own.image) else { return Vec::new() };
+        let Some(depth) = self.depth_mut(image) else { return Vec::new() };
+        let scale = image.metres_per_unit as f32;
+        let forget = |pixel: &usize| {
+            let Some(depth) = depth.get_mut(*pixel) else { return 0.0 };
+            let learnt = *depth;
+            // What was learnt behind the body stays.
+            let z = image.pixels.get(*pixel) * scale;
+            if !(z > 0.0) || Background::holds(learnt, z) {
+                *depth = 0.0;
+            }
+            learnt
         };
-        own.pixels.iter().map(|pixel| depth.get_mut(*pixel).map_or(0.0, std::mem::take)).collect()
+        own.pixels.iter().map(forget).collect()
     }
 
     /// Learns again what was forgotten.

@@ -313,7 +313,11 @@ impl People {
             person.measure(&stranger.detection);
         }
         person.note(frame, share);
-        came
+        // Who was lost may have been found by their own tracker in this very frame.
+        let place = person.place;
+        let twice = self.others_than(Some(number)).iter().any(|(_, other)| other.distance(place) < ONE_BODY);
+        self.persons[number].there &= !twice;
+        came && !twice
     }
 
     /// Forgets who has been away for too long, and who was there for a moment only.

@@ -94,10 +94,13 @@ impl Person {
         if self.tracked() {
             self.seen = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
-            if estimate.status == Status::Tracking && self.due(frame.stamp) && !frame.colors.is_empty() {
-                let own = |image, pixel: usize| share.owners(image).get(pixel) == Some(&share.own);
-                self.clothes.look(frame, self.tracker.body(), &estimate.world_from_limb, own);
+            // Looked at together, all need one picture.
+            if frame.stamp - self.looked >= 0.5 * CLOTHES_EVERY && !frame.colors.is_empty() {
                 self.looked = frame.stamp;
+                if estimate.status == Status::Tracking {
+                    let own = |image, pixel: usize| share.owners(image).get(pixel) == Some(&share.own);
+                    self.clothes.look(frame, self.tracker.body(), &estimate.world_from_limb, own);
+                }
             }
             return;
         }

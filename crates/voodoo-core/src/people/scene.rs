@@ -100,11 +100,15 @@ impl Scene {
         2 * pixels.iter().filter(still).count() > pixels.len()
     }
 
-    /// These pixels of an image show a person.
+    /// These pixels of an image show a person: where the scene was thought to be there, nothing is known of it. What was learnt
+    /// behind the person stays; forgotten, it would stand out as a flat body when the person is gone.
     pub(super) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
-        let Some(known) = frame.images.get(image).and_then(|image| self.known.depth_mut(image)) else { return };
+        let Some(image) = frame.images.get(image) else { return };
+        let Some(known) = self.known.depth_mut(image) else { return };
         for pixel in pixels {
-            if let Some(depth) = known.get_mut(*pixel) {
+            if let Some(depth) = known.get_mut(*pixel)
+                && metres(image, *pixel).is_none_or(|z| Background::holds(*depth, z))
+            {
                 *depth = 0.0;
             }
         }
@@ -130,4 +134,33 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, looks: &mut u8, z: f32) {
 fn metres(image: &DepthImage, index: usize) -> Option<f32> {
     let z = image.pixels.get(index) * image.metres_per_unit as f32;
     (z > 0.0 && z.is_finite()).then_some(z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::with_frame;
+
+    const PIXELS: usize = 160 * 124;
+
+    fn show(scene: &mut Scene, millimetres: u16, frame: usize, look: impl FnOnce(&mut Scene, &Frame)) {
+        with_frame(&[millimetres; PIXELS], frame as f64 / 30.0, |frame| {
+            scene.meet(frame);
+            look(scene, frame);
+            scene.learn(frame, &[vec![NOBODY; PIXELS]]);
+        });
+    }
+
+    #[test]
+    fn where_a_person_was_taken_for_the_scene_it_is_forgotten_and_behind_one_who_came_it_stays() {
+        for (came, left) in [(5000, 0.0), (3000, 5.0)] {
+            let mut scene = Scene::default();
+            (0..3).for_each(|frame| show(&mut scene, 5000, frame, |_, _| ()));
+            show(&mut scene, came, 3, |scene, frame| {
+                scene.release(frame, 0, &[7]);
+                let known = scene.known().of(&frame.images[0]).map(|known| [known.depth()[7], known.depth()[8]]);
+                assert_eq!(known, Some([left, 5.0]));
+            });
+        }
+    }
 }
