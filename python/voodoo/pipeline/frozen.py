@@ -40,17 +40,11 @@ class FrozenSensors:
         decoded for it, so it is looked at only where another sensor repeats itself.
         """
         repeats, changes = [], False
-<<<<<<< HEAD
-        for item in measurements:
-            adapter = next((known for known in adapters_of(item) if known.kind in use), None)
-            content = None if adapter is None else adapter.content(item)
-=======
         for item in sorted(measurements, key=idle):
-            adapter = adapter_of(item)
             if idle(item) and not repeats:
                 continue
-            content = adapter.content(item) if adapter.kind in use else None
->>>>>>> origin/main
+            adapter = next((known for known in adapters_of(item) if known.kind in use), None)
+            content = None if adapter is None else adapter.content(item)
             if content is None:
                 continue
             before = self._contents.get(item.sensor)
