@@ -288,13 +288,18 @@ class Frame:
         *,
         camera: _Camera,
         world_from_sensor: npt.ArrayLike | None = None,
+        stamp: float | None = None,
+        source: str = "color",
     ) -> None:
-        """Add a colour picture, by which People tells persons apart who come back; Tracker does not look at it.
+        """Add a colour or grey picture: Tracker fits the body's contour to its regions, People tells persons apart by clothes.
 
         Args:
-            image: (height, width, 3) uint8, channels in any order that is the same in all frames.
-            camera: its calibration, a voodoo.Camera of the same size.
+            image: (height, width, 3) uint8, channels in any order that is the same in all frames, or (height, width) uint8.
+            camera: its calibration, a voodoo.Camera of the same size; Tracker refuses one with distortion: undistort first.
             world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
+            stamp: when the picture was taken [s], within 0.25 s of the frame's; the frame's by default.
+            source: name of the camera, the same in every frame: what is learnt of colours goes by it, and the report in
+                `Estimate.sources`.
 
         Raises:
             MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
@@ -560,6 +565,7 @@ class Tracker:
     def _reset(self, joints: Mapping[str, tuple[float, float, float]], *, fit_sizes: bool = True) -> Estimate: ...
     def _reset_pose(self, world_from_limb: Sequence[npt.NDArray[np.float64]]) -> Estimate: ...
     def step(self, frame: Frame) -> Estimate: ...
+    def _set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None: ...
     def distance(self, points: _Points) -> npt.NDArray[np.float32]: ...
     def limb_distances(self, points: _Points) -> npt.NDArray[np.float32]: ...
     def scale(self, factor: float) -> None: ...

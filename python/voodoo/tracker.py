@@ -40,6 +40,7 @@ class Tracker:
             raise ConfigError(f"config: expected a voodoo.Config, found {type(config).__name__}")
         self.config = Config() if config is None else config
         self._initial = body
+        self._backgrounds: dict[str, tuple[npt.NDArray[np.uint8], ...]] = {}
         self.search()
 
     @property
@@ -72,6 +73,8 @@ class Tracker:
     def search(self) -> None:
         """Give up the pose and what was learnt with it: from the next step on somebody is looked for, as in a new tracker."""
         self._core = _core.Tracker(self._initial.core, self.config.values())
+        for source, images in self._backgrounds.items():
+            self._core._set_background(source, images)
 
     def reset_pose(self, world_from_limb: Mapping[str, npt.ArrayLike]) -> Estimate:
         """Set the pose of every limb directly: limb name -> rigid (4, 4) world_from_limb; sizes stay as they are.
@@ -81,6 +84,27 @@ class Tracker:
             MeasurementError: a matrix is not rigid; it names the limb.
         """
         return self._core._reset_pose(ordered_poses(self.body, world_from_limb))
+
+    def set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None:
+        """Show the scene without anybody in it, as the colour camera `source` sees it (`Frame.add_color`).
+
+        What a pixel shows then is compared with what it shows now; not needed, but it helps where clothes and scene have
+        one colour. It stays over `reset` and `search`.
+
+        Args:
+            source: name of the camera.
+            images: (height, width, 3) or (height, width) uint8 each, of the size and kind of the camera's pictures; none:
+                what was shown before is forgotten.
+
+        Raises:
+            MeasurementError: pictures of another kind, or of different sizes. The next step refuses those of another size
+                than its own.
+        """
+        if not isinstance(source, str):
+            raise MeasurementError(f"source: expected a name, found {type(source).__name__}")
+        shown = tuple(images)
+        self._core._set_background(source, shown)
+        self._backgrounds[source] = shown
 
     def step(self, frame: Frame) -> Estimate:
         """The pose at the frame's time. Releases the GIL; a refused frame leaves the tracker as it was.

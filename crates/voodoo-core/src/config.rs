@@ -272,6 +272,8 @@ config! {
     relocalization: bool = true, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body solvers).
     outline: bool = true, "";
+    /// Draw the limbs' contours to the edges of their colours in colour pictures (whole-body solvers).
+    regions: bool = true, "";
     /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).
     facing: bool = true, "";
     /// Keep joints within their limits, softly (whole-body solvers).

@@ -64,6 +64,7 @@ pub mod ik;
 pub mod math;
 pub mod observation;
 pub mod people;
+pub mod regions;
 pub mod relocalize;
 pub mod shape;
 pub mod sizes;

@@ -5,7 +5,8 @@ mod scene;
 
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{ColorImage, Frame};
+use voodoo_core::observation::frame::Frame;
+use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 use voodoo_core::people::Options;
 use voodoo_core::{Body, Config, People, Status};
 
@@ -123,8 +124,16 @@ fn a_refused_frame_changes_nothing() {
     assert!(people.step(&Frame { images: &none, ..Frame::empty(1.0) }, &[]).is_err(), "no pixels");
     assert!(people.step(&good, &[(1, Frame { images: &none, ..Frame::empty(1.0) })]).is_err(), "one person's");
     let short = [[0_u8; 3]; 5];
-    let picture =
-        ColorImage { pixels: &short, width: 3, height: 2, intrinsics: [1.0; 4], world_from_sensor: Pose::IDENTITY };
+    let picture = ColorImage {
+        pixels: ColorPixels::Color(&short),
+        width: 3,
+        height: 2,
+        intrinsics: [1.0; 4],
+        world_from_sensor: Pose::IDENTITY,
+        stamp: 1.0,
+        camera: 0,
+        source: 0,
+    };
     assert!(people.step(&Frame { colors: &[picture], ..good }, &[]).is_err(), "a pixel is missing");
     assert_eq!(format!("{people:?}"), before);
     assert!(people.step(&good, &[]).is_ok());

@@ -4,12 +4,12 @@
 use nalgebra::Vector6;
 use proptest::prelude::*;
 use voodoo_core::Body;
-use voodoo_core::association::correspondence::{ContourPair, Correspondences, LimbMatches, SitePair};
+use voodoo_core::association::correspondence::{ContourPair, Correspondences, LimbMatches, RegionPair, SitePair};
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Vec3};
 use voodoo_core::terms::normal_equations::NormalEquations;
-use voodoo_core::terms::{Contour, Limits, Penetration, Prior, Sites, Surface, Term};
+use voodoo_core::terms::{Contour, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
 
 /// Compares the analytic gradient with differences of the cost; `evaluate` fills the system at given poses. Where the cost has a
 /// kink, as where two limbs begin to touch, the gradient lies between the differences to both sides; elsewhere these agree.
@@ -123,6 +123,24 @@ proptest! {
                 ContourPair { limb, x, normal, distance: normal.dot(targets[limb] - x) }
             }).collect();
             Contour { pairs: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
+        })?;
+    }
+
+    #[test]
+    fn regions(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 18)) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = random_pose(&body, &angles);
+        // A point of each limb's contour, and where the edge of its colours is seen along a direction fixed in the world.
+        let feet: Vec<Vec3> = offsets.iter().map(|offset| Vec3::new(0.06, *offset, 0.1)).collect();
+        let normal = Vec3::new(0.48, -0.6, 0.64);
+        let edges: Vec<f64> = poses.iter().zip(&feet).zip(&offsets).map(|((pose, foot), off)| normal.dot(*pose * *foot) + off).collect();
+        check(&body, &poses, &|poses, system| {
+            let pairs: Vec<RegionPair> = (0..poses.len()).map(|limb| {
+                let x = poses[limb] * feet[limb];
+                let information = 1.0 + limb as f64;
+                RegionPair { limb, x, normal, distance: edges[limb] - normal.dot(x), information, source: 0 }
+            }).collect();
+            Regions { pairs: &pairs }.add(&body, poses, system);
         })?;
     }
 

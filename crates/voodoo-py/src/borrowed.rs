@@ -1,14 +1,13 @@
 //! What a `Frame` holds, and what a step borrows of it: arrays of the caller, names looked up in the body.
 
-use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{
-    Cloud, ColorImage, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope,
-};
+use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 
-use crate::arrays::{PointArray, PointView};
+use crate::arrays::{PointArray, PointView, contiguous};
 use crate::errors::IntoPy;
 
 pub struct CloudData {
@@ -41,29 +40,75 @@ pub struct ImageData {
     pub source: u16,
 }
 
+/// A picture as it came: colour or grey.
+pub enum ColorArray {
+    Color(Py<PyArray3<u8>>),
+    Grey(Py<PyArray2<u8>>),
+}
+
+/// A borrow of a [`ColorArray`].
+pub enum ColorPixelView<'py> {
+    Color(PyReadonlyArray3<'py, u8>),
+    Grey(PyReadonlyArray2<'py, u8>),
+}
+
 pub struct ColorData {
-    pub pixels: Py<PyArray3<u8>>,
+    pub pixels: ColorArray,
     pub size: [usize; 2],
     pub intrinsics: [f64; 4],
+    pub distorted: bool,
     pub world_from_sensor: Pose,
+    pub stamp: f64,
+    pub source: u16,
 }
 
 /// A borrow of a [`ColorData`].
 pub struct ColorView<'py, 'a> {
-    pixels: PyReadonlyArray3<'py, u8>,
-    data: &'a ColorData,
+    pixels: ColorPixelView<'py>,
+    pub data: &'a ColorData,
+}
+
+impl ColorArray {
+    /// Takes a contiguous array of shape (height, width, 3) or (height, width) and dtype uint8; none of another kind.
+    pub fn new(image: &Bound<'_, PyAny>) -> Option<(Self, [usize; 2])> {
+        let array = contiguous(image).ok()?;
+        if let Ok(array) = array.cast::<PyArray3<u8>>() {
+            let shape = array.shape();
+            return (shape[2] == 3).then(|| (Self::Color(array.clone().unbind()), [shape[0], shape[1]]));
+        }
+        let array = array.cast::<PyArray2<u8>>().ok()?;
+        Some((Self::Grey(array.clone().unbind()), [array.shape()[0], array.shape()[1]]))
+    }
+
+    pub fn view<'py>(&self, py: Python<'py>) -> ColorPixelView<'py> {
+        match self {
+            Self::Color(array) => ColorPixelView::Color(array.bind(py).readonly()),
+            Self::Grey(array) => ColorPixelView::Grey(array.bind(py).readonly()),
+        }
+    }
+}
+
+impl ColorPixelView<'_> {
+    pub fn pixels(&self) -> PyResult<ColorPixels<'_>> {
+        Ok(match self {
+            Self::Color(view) => ColorPixels::Color(view.as_slice()?.as_chunks().0),
+            Self::Grey(view) => ColorPixels::Grey(view.as_slice()?),
+        })
+    }
 }
 
 impl ColorData {
     pub fn view<'py>(&self, py: Python<'py>) -> ColorView<'py, '_> {
-        ColorView { pixels: self.pixels.bind(py).readonly(), data: self }
+        ColorView { pixels: self.pixels.view(py), data: self }
     }
 }
 
 impl ColorView<'_, '_> {
-    pub fn image(&self) -> PyResult<ColorImage<'_>> {
-        let ColorData { size: [height, width], intrinsics, world_from_sensor, .. } = *self.data;
-        Ok(ColorImage { pixels: self.pixels.as_slice()?.as_chunks().0, width, height, intrinsics, world_from_sensor })
+    /// The picture of the camera with this number.
+    pub fn image(&self, camera: u16) -> PyResult<ColorImage<'_>> {
+        let ColorData { size: [height, width], intrinsics, world_from_sensor, stamp, source, .. } = *self.data;
+        let pixels = self.pixels.pixels()?;
+        Ok(ColorImage { pixels, width, height, intrinsics, world_from_sensor, stamp, camera, source })
     }
 }
 

@@ -8,7 +8,7 @@ use voodoo_core::observation::frame::Ground;
 
 use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
-use crate::borrowed::{Borrowed, CloudData, ColorData, ColorView, DepthArray, Held, ImageData, SiteData};
+use crate::borrowed::{Borrowed, CloudData, ColorArray, ColorData, ColorView, DepthArray, Held, ImageData, SiteData};
 use crate::errors::{exception, wrong_argument};
 
 /// All measurements of one instant, from any number of sensors.
@@ -172,31 +172,44 @@ impl PyFrame {
         Ok(())
     }
 
-    /// Add a colour picture, by which People tells persons apart who come back; Tracker does not look at it.
+    /// Add a colour or grey picture: Tracker fits the body's contour to its regions, People tells persons apart by clothes.
     ///
     /// Args:
-    ///     image: (height, width, 3) uint8, channels in any order that is the same in all frames.
-    ///     camera: its calibration, a voodoo.Camera of the same size.
+    ///     image: (height, width, 3) uint8, channels in any order that is the same in all frames, or (height, width) uint8.
+    ///     camera: its calibration, a voodoo.Camera of the same size; Tracker refuses one with distortion: undistort first.
     ///     world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
+    ///     stamp: when the picture was taken [s], within 0.25 s of the frame's; the frame's by default.
+    ///     source: name of the camera, the same in every frame: what is learnt of colours goes by it, and the report in
+    ///         `Estimate.sources`.
     ///
     /// Raises:
     ///     MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
-    #[pyo3(signature = (image, *, camera, world_from_sensor=None))]
+    #[pyo3(signature = (image, *, camera, world_from_sensor=None, stamp=None, source="color"))]
     fn add_color(
         &mut self,
         image: &Bound<'_, PyAny>,
         camera: &Bound<'_, PyAny>,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
+        stamp: Option<&Bound<'_, PyAny>>,
+        source: &str,
     ) -> PyResult<()> {
         let (size, intrinsics) = calibration(camera)?;
-        let expected = format!("an array of shape ({}, {}, 3) and dtype uint8", size[0], size[1]);
-        let wrong = || wrong_argument(image.py(), "image", &expected, image);
-        let array = contiguous(image).map_err(|_| wrong())?.cast_into::<PyArray3<u8>>().map_err(|_| wrong())?;
-        if array.shape() != [size[0], size[1], 3] {
-            return Err(wrong());
-        }
-        let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
-        self.colors.push(ColorData { pixels: array.unbind(), size, intrinsics, world_from_sensor });
+        let [height, width] = size;
+        let expected = format!("an array of shape ({height}, {width}, 3) or ({height}, {width}) and dtype uint8");
+        unmasked("image", image, "fill it: image.filled(0)")?;
+        let (pixels, _) = ColorArray::new(image)
+            .filter(|(_, found)| *found == size)
+            .ok_or_else(|| wrong_argument(image.py(), "image", &expected, image))?;
+        let data = ColorData {
+            pixels,
+            size,
+            intrinsics,
+            distorted: camera.getattr("distorted")?.extract()?,
+            world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
+            stamp: stamp.map_or(Ok(self.stamp), arguments::stamp)?,
+            source: self.source(source),
+        };
+        self.colors.push(data);
         Ok(())
     }
 
@@ -300,10 +313,11 @@ impl PyFrame {
 
     fn __repr__(&self) -> String {
         format!(
-            "Frame(stamp={}, clouds={}, depth_images={}, sites={}, sources={:?})",
+            "Frame(stamp={}, clouds={}, depth_images={}, colors={}, sites={}, sources={:?})",
             self.stamp,
             self.clouds.len(),
             self.images.len(),
+            self.colors.len(),
             self.sites.len(),
             self.sources
         )

@@ -13,7 +13,7 @@ use voodoo_core::{Frame, People};
 
 use crate::arrays::PointArray;
 use crate::body::PyBody;
-use crate::borrowed::{Borrowed, ColorView};
+use crate::borrowed::Borrowed;
 use crate::config::config;
 use crate::errors::IntoPy;
 use crate::estimate::{Names, PyEstimate};
@@ -57,7 +57,8 @@ impl PyPeople {
         let all = frame.borrow_for(py, body)?;
         let (clouds, images) = (all.clouds()?, all.images()?);
         let views = frame.color_views(py);
-        let colors = views.iter().map(ColorView::image).collect::<PyResult<Vec<_>>>()?;
+        let numbered = views.iter().zip(0..);
+        let colors = numbered.map(|(view, camera)| view.image(camera)).collect::<PyResult<Vec<_>>>()?;
         let input = Frame {
             stamp: frame.stamp,
             clouds: &clouds,

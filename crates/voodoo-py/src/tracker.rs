@@ -11,8 +11,9 @@ use voodoo_core::{Body, Frame, Tracker};
 
 use crate::arrays::{PointArray, limb_poses, vector};
 use crate::body::{JointParts, PyBody, joint};
+use crate::borrowed::ColorArray;
 use crate::config::config;
-use crate::errors::IntoPy;
+use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::shape::PyShape;
@@ -22,6 +23,8 @@ pub struct PyTracker {
     tracker: Tracker,
     names: Arc<Names>,
     sources: Vec<String>,
+    /// Names of the cameras of colour pictures, in the order of their numbers.
+    cameras: Vec<String>,
 }
 
 /// Named positions with the indices of their sites.
@@ -43,6 +46,16 @@ impl PyTracker {
         }
     }
 
+    /// Number of the camera of colour pictures with this name.
+    fn camera(&mut self, name: &str) -> u16 {
+        let known = self.cameras.iter().position(|known| known == name);
+        let number = known.unwrap_or_else(|| {
+            self.cameras.push(name.to_owned());
+            self.cameras.len() - 1
+        });
+        number as u16
+    }
+
     fn body_changed(&mut self) {
         self.names = Arc::new(Names::of(self.tracker.body()));
     }
@@ -54,7 +67,7 @@ impl PyTracker {
     fn new(body: &PyBody, values: &Bound<'_, PyDict>) -> PyResult<Self> {
         let tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
         let names = Arc::new(Names::of(tracker.body()));
-        Ok(Self { tracker, names, sources: Vec::new() })
+        Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new() })
     }
 
     fn _body(&self) -> PyBody {
@@ -87,11 +100,21 @@ impl PyTracker {
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = frame.borrow_for(py, self.tracker.body())?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
+        let views = frame.color_views(py);
+        let mut colors = Vec::with_capacity(views.len());
+        for view in &views {
+            let name = &frame.sources[usize::from(view.data.source)];
+            if view.data.distorted {
+                let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
+                return Err(exception(py, "MeasurementError", text));
+            }
+            colors.push(view.image(self.camera(name))?);
+        }
         let input = Frame {
             stamp: frame.stamp,
             clouds: &clouds,
             images: &images,
-            colors: &[],
+            colors: &colors,
             positions: &borrowed.positions,
             rays: &borrowed.rays,
             ground: borrowed.ground,
@@ -101,6 +124,35 @@ impl PyTracker {
         py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
         self.sources.clone_from(&frame.sources);
         Ok(self.snapshot())
+    }
+
+    /// Pictures of the scene without anybody, as the camera with this name sees it; none: forgets them.
+    fn _set_background(&mut self, py: Python<'_>, source: &str, images: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
+        let mut pictures = Vec::with_capacity(images.len());
+        for (index, image) in images.iter().enumerate() {
+            let expected = "an array of shape (height, width, 3) or (height, width) and dtype uint8";
+            let wrong = || wrong_argument(py, &format!("images[{index}]"), expected, image);
+            pictures.push(ColorArray::new(image).ok_or_else(wrong)?);
+        }
+        let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
+        let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
+        let camera = self.camera(source);
+        self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
+    }
+
+    /// The lines of the last step in the pictures of a camera: limb, place (2), outward normal (2), offset, sigma, row by row.
+    fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let camera = self.cameras.iter().position(|known| known == source);
+        let rows: Vec<Vec<f32>> = camera.map_or_else(Vec::new, |camera| {
+            let lines = self.tracker.region_lines(camera as u16);
+            lines
+                .map(|line| {
+                    let ([u, v], [nu, nv]) = (line.place, line.normal);
+                    vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
+                })
+                .collect()
+        });
+        PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
     /// Signed distance of world points `(N, 3)` to the posed body, metres, negative inside.

@@ -341,7 +341,6 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         raise VoodooError(
             f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
         )
-    sure: dict[str, Any] = {name: content[name] for name in ("covariance", "root_covariance") if name in content}
     return Track(
         stamps=content["stamps"],
         status=tuple(str(value) for value in content["status"]),
@@ -353,7 +352,8 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         # Files of earlier versions have no angles.
         angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
         angles=content["angles"] if "angles" in content else np.empty((0, 0)),
-        **sure,
+        covariance=content.get("covariance", np.empty((0, 0, 3, 3))),
+        root_covariance=content.get("root_covariance", np.empty((0, 6, 6))),
         **_told(content),
     )
 

@@ -56,6 +56,37 @@ pub struct ContourPair {
     pub distance: f64,
 }
 
+/// A point of a limb's contour and the edge of its colours in a picture: a distance along one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegionPair {
+    /// The limb.
+    pub limb: usize,
+    /// The contour's point.
+    pub x: Vec3,
+    /// Direction in which the point is seen to move across the contour, outward, length one.
+    pub normal: Vec3,
+    /// The edge lies so far out along it, metres.
+    pub distance: f64,
+    /// What the colours say of it, 1/m^2.
+    pub information: f64,
+    /// Number of the source.
+    pub source: u16,
+}
+
+/// What pictures say of a limb, by its lines: shares of those that can tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RegionSupport {
+    /// Its colours end at its contour: of the whole limb, each line weighted with its distance from the proximal joint, and of
+    /// its outer part.
+    pub own: [f64; 2],
+    /// The colours of its surroundings are seen within it, likewise.
+    pub against: [f64; 2],
+    /// Lines that can tell, as a share of all.
+    pub shown: f64,
+    /// Number of lines.
+    pub lines: f64,
+}
+
 /// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
@@ -82,6 +113,10 @@ pub struct Correspondences {
     pub sites: Vec<SitePair>,
     /// Rims of limbs and the contour of the body in depth images.
     pub contour: Vec<ContourPair>,
+    /// Contours of limbs and edges of colours.
+    pub regions: Vec<RegionPair>,
+    /// What they say of each limb; empty without pictures.
+    pub region_support: Vec<RegionSupport>,
     /// Elastic bands.
     pub bands: Vec<Band>,
 }

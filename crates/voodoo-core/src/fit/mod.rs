@@ -17,6 +17,7 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::Pose;
+use crate::regions::{Posed, Regions};
 use crate::solver::{Gate, Problem, Schedule, Solver, WarmStartInput, solver};
 
 /// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
@@ -29,6 +30,7 @@ pub struct Fit {
     assignment: Assignment,
     correspondences: Correspondences,
     contours: Contours,
+    regions: Regions,
     band_weights: Vec<f64>,
     threads: Option<ThreadPool>,
 }
@@ -47,6 +49,7 @@ impl Fit {
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
             contours: Contours::default(),
+            regions: Regions::default(),
             band_weights: Vec::new(),
             threads,
         })
@@ -77,6 +80,9 @@ impl Fit {
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
         self.correspondences.contour.clear();
+        self.correspondences.regions.clear();
+        self.correspondences.region_support.clear();
+        self.regions.clear();
     }
 
     /// Warm start, then steps 2 to 7 until they settle; the matches at the end are those of the found poses. Returns the
@@ -95,7 +101,7 @@ impl Fit {
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
             self.solve(context, predicted, poses, steps);
             steps += 1;
-            if (before - distance).abs() < context.config.min_change {
+            if (before - distance).abs() < context.config.min_change && self.correspondences.regions.is_empty() {
                 break;
             }
             before = distance;
@@ -121,6 +127,7 @@ impl Fit {
             self.contours.clear();
         }
         self.match_assigned(context, poses, &gate, true);
+        self.find_regions(context, poses, step);
     }
 
     /// The same after the last step, but for the contour: it moves nothing any more.
@@ -129,6 +136,7 @@ impl Fit {
         self.assign(context, poses, &gate);
         self.contours.clear();
         self.match_assigned(context, poses, &gate, true);
+        self.find_regions(context, poses, context.config.max_steps);
     }
 
     /// Points alone, within `gate`, wherever on a limb they are closest: for poses that somebody set.
@@ -185,6 +193,7 @@ impl Fit {
     fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
         let gate = self.schedule(context.config).gate(step);
         self.match_assigned(context, poses, &gate, false);
+        self.find_regions(context, poses, step);
     }
 
     fn match_assigned(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool) {
@@ -203,6 +212,50 @@ impl Fit {
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         let Context { config, model, seen, .. } = context;
         self.assignment.assign(&model.body, poses, seen.candidates, config.overlap, gate.box_margin);
+    }
+
+    /// Colours of limbs and surroundings.
+    pub fn regions(&self) -> &Regions {
+        &self.regions
+    }
+
+    /// The same, to change.
+    pub fn regions_mut(&mut self) -> &mut Regions {
+        &mut self.regions
+    }
+
+    /// Learns the colours of new cameras where the body is expected.
+    pub fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
+        if context.config.regions {
+            self.regions.begin(context.seen.frame(), posed(context, poses));
+        }
+    }
+
+    /// Looks for every edge of colours by itself, both sides of a limb apart: pairs that tell how wide it is.
+    pub fn match_outline(&mut self, context: Context, poses: &[Pose]) {
+        let Self { regions, correspondences, .. } = self;
+        correspondences.regions.clear();
+        if context.config.regions {
+            let (frame, posed) = (context.seen.frame(), posed(context, poses));
+            regions.find_outline(frame, posed, &mut correspondences.regions);
+        }
+    }
+
+    /// Learns colours where the body was found.
+    pub fn learn_regions(&mut self, context: Context, poses: &[Pose]) {
+        if context.config.regions {
+            self.regions.learn(context.seen.frame(), posed(context, poses));
+        }
+    }
+
+    fn find_regions(&mut self, context: Context, poses: &[Pose], step: usize) {
+        let Self { regions, correspondences, .. } = self;
+        correspondences.regions.clear();
+        correspondences.region_support.clear();
+        let frame = context.seen.frame();
+        if context.config.regions && !frame.colors.is_empty() {
+            regions.find(frame, posed(context, poses), step, correspondences);
+        }
     }
 
     fn find_contour(&mut self, context: Context, poses: &[Pose]) {
@@ -244,6 +297,10 @@ impl Fit {
         // 7 Fit the model.
         solver.solve(&problem(context, correspondences, predicted, step), poses);
     }
+}
+
+fn posed<'a>(context: Context<'a>, poses: &'a [Pose]) -> Posed<'a> {
+    Posed { body: &context.model.body, poses, previous: context.previous, origin: context.seen.origin() }
 }
 
 fn problem<'a>(

@@ -3,6 +3,7 @@
 use crate::body::Body;
 use crate::error::TrackError;
 use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
+use crate::observation::picture::ColorImage;
 
 /// Three-dimensional points as they lie in memory, in metres.
 #[derive(Clone, Copy, Debug)]
@@ -130,21 +131,6 @@ impl DepthImage<'_> {
     }
 }
 
-/// A colour picture, for telling persons apart by their clothes. What bends straight lines is not corrected: it is little there.
-#[derive(Clone, Copy, Debug)]
-pub struct ColorImage<'a> {
-    /// `width * height` pixels, the colours in any order that is always the same.
-    pub pixels: &'a [[u8; 3]],
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// As of a [`DepthImage`].
-    pub intrinsics: [f64; 4],
-    /// Pose of the camera's optical frame (x right, y down, z forward).
-    pub world_from_sensor: Pose,
-}
-
 /// A named site was seen at a position (K06 IV-A: 3-D point-to-point relation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionRelation {
@@ -195,7 +181,7 @@ pub struct Frame<'a> {
     pub clouds: &'a [Cloud<'a>],
     /// Depth images.
     pub images: &'a [DepthImage<'a>],
-    /// Colour pictures; one person alone is tracked without them.
+    /// Colour pictures.
     pub colors: &'a [ColorImage<'a>],
     /// Sites with positions.
     pub positions: &'a [PositionRelation],
@@ -248,7 +234,7 @@ impl<'a> Frame<'a> {
             check_image(index, image)?;
         }
         for (index, picture) in self.colors.iter().enumerate() {
-            check_color(index, picture)?;
+            picture.check(index, self.stamp, &self.colors[..index])?;
         }
         for (index, relation) in self.positions.iter().enumerate() {
             let what = |part: &str| format!("positions[{index}].{part}");
@@ -318,19 +304,6 @@ fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
     }
     check_weight(|| format!("depth[{index}].weight"), image.weight)?;
     check_pose(|| format!("depth[{index}].world_from_sensor"), &image.world_from_sensor)
-}
-
-fn check_color(index: usize, picture: &ColorImage) -> Result<(), TrackError> {
-    if picture.pixels.len() != picture.width * picture.height || picture.pixels.is_empty() {
-        let found = format!("{} for {}x{}", picture.pixels.len(), picture.width, picture.height);
-        return Err(TrackError::measurement(format!("color[{index}].image"), "width x height pixels", found));
-    }
-    let [fx, fy, cx, cy] = picture.intrinsics;
-    if !(fx > 0.0 && fy > 0.0 && [fx, fy, cx, cy].iter().all(|value| value.is_finite())) {
-        let (what, found) = (format!("color[{index}].camera"), format!("{:?}", picture.intrinsics));
-        return Err(TrackError::measurement(what, "positive focal lengths and a finite centre", found));
-    }
-    check_pose(|| format!("color[{index}].world_from_sensor"), &picture.world_from_sensor)
 }
 
 fn check_site(what: impl FnOnce() -> String, site: usize, body: &Body) -> Result<(), TrackError> {

@@ -12,6 +12,7 @@ pub(crate) mod clusters;
 pub mod depth_view;
 pub mod frame;
 pub mod observer;
+pub mod picture;
 pub(crate) mod pixels;
 pub mod registration;
 pub(crate) mod segments;

@@ -2,7 +2,8 @@
 
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
-use crate::observation::frame::{ColorImage, DepthImage, Frame};
+use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::picture::ColorImage;
 use crate::visibility::ALONG_LIMB;
 
 /// Limbs that show what is worn above the waist, and below it, by what their names hold.
@@ -102,7 +103,7 @@ fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Opti
 fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
     let place = picture.world_from_sensor.inverse_transform_point(world);
     let pixel = pixel_of(picture.intrinsics, [picture.width, picture.height], place)?;
-    picture.pixels.get(pixel).copied()
+    Some(picture.pixels.get(pixel))
 }
 
 /// The pixel in which a point of the camera's frame is seen.

@@ -13,12 +13,14 @@
 //! | [`TaperedEllipticCylinder::approximate_distance`] | `approximate` |
 //! | [`TaperedEllipticCylinder::cast_ray`] | `ray` |
 //! | [`TaperedEllipticCylinder::aabb`] | `bounds` |
+//! | [`TaperedEllipticCylinder::contour`], where a camera sees its border | `contour` |
 //! | [`TaperedEllipticCylinder::section`], what of it faces a camera | `section` |
 
 mod approximate;
 mod batch;
 mod bounds;
 mod closest;
+mod contour;
 mod kernel;
 mod lanes;
 mod ray;
@@ -29,6 +31,7 @@ use crate::math::Vec3;
 use thiserror::Error;
 
 pub use batch::SurfaceBatch;
+pub use contour::ContourPoint;
 pub use ray::RayHit;
 pub use section::{FacingSection, Section};
 

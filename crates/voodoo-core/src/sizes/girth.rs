@@ -11,8 +11,8 @@ use crate::shape::TaperedEllipticCylinder;
 
 /// Standard deviation of the shift of a limb's surface against its joints (metres) and of its relative girth: what
 /// anthropometry leaves open between persons, clothes and definitions of joint centres.
-const SHIFT_SIGMA: f64 = 0.03;
-const GIRTH_SIGMA: f64 = 0.15;
+pub(super) const SHIFT_SIGMA: f64 = 0.03;
+pub(super) const GIRTH_SIGMA: f64 = 0.15;
 /// Scatter of a surface point about the model, and how many independent ones a limb shows at most: neighbours err alike.
 const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
@@ -23,7 +23,7 @@ const ASIDE_SIGMA: f64 = 0.01;
 /// Edges of following frames err alike: this many frames tell as much as one.
 pub const ALIKE: f64 = 10.0;
 /// So many frames are remembered: clothes move.
-const REMEMBERED: f64 = 100.0;
+pub(super) const REMEMBERED: f64 = 100.0;
 /// Fewer matched points than this tell nothing.
 const ENOUGH: usize = 15;
 
@@ -96,7 +96,7 @@ pub fn girth_step(
 }
 
 /// How far the surface at `foot` moves along `n` (limb frame) with the three relative changes of girth.
-fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
+pub(super) fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
     let t = (foot.z / shape.length()).clamp(0.0, 1.0);
     let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
     let (a, b) = (n.x * foot.x, n.y * foot.y);
@@ -104,7 +104,7 @@ fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f6
 }
 
 /// Cauchy's weight of a distance, metres.
-fn kernel(distance: f64) -> f64 {
+pub(super) fn kernel(distance: f64) -> f64 {
     1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
 }
 

@@ -1,6 +1,7 @@
 //! Sizes of the body: what the first frame corrects and fits, and what those that follow refine.
 
 pub mod girth;
+mod outline;
 
 use crate::association::contour::edges;
 use crate::body::{Body, Model, Pair};
@@ -10,6 +11,7 @@ use crate::hypotheses::{GAIN, overall_cost};
 use crate::math::{Pose, Vec3};
 use crate::solver::Gate;
 use girth::{Girth, GirthFit, girth_step};
+use outline::Outline;
 
 /// Gauss-Newton steps of the girth fit: points find their limbs anew in each.
 const GIRTH_STEPS: usize = 6;
@@ -45,6 +47,8 @@ pub struct Sizes {
     set: Option<Body>,
     /// What is known about the girths since the first frame fitted them; empty when they were given.
     girths: Vec<Girth>,
+    /// The same by colours.
+    outlines: Vec<Outline>,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
     pairs: Vec<Pair>,
     stretched: Vec<f64>,
@@ -58,6 +62,7 @@ impl Sizes {
         (self.open, self.rough) = (fit, start == Start::Detected);
         self.set = fit.then(|| model.body.clone());
         self.girths.clear();
+        self.outlines.clear();
         self.pairs.clear();
         if fit && config.fit_lengths {
             self.follow_lengths(model);
@@ -72,6 +77,11 @@ impl Sizes {
     /// The sizes are known: no frame changes them.
     pub fn known(&self) -> bool {
         self.set.is_none()
+    }
+
+    /// The sizes were found with the pose: nobody told how large the body is.
+    pub fn found(&self) -> bool {
+        self.rough
     }
 
     /// Limbs of one length whose lengths are refined; none where they are known.
@@ -92,6 +102,7 @@ impl Sizes {
     /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
     pub fn edited(&mut self, model: &Model) {
         self.girths.clear();
+        self.outlines.clear();
         self.set = self.set.is_some().then(|| model.body.clone());
         if !self.pairs.is_empty() {
             self.follow_lengths(model);
@@ -115,6 +126,7 @@ impl Sizes {
         }
         if setting.config.fit_girths {
             self.fit_girths(setting, model, poses, fit);
+            self.fit_outlines(setting, model, poses, fit);
         }
     }
 
@@ -152,6 +164,30 @@ impl Sizes {
         }
     }
 
+    /// Fits the limbs' surfaces to the edges of their colours, where nothing else shows them.
+    fn fit_outlines(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
+        if !setting.seen.candidates.is_empty() || setting.seen.frame().colors.is_empty() {
+            return;
+        }
+        self.outlines = vec![Outline::default(); poses.len()];
+        for _ in 0..GIRTH_STEPS {
+            fit.match_outline(setting.of(model), poses);
+            for (limb, outline) in self.outlines.iter_mut().enumerate() {
+                let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
+                let part = &model.body.limbs()[limb];
+                if part.match_caps[1] {
+                    let longer = outline.tip(&part.shape, &poses[limb], pairs.clone());
+                    model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
+                }
+                let Some(step) = outline.start(&model.body.limbs()[limb].shape, &poses[limb], pairs) else { continue };
+                if model.body.change_girth(limb, step.shift, step.axes()) {
+                    let pose = &mut poses[limb];
+                    pose.translation += pose.rotation * step.shift;
+                }
+            }
+        }
+    }
+
     /// Draws the sizes to what a frame shows of the body at `poses`: lengths unless it is `lost`, and with `girths` those of the
     /// limbs that are `relied_on`. Changed lengths leave the joints closed.
     pub fn refine(
@@ -170,8 +206,22 @@ impl Sizes {
         if !self.pairs.is_empty() && !reliance.lost {
             self.refine_lengths(setting, model, poses, predicted, fit);
         }
+        if reliance.girths && !self.outlines.is_empty() {
+            self.follow_outlines(setting, model, poses, fit);
+        }
         if reliance.girths {
             self.refine_girths(model, fit, reliance.limb);
+        }
+    }
+
+    /// Draws the girths to the edges of colours.
+    fn follow_outlines(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
+        fit.match_outline(setting.of(model), poses);
+        for (limb, outline) in self.outlines.iter_mut().enumerate() {
+            let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
+            if let Some(step) = outline.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
+                model.body.change_girth(limb, step.shift, step.axes());
+            }
         }
     }
 

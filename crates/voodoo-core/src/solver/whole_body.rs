@@ -10,7 +10,7 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Limits, Penetration, Prior, Sites, Surface, Term};
+use crate::terms::{Contour, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
 
 /// Standard deviation of an axis that lies in another limb, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
@@ -21,6 +21,8 @@ const STILL_FROM: usize = 3;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
+/// By contours alone every joint moves by so much at least, radians: no points hold a shoulder where it is not.
+const LEAST_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 pub const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
@@ -41,6 +43,8 @@ pub struct WholeBody {
     joint_sigmas: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
+    /// Weight of the edges of colours on each limb.
+    edges: Vec<f64>,
 }
 
 impl Solver for WholeBody {
@@ -99,15 +103,17 @@ impl WholeBody {
         let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
         let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
         let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
+        let regions = Regions { pairs: &correspondences.regions };
         let still_gain = still_prior_gain(problem, information);
         let prior = Prior { predicted, root, joints: &self.joint_sigmas, still_gain };
         let limits = Limits { sigma: LIMIT_SIGMA };
         let penetration = Penetration { sigma: OVERLAP_SIGMA };
         // The objective: one more term is a file and a line here.
-        let terms: [Option<&dyn Term>; 6] = [
+        let terms: [Option<&dyn Term>; 7] = [
             Some(&surface),
             Some(&sites),
             Some(&contour),
+            Some(&regions),
             Some(&prior),
             config.limits.then_some(&limits),
             config.penetration.then_some(&penetration),
@@ -134,11 +140,18 @@ impl WholeBody {
 
     /// Standard deviation of every joint's motion.
     fn expect_motion(&mut self, problem: &Problem) {
+        let information = 1.0 / (problem.config.point_sigma * problem.config.point_sigma);
+        self.edges.clear();
+        self.edges.resize(problem.body.limbs().len(), 0.0);
+        for pair in &problem.correspondences.regions {
+            self.edges[pair.limb] += pair.information / information;
+        }
         self.joint_sigmas.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
+            let motion = if problem.correspondences.regions.is_empty() { motion } else { motion.max(LEAST_MOTION) };
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
-            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb];
+            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }

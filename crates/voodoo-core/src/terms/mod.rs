@@ -5,6 +5,7 @@ mod limits;
 pub mod normal_equations;
 mod penetration;
 mod prior;
+mod regions;
 mod sites;
 mod surface;
 
@@ -12,6 +13,7 @@ pub use contour::Contour;
 pub use limits::Limits;
 pub use penetration::Penetration;
 pub use prior::Prior;
+pub use regions::Regions;
 pub use sites::Sites;
 pub use surface::Surface;
 

@@ -2,8 +2,9 @@
 
 use super::Tracker;
 use crate::body::Joint;
-use crate::error::BodyError;
+use crate::error::{BodyError, TrackError};
 use crate::math::Vec3;
+use crate::observation::picture::ColorPixels;
 use crate::shape::TaperedEllipticCylinder;
 
 impl Tracker {
@@ -48,6 +49,11 @@ impl Tracker {
         }
         self.edited();
         Ok(())
+    }
+
+    /// Keeps what a colour camera sees of the scene without anybody: pictures with their heights and widths; none: forgets it.
+    pub fn set_background(&mut self, camera: u16, pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
+        self.fit.regions_mut().set_background(camera, pictures)
     }
 
     /// Takes note of a changed body and closes its joints from the root outwards, orientations kept.

@@ -155,6 +155,8 @@ impl Tracker {
 
     /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
     pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detection: &Detection, known: bool) -> bool {
+        // Colours tell persons apart; they are none's alone.
+        let frame = &Frame { colors: &[], ..*frame };
         let Some((body, poses)) = self.relocalizer.placed(&self.model, detection, known) else { return false };
         self.restart(body, poses, !known);
         self.assessor.doubt_pose();
@@ -190,6 +192,7 @@ impl Tracker {
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
+        fit.begin_regions(setting.of(model), poses);
         if sizes.wait_for_pose() {
             steps += fit.run(setting.of(model), predicted, poses);
         }
@@ -213,6 +216,7 @@ impl Tracker {
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
+        fit.learn_regions(setting.of(model), poses);
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
         if relocalizes && self.relocalize(frame, known, share.is_some()) {
@@ -229,7 +233,7 @@ impl Tracker {
     /// The pose at the next instant by its share of a frame, which was checked.
     pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
         if self.is_started() {
-            self.follow(frame, Some(share));
+            self.follow(&Frame { colors: &[], ..*frame }, Some(share));
         }
         &self.estimate
     }
@@ -239,7 +243,8 @@ impl Tracker {
         if !self.is_started() && !self.relocalizer.finds(&self.model.body) {
             return Err(TrackError::NotInitialised);
         }
-        frame.check(&self.model.body, self.motion.stamp)
+        frame.check(&self.model.body, self.motion.stamp)?;
+        self.fit.regions().check(frame)
     }
 
     /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found. A track
@@ -340,7 +345,8 @@ impl Tracker {
             None => assessor.forget_spread(&model.body, estimate),
             Some(time_scale) => {
                 let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
-                let found = Found { body, poses, correspondences, pairs: sizes.followed(), time_scale, config };
+                let (pairs, sizes_found) = (sizes.followed(), sizes.found());
+                let found = Found { body, poses, correspondences, pairs, sizes_found, time_scale, config };
                 assessor.report_spread(found, hypotheses.rivals(), |limb| sizes.girth_sigma(body, limb), estimate);
             }
         }

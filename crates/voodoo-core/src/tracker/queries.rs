@@ -7,9 +7,15 @@ use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::{Points, Pose};
 use crate::observation::frame::PointSlice;
+use crate::regions::RegionLine;
 use crate::shape::SurfaceBatch;
 
 impl Tracker {
+    /// The lines along which the last step looked for edges of colours in a camera's picture.
+    pub fn region_lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
+        self.fit.regions().lines(camera)
+    }
+
     /// The body in its current sizes.
     pub fn body(&self) -> &Body {
         &self.model.body

@@ -203,6 +203,10 @@ impl Assessor {
                 now = [1.0, 0.0, 1.0];
                 support.known = false;
             }
+            // Where no depth image looks, pictures tell.
+            if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
+                now = [colors.own[0] * colors.shown, colors.against[0], colors.shown];
+            }
             // What other sensors than depth cameras see of a limb no depth image disproves.
             support.known &= self.exclusive.clouds[limb] < FEW;
             history.support(&support);

@@ -1,0 +1,153 @@
+//! Lines across the contour of limbs: where they stand in a picture and what borders the limb there.
+
+use super::labels::{Labels, NOTHING};
+use super::lens::Lens;
+use crate::body::{Body, Limb};
+use crate::math::{Pose, Vec3};
+
+/// Points on the rim of an end that no other limb is joined to.
+const RIM: usize = 8;
+/// So far inside and outside of the contour one looks which limb is seen, units: labels are coarse.
+pub(super) const BESIDE: f32 = 3.0;
+/// A limb that lies behind by less than this is no background to one that it is joined to, metres.
+const FAR_BEHIND: f32 = 0.10;
+/// A limb this much nearer than another hides it, metres.
+pub(super) const NEARER_BY: f32 = 0.03;
+
+/// A line across the contour.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    pub limb: u16,
+    /// The contour's point, limb frame.
+    pub foot: Vec3,
+    /// Where it is seen, pixels, and the unit vector outward.
+    pub place: [f32; 2],
+    pub normal: [f32; 2],
+    /// How far the foot is seen to move outward with its place: pixels a metre, camera frame.
+    pub motion: Vec3,
+    /// Depth of the limb's surface there, metres.
+    pub depth: f32,
+    /// Width of the limb along the line, units; infinite where it does not end.
+    pub width: f32,
+    /// What is seen outside of the limb on this side and on the other: a limb, or nothing.
+    pub outside: u16,
+    pub opposite: u16,
+    /// The limb is seen here and what is outside is none that hides it; and on the other side.
+    pub clear: bool,
+    pub both: bool,
+}
+
+/// Where lines of a limb are looked for.
+pub(super) struct Viewer<'a> {
+    pub body: &'a Body,
+    pub lens: &'a Lens,
+    pub labels: &'a Labels,
+    /// Pixels a unit.
+    pub unit: f32,
+}
+
+/// What borders a limb at a place of its contour.
+struct Border {
+    outside: u16,
+    depth: f32,
+    clear: bool,
+}
+
+impl Viewer<'_> {
+    /// Adds so many lines on each side of a limb, and those on its free ends.
+    pub(super) fn add(&self, index: usize, camera_from_limb: &Pose, a_side: usize, lines: &mut Vec<Line>) {
+        let limb = &self.body.limbs()[index];
+        let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
+        for height in 0..a_side {
+            let t = (height as f64 + 0.5) / a_side as f64;
+            let Some(points) = limb.shape.contour(t, camera) else { continue };
+            let sides = points.map(|found| {
+                let normal = camera_from_limb.rotation * found.normal;
+                let [fx, fy, ..] = self.lens.intrinsics;
+                self.line(index, camera_from_limb, found.point, [normal.x / fx, normal.y / fy])
+            });
+            let [Some(mut first), Some(mut second)] = sides else { continue };
+            let apart = [second.place[0] - first.place[0], second.place[1] - first.place[1]];
+            let (of_first, of_second) = (first, second);
+            for (line, other) in [(&mut first, of_second), (&mut second, of_first)] {
+                let across = apart[0] * line.normal[0] + apart[1] * line.normal[1];
+                line.width = across.abs() / self.unit;
+                (line.opposite, line.both) = (other.outside, line.clear && other.clear);
+            }
+            lines.extend([first, second]);
+        }
+        for (distal, _) in [false, true].into_iter().zip(limb.match_caps).filter(|(_, free)| *free) {
+            self.add_rim(index, limb, camera_from_limb, camera, distal, lines);
+        }
+    }
+
+    fn add_rim(
+        &self,
+        index: usize,
+        limb: &Limb,
+        camera_from_limb: &Pose,
+        camera: Vec3,
+        distal: bool,
+        lines: &mut Vec<Line>,
+    ) {
+        let middle = *camera_from_limb * (0.5 * limb.shape.length() * Vec3::Z);
+        let middle = self.lens.project(middle);
+        for corner in 0..RIM {
+            let (s, c) = f64::sin_cos(std::f64::consts::TAU * corner as f64 / RIM as f64);
+            let Some([point, along]) = limb.shape.rim_contour(distal, [c, s], camera) else { continue };
+            let place = *camera_from_limb * point;
+            let along = camera_from_limb.rotation * along;
+            // The picture of the rim's direction; the normal is at right angles to it, away from the limb.
+            let [x, y] = [[1.0, 0.0], [0.0, 1.0]].map(|axis| self.lens.motion(place, axis).dot(along));
+            let seen = self.lens.project(place);
+            let out = (seen[0] - middle[0]) * y - (seen[1] - middle[1]) * x;
+            let normal = if out > 0.0 { [y, -x] } else { [-y, x] };
+            lines.extend(self.line(index, camera_from_limb, point, normal));
+        }
+    }
+
+    fn line(&self, limb: usize, camera_from_limb: &Pose, foot: Vec3, normal: [f64; 2]) -> Option<Line> {
+        let point = *camera_from_limb * foot;
+        let norm = normal[0].hypot(normal[1]);
+        if !(point.z > 0.05 && norm > 0.0) {
+            return None;
+        }
+        let n = normal.map(|value| value / norm);
+        let place = self.lens.project(point).map(|value| value as f32);
+        let (normal, motion) = (n.map(|value| value as f32), self.lens.motion(point, n));
+        let border = self.border(limb, place, normal)?;
+        let Border { outside, depth, clear } = border;
+        Some(Line {
+            limb: limb as u16,
+            foot,
+            place,
+            normal,
+            motion,
+            depth,
+            width: f32::INFINITY,
+            outside,
+            opposite: NOTHING,
+            clear,
+            both: false,
+        })
+    }
+
+    /// What borders a limb at a place; `None` outside of the picture.
+    fn border(&self, limb: usize, place: [f32; 2], normal: [f32; 2]) -> Option<Border> {
+        let inside = |u: f32, v: f32| {
+            (u >= 0.0 && v >= 0.0 && u < self.lens.width as f32 && v < self.lens.height as f32).then_some((u, v))
+        };
+        let beside = BESIDE * self.unit;
+        let (u, v) = inside(place[0] - beside * normal[0], place[1] - beside * normal[1])?;
+        let (own, depth) = self.labels.at(u, v);
+        let (u, v) = inside(place[0] + beside * normal[0], place[1] + beside * normal[1])?;
+        let (outside, behind) = self.labels.at(u, v);
+        let clear = usize::from(own) == limb
+            && usize::from(outside) != limb
+            && (outside == NOTHING || {
+                let far = if self.body.adjacent(limb, usize::from(outside)) { FAR_BEHIND } else { -NEARER_BY };
+                behind > depth + far
+            });
+        Some(Border { outside, depth, clear })
+    }
+}

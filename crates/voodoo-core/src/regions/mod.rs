@@ -1,0 +1,291 @@
+//! Colour regions: where the contour of limbs lies in pictures, by what limbs and their surroundings look like (R07 section 3).
+//!
+//! R07 alternates between a segmentation of the whole picture with the projected body as prior and a pose from its border. Here
+//! only short lines across the body's contour are segmented, with the same two ingredients: how likely each pixel is the limb's
+//! or the surroundings', and where the body is thought to be. A line's edge is a distance along one direction, as any other
+//! correspondence.
+
+mod evidence;
+mod histogram;
+mod labels;
+mod lens;
+mod lines;
+mod models;
+mod posterior;
+mod scan;
+mod scene;
+
+use crate::association::correspondence::{Correspondences, RegionPair};
+use crate::body::{Body, Limb};
+use crate::error::TrackError;
+use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
+use crate::observation::frame::Frame;
+use crate::observation::picture::{ColorImage, ColorPixels};
+use evidence::Evidence;
+use histogram::Kind;
+use labels::Labels;
+use lens::Lens;
+use lines::{Line, Viewer};
+use models::ColorModel;
+use scan::Scanner;
+use scene::Scene;
+
+/// How far from the contour its edge is looked for in the steps of a frame, units.
+const REACHES: [usize; 4] = [15, 10, 6, 5];
+/// Lines stand about so far apart along a limb, metres, and so many on each side at least and at most.
+const SPACING: f64 = 0.035;
+const LEAST_LINES: usize = 3;
+const MOST_LINES: usize = 16;
+/// A unit is a pixel of a lens with this focal length, pixels.
+const FOCAL: f64 = 520.0;
+/// Standard deviation of the body's own contour, units: limbs are no cones.
+const MODEL_ERROR: f32 = 2.0;
+
+/// What the pictures of one camera have taught, and working memory.
+#[derive(Debug, Default)]
+struct Camera {
+    number: u16,
+    lens: Lens,
+    model: ColorModel,
+    scene: Option<Scene>,
+    labels: Labels,
+    lines: Vec<Line>,
+    /// What was found on each of them.
+    edges: Vec<Option<scan::Found>>,
+    camera_from_limb: Vec<Pose>,
+    known: bool,
+}
+
+/// Colours of the body and its surroundings, camera by camera, and the lines of the last look.
+#[derive(Debug, Default)]
+pub struct Regions {
+    cameras: Vec<Camera>,
+    /// Group of every limb: those of one group have the same colours.
+    groups: Vec<u16>,
+    /// Time of the last frame, seconds.
+    stamp: Option<f64>,
+    scanner: Scanner,
+    evidence: Vec<Evidence>,
+}
+
+/// The body at the time of a frame, in the working frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Posed<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// Its poses.
+    pub poses: &'a [Pose],
+    /// Its poses in the frame before; empty where they are not known.
+    pub previous: &'a [Pose],
+    /// The working frame's origin in the world.
+    pub origin: Vec3,
+}
+
+/// A line across the contour of a limb in a picture, and the edge of its colours there; pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegionLine {
+    /// The limb.
+    pub limb: usize,
+    /// Where the contour is seen.
+    pub place: [f32; 2],
+    /// Unit vector outward.
+    pub normal: [f32; 2],
+    /// How far outward the edge lies.
+    pub offset: f32,
+    /// Its standard deviation; infinite where nothing is told.
+    pub sigma: f32,
+}
+
+impl Regions {
+    /// Forgets what bodies and surroundings look like.
+    pub fn clear(&mut self) {
+        self.stamp = None;
+        self.cameras.iter_mut().for_each(|camera| camera.known = false);
+    }
+
+    /// Keeps what a camera sees without anybody: pictures with their heights and widths; none: forgets it.
+    pub fn set_background(&mut self, camera: u16, pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
+        let scene = if pictures.is_empty() { None } else { Some(Scene::of(pictures)?) };
+        self.camera(camera).scene = scene;
+        Ok(())
+    }
+
+    /// Refuses pictures that cannot be compared with those of the empty scene.
+    pub fn check(&self, frame: &Frame) -> Result<(), TrackError> {
+        for (index, picture) in frame.colors.iter().enumerate() {
+            let known = self.cameras.iter().find(|camera| camera.number == picture.camera);
+            known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
+        }
+        Ok(())
+    }
+
+    /// Learns the colours of cameras that are new at the pose where the body is thought to be.
+    pub fn begin(&mut self, frame: &Frame, posed: Posed) {
+        if self.groups.len() != posed.poses.len() {
+            self.groups = groups(posed.body);
+            self.cameras.iter_mut().for_each(|camera| camera.known = false);
+        }
+        for picture in frame.colors {
+            let kind = Kind::of(&picture.pixels);
+            let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
+            let camera = self.camera(picture.camera);
+            if camera.known && camera.model.kind == kind {
+                continue;
+            }
+            camera.model.clear(kind, groups);
+            camera.known = true;
+            self.look(frame, picture, posed);
+            self.teach(picture);
+        }
+    }
+
+    /// The edges of all limbs in all pictures, in the given step of a frame.
+    pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
+        let reach = REACHES[step.min(REACHES.len() - 1)];
+        self.evidence.clear();
+        self.evidence.resize(posed.poses.len(), Evidence::default());
+        self.find_within(frame, posed, reach, true, &mut found.regions);
+        found.region_support.clear();
+        found.region_support.extend(self.evidence.iter().map(Evidence::support));
+    }
+
+    /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
+    pub fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
+        self.find_within(frame, posed, REACHES[1], false, pairs);
+    }
+
+    fn find_within(&mut self, frame: &Frame, posed: Posed, reach: usize, together: bool, pairs: &mut Vec<RegionPair>) {
+        pairs.clear();
+        for picture in frame.colors {
+            self.look(frame, picture, posed);
+            let Self { cameras, groups, scanner, evidence, .. } = self;
+            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera && camera.known) else {
+                continue;
+            };
+            let unit = unit_of(&camera.lens);
+            let Camera { model, labels, scene, lines, edges, .. } = camera;
+            let view = scan::View { picture, model, labels, scene: scene.as_ref(), groups, unit };
+            let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
+            edges.clear();
+            for line in &*lines {
+                let found = scanner.edge(&view, line, reach, together);
+                edges.push(found);
+                if together {
+                    let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
+                    evidence[usize::from(line.limb)].take(line.foot.z / length, found.map(|found| found.beside));
+                }
+                let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
+                let motion = line.motion / f64::from(unit);
+                let slope = motion.length();
+                let information = edge.information / (1.0 + edge.information * MODEL_ERROR * MODEL_ERROR);
+                let limb = usize::from(line.limb);
+                pairs.push(RegionPair {
+                    limb,
+                    x: posed.poses[limb] * line.foot,
+                    normal: working_from_camera.rotation * (motion / slope),
+                    distance: f64::from(edge.mean) / slope,
+                    information: f64::from(information) * slope * slope,
+                    source: picture.source,
+                });
+            }
+        }
+    }
+
+    /// The lines of the last look at a camera's picture.
+    pub fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
+        let camera = self.cameras.iter().find(|known| known.number == camera);
+        camera.into_iter().flat_map(|camera| {
+            let unit = unit_of(&camera.lens);
+            camera.lines.iter().zip(&camera.edges).map(move |(line, found)| {
+                let edge = found.map(|found| found.edge).unwrap_or_default();
+                RegionLine {
+                    limb: usize::from(line.limb),
+                    place: line.place,
+                    normal: line.normal,
+                    offset: unit * edge.mean,
+                    sigma: unit / edge.information.sqrt(),
+                }
+            })
+        })
+    }
+
+    /// Learns colours where the body was found.
+    pub fn learn(&mut self, frame: &Frame, posed: Posed) {
+        for picture in frame.colors {
+            self.look(frame, picture, posed);
+            self.teach(picture);
+        }
+        self.stamp = Some(frame.stamp);
+    }
+
+    fn camera(&mut self, number: u16) -> &mut Camera {
+        let index = self.cameras.iter().position(|camera| camera.number == number).unwrap_or_else(|| {
+            self.cameras.push(Camera { number, ..Camera::default() });
+            self.cameras.len() - 1
+        });
+        &mut self.cameras[index]
+    }
+
+    /// Places the lines of one picture.
+    fn look(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
+        let Posed { body, poses, previous, origin } = posed;
+        let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
+        let share = (picture.stamp - frame.stamp) / passed;
+        let camera = self.camera(picture.camera);
+        let camera_from_working = shifted(&picture.world_from_sensor, origin).inverse();
+        camera.camera_from_limb.clear();
+        for (limb, pose) in poses.iter().enumerate() {
+            // The body of the moment that the camera saw.
+            let then =
+                previous.get(limb).filter(|_| share != 0.0).map_or(*pose, |before| moved_on(before, pose, share));
+            camera.camera_from_limb.push(camera_from_working * then);
+        }
+        camera.lens = Lens::of(picture);
+        let Camera { lens, labels, lines, camera_from_limb, .. } = camera;
+        labels.draw(body, camera_from_limb, lens);
+        lines.clear();
+        let viewer = Viewer { body, lens, labels, unit: unit_of(lens) };
+        for (limb, pose) in camera_from_limb.iter().enumerate() {
+            let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
+            viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
+        }
+    }
+
+    /// Learns the colours along the lines of one picture.
+    fn teach(&mut self, picture: &ColorImage) {
+        let Self { cameras, groups, .. } = self;
+        let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera) else { return };
+        let unit = unit_of(&camera.lens);
+        for line in &camera.lines {
+            scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
+        }
+        camera.model.learn();
+    }
+}
+
+/// Pixels a unit.
+fn unit_of(lens: &Lens) -> f32 {
+    (0.5 * (lens.intrinsics[0] + lens.intrinsics[1]) / FOCAL) as f32
+}
+
+/// Where a limb is a share of the last motion later.
+fn moved_on(before: &Pose, now: &Pose, share: f64) -> Pose {
+    let turn = (now.rotation * before.rotation.inverse()).to_scaled_axis_shortest();
+    let shift = now.translation - before.translation;
+    Pose::from_parts(now.translation + share * shift, Quat::from_scaled_axis(share * turn) * now.rotation)
+}
+
+/// Groups of limbs with the same colours: the two of a pair.
+fn groups(body: &Body) -> Vec<u16> {
+    let stem = |limb: &Limb| limb.name.trim_start_matches("l_").trim_start_matches("r_").to_owned();
+    let mut names: Vec<String> = Vec::new();
+    let group = |limb: &Limb| {
+        let name = stem(limb);
+        let known = names.iter().position(|known| *known == name);
+        known.unwrap_or_else(|| {
+            names.push(name);
+            names.len() - 1
+        }) as u16
+    };
+    body.limbs().iter().map(group).collect()
+}

@@ -1,0 +1,91 @@
+//! What a camera sees without anybody: a colour for every pixel, and how likely another one is that of the scene.
+
+use super::histogram::Kind;
+use crate::error::TrackError;
+use crate::observation::picture::{ColorImage, ColorPixels};
+
+/// Least standard deviation of a channel, of 255: noise, and what compression makes of it.
+const LEAST_SIGMA: f32 = 6.0;
+/// A shadow or a lamp changes the brightness by these factors at most.
+const SHADED: [f32; 2] = [0.6, 1.2];
+/// How likely a pixel that shows no body shows what the scene was, and that it shows anything of the surroundings' colours.
+const AS_BEFORE: [f32; 2] = [0.8, 0.2];
+
+/// The scene as one camera sees it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scene {
+    size: [usize; 2],
+    kind: Kind,
+    mean: Vec<[u8; 3]>,
+    /// Logarithm of the greatest share of a bin, and one over twice the variance of a channel.
+    most: f32,
+    narrow: f32,
+}
+
+impl Scene {
+    /// The mean of pictures of one size (height, width) and kind, and how they differ.
+    pub(super) fn of(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, TrackError> {
+        let wrong = |index: usize, found: String| {
+            let expected = "pictures of the empty scene, all of one size and kind";
+            Err(TrackError::measurement(format!("images[{index}]"), expected, found))
+        };
+        let Some((first, size)) = pictures.first() else { return wrong(0, "none".into()) };
+        let kind = Kind::of(first);
+        for (index, (pixels, found)) in pictures.iter().enumerate() {
+            let count = found[0].saturating_mul(found[1]);
+            if found != size || Kind::of(pixels) != kind || pixels.len() != count || count == 0 {
+                return wrong(
+                    index,
+                    format!("{:?} of {}x{} beside {}x{}", Kind::of(pixels), found[1], found[0], size[1], size[0]),
+                );
+            }
+        }
+        let count = pictures.len() as f32;
+        let mut squares = 0.0_f64;
+        let mean = (0..first.len()).map(|index| {
+            let mut sums = [[0.0_f32; 3]; 2];
+            for (pixels, _) in pictures {
+                for (channel, value) in pixels.get(index).into_iter().enumerate() {
+                    sums[0][channel] += f32::from(value);
+                    sums[1][channel] += f32::from(value).powi(2);
+                }
+            }
+            let [sum, square] = sums;
+            squares += (0..3).map(|channel| f64::from(square[channel] - sum[channel].powi(2) / count)).sum::<f64>();
+            sum.map(|sum| (sum / count).round() as u8)
+        });
+        let mean: Vec<[u8; 3]> = mean.collect();
+        let variance = (squares / (3.0 * mean.len() as f64 * f64::from((count - 1.0).max(1.0)))) as f32;
+        let sigma = variance.sqrt().max(LEAST_SIGMA);
+        let width = (std::f32::consts::TAU.sqrt() * sigma).ln();
+        let most = match kind {
+            Kind::Color => (16.0_f32).ln() * 3.0 - 3.0 * width,
+            Kind::Grey => -width,
+        };
+        Ok(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) })
+    }
+
+    /// Refuses a picture that cannot be compared.
+    pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
+        if self.size == [picture.height, picture.width] && self.kind == Kind::of(&picture.pixels) {
+            return Ok(());
+        }
+        let what = format!("color[{index}].image");
+        let found = format!("{}x{} beside {}x{}", picture.width, picture.height, self.size[1], self.size[0]);
+        Err(TrackError::measurement(what, "a picture like those of the empty scene", found))
+    }
+
+    /// Logarithm of how likely a pixel that shows no body has this colour, where `around` is that of the surroundings.
+    #[inline]
+    pub(super) fn log(&self, index: usize, pixel: [u8; 3], around: f32) -> f32 {
+        let (here, seen) = (self.mean[index].map(f32::from), pixel.map(f32::from));
+        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let shade = match self.kind {
+            Kind::Color => (dot(here, seen) / dot(here, here).max(1.0)).clamp(SHADED[0], SHADED[1]),
+            Kind::Grey => 1.0,
+        };
+        let off = [0, 1, 2].map(|channel| seen[channel] - shade * here[channel]);
+        let square = if self.kind == Kind::Color { dot(off, off) } else { off[0] * off[0] };
+        (self.most - self.narrow * square + AS_BEFORE[0].ln()).max(around + AS_BEFORE[1].ln())
+    }
+}

@@ -1,0 +1,133 @@
+//! Girths by the edges of colour regions, where no depth tells them.
+
+use nalgebra::{Matrix2, SMatrix, SVector};
+
+use super::girth::{GIRTH_SIGMA, GirthFit, REMEMBERED, SHIFT_SIGMA, girth_row, kernel};
+use crate::association::correspondence::RegionPair;
+use crate::math::{Pose, Vec3};
+use crate::shape::TaperedEllipticCylinder;
+
+/// Edges of neighbouring lines, and of following frames, err alike: so many tell as much as one.
+const LINES_ALIKE: f64 = 3.0;
+const FRAMES_ALIKE: f64 = 10.0;
+/// How far the axis of a tracked limb is off across itself, metres.
+const AXIS_SIGMA: f64 = 0.02;
+
+/// What anthropometry leaves open of the length of hands, feet and heads, metres.
+const TIP_SIGMA: f64 = 0.03;
+
+/// What is known of the surface of one limb.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outline {
+    information: SMatrix<f64, 5, 5>,
+    total: GirthFit,
+}
+
+impl Default for Outline {
+    fn default() -> Self {
+        let sigmas = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA]);
+        Self {
+            information: SMatrix::from_diagonal(&sigmas.map(|sigma: f64| 1.0 / (sigma * sigma))),
+            total: GirthFit::default(),
+        }
+    }
+}
+
+/// Normal equations of a limb's edges: for shift and girth.
+struct Asked {
+    h: SMatrix<f64, 5, 5>,
+    g: SVector<f64, 5>,
+}
+
+fn asked<'a>(
+    shape: &TaperedEllipticCylinder,
+    working_from_limb: &Pose,
+    pairs: impl Iterator<Item = &'a RegionPair>,
+) -> Asked {
+    let (mut h, mut g) = (SMatrix::zeros(), SVector::zeros());
+    for pair in pairs {
+        let foot = working_from_limb.inverse_transform_point(pair.x);
+        let n = working_from_limb.inverse_transform_vector(pair.normal);
+        let girth = girth_row(shape, foot, n);
+        let row = SVector::from([n.x, n.y, girth.x, girth.y, girth.z]);
+        let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
+        h += weight * row * row.transpose();
+        g += weight * pair.distance * row;
+    }
+    Asked { h, g }
+}
+
+impl Outline {
+    /// The surface of a limb whose pose is known, from its edges in the first frame: a Gauss-Newton step, the changes made so
+    /// far drawn to none.
+    pub(super) fn start<'a>(
+        &mut self,
+        shape: &TaperedEllipticCylinder,
+        working_from_limb: &Pose,
+        pairs: impl Iterator<Item = &'a RegionPair>,
+    ) -> Option<GirthFit> {
+        let Asked { h, g } = asked(shape, working_from_limb, pairs);
+        if h.trace() <= 0.0 {
+            return None;
+        }
+        let [e0, e1, e2] = self.total.factors.map(|factor| factor - 1.0);
+        let so_far = SVector::from([self.total.shift.x, self.total.shift.y, e0, e1, e2]);
+        self.take((h + self.information).cholesky()?.solve(&(g - self.information * so_far)))
+    }
+
+    /// How much longer a limb with a free distal end is, as a factor, by the edges along the end's rim.
+    pub(super) fn tip<'a>(
+        &self,
+        shape: &TaperedEllipticCylinder,
+        working_from_limb: &Pose,
+        pairs: impl Iterator<Item = &'a RegionPair>,
+    ) -> f64 {
+        let (mut h, mut g) = (1.0 / (TIP_SIGMA * TIP_SIGMA), 0.0);
+        for pair in pairs {
+            let foot = working_from_limb.inverse_transform_point(pair.x);
+            let along = working_from_limb.inverse_transform_vector(pair.normal).z;
+            if foot.z < shape.length() * 0.999 {
+                continue;
+            }
+            let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
+            h += weight * along * along;
+            g += weight * along * pair.distance;
+        }
+        1.0 + g / (h * shape.length())
+    }
+
+    /// The girth of a tracked limb: how far its axis is off in this frame is eliminated, and where it lies about the joints
+    /// stays.
+    pub(super) fn follow<'a>(
+        &mut self,
+        shape: &TaperedEllipticCylinder,
+        working_from_limb: &Pose,
+        pairs: impl Iterator<Item = &'a RegionPair>,
+    ) -> Option<GirthFit> {
+        let Asked { h, g } = asked(shape, working_from_limb, pairs);
+        if h.trace() <= 0.0 {
+            return None;
+        }
+        let (h, g) = (h / FRAMES_ALIKE, g / FRAMES_ALIKE);
+        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * FRAMES_ALIKE);
+        let mixed = h.fixed_view::<3, 2>(2, 0);
+        let inverse = aside.try_inverse()?;
+        let own = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
+        let pull = g.fixed_rows::<3>(2) - mixed * inverse * g.fixed_rows::<2>(0);
+        let mut information = self.information.fixed_view::<3, 3>(2, 2) * (1.0 - 1.0 / REMEMBERED);
+        information += own;
+        let step = information.cholesky()?.solve(&pull);
+        self.information.fixed_view_mut::<3, 3>(2, 2).copy_from(&information);
+        self.take(SVector::from([0.0, 0.0, step[0], step[1], step[2]]))
+    }
+
+    fn take(&mut self, step: SVector<f64, 5>) -> Option<GirthFit> {
+        if !step.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
+        let (total, done) = self.total.then(&GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors });
+        self.total = total;
+        Some(done)
+    }
+}

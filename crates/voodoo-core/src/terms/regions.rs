@@ -1,0 +1,24 @@
+//! Edges of colour regions (R07 section 3): each a distance along one direction, as certain as its colours are.
+
+use super::Term;
+use crate::association::correspondence::RegionPair;
+use crate::body::Body;
+use crate::math::Pose;
+use crate::terms::normal_equations::{NormalEquations, line};
+
+/// All edges.
+#[derive(Debug)]
+pub struct Regions<'a> {
+    /// The edges.
+    pub pairs: &'a [RegionPair],
+}
+
+impl Term for Regions<'_> {
+    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
+        for pair in self.pairs {
+            normal.cost += pair.information * pair.distance * pair.distance;
+            let row = line(pair.x, pair.normal);
+            normal.limbs[pair.limb].add_row(pair.information, &row, -pair.distance);
+        }
+    }
+}
