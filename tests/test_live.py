@@ -377,3 +377,8 @@ def test_sources_that_do_not_go_together_are_refused(second, told):
 def test_sources_must_be_there():
     with pytest.raises(VoodooError, match="at least one"):
         voodoo.live.open()
+
+
+def test_a_loop_needs_the_with_block():
+    with pytest.raises(VoodooError, match="`with` block"):
+        next(iter(voodoo.live.open(Script())))
