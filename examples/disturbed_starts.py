@@ -3,9 +3,9 @@
     python examples/disturbed_starts.py ../shared/data/rendered/dev_* --starts 5
 
 The first run starts from init.json, the others with 4 mm of noise on its joints. Prints mean error, class (K06 Table I made
-automatic) and the joints that are still lost at the end, run by run; and how many of the limbs that were off by 10 cm, and of
-the others, were not called measured; and how errors compare with their standard deviations. Against a reference skeleton, which leads the depth by some
-frames, errors are at the recording's best lag and 15 cm count as lost, as in `voodoo eval`.
+automatic) and the joints that are still lost at the end, run by run; how many of the limbs that were off by 10 cm, and of the
+others, were not called measured; and how errors compare with their standard deviations. Against a reference skeleton, which
+leads the depth by some frames, errors are at the recording's best lag and 15 cm count as lost, as in `voodoo eval`.
 
 `--backwards` plays the recordings from their end, starting from the true joints there, and `--every 2` leaves out every second
 frame: other motions of the same people.

@@ -244,7 +244,7 @@ def install(monkeypatch):
     import voodoo.pipeline.front_end
     import voodoo.pipeline.search
     import voodoo.pipeline.start
-    from voodoo.export import track as results
+    from voodoo.export import collected as results
 
     monkeypatch.setattr(voodoo.pipeline.search, "knows", lambda body: True)
     # The fake body has no joints to take angles from.

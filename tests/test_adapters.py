@@ -23,8 +23,8 @@ from voodoo.measurements import (
 from voodoo.names import INPUTS
 from voodoo.pipeline.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors import adapters
-from voodoo.sensors.adapters import Memory, adapter_of
-from voodoo.sensors.kinds import input_of, inputs
+from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
+from voodoo.sensors.kinds import inputs, inputs_of
 from voodoo.visualization.overlay import Overlay
 
 PACKAGE = Path(voodoo.__file__).parent
@@ -39,7 +39,8 @@ def uwb():
 
 
 def test_a_new_sensor_in_one_file_tracks_a_body(uwb):
-    assert inputs() == (*INPUTS, "uwb") == FrontEndSettings().use and input_of("uwb") == "uwb"
+    assert inputs() == (*INPUTS, "uwb") and inputs_of("uwb") == ("uwb",)
+    assert FrontEndSettings().use == tuple(kind for kind in inputs() if kind != "color")
     assert uwb.main(frames=40) < 0.06, "no worse than the tags' own noise (mean length 8 cm)"
 
 
@@ -70,7 +71,7 @@ def test_what_has_no_adapter_is_refused():
         FrontEndSettings(use=("uwb",))
 
 
-def test_one_adapter_for_a_kind_and_a_measurement():
+def test_one_adapter_for_a_kind():
     items = (
         DepthImage("d", 0.0, np.zeros((3, 4), np.uint16), 0.001, CAMERA, np.eye(4)),
         PointCloud("p", 0.0, np.zeros((1, 3)), np.eye(4)),
@@ -79,11 +80,12 @@ def test_one_adapter_for_a_kind_and_a_measurement():
         ColorImage("c", 0.0, lambda: np.zeros((3, 4, 3), np.uint8), CAMERA, np.eye(4)),
         MarkerSet("m", 0.0, {}),
     )
-    assert tuple(adapter_of(item).kind for item in items) == INPUTS == inputs()
+    assert tuple(adapter.kind for item in items for adapter in adapters_of(item)) == INPUTS == inputs()
     recorded = ("depth", "points", "scan", "keypoints", "color", "markers")
-    assert tuple(map(input_of, recorded)) == INPUTS and input_of("imu") is None
+    assert tuple(kind for word in recorded for kind in inputs_of(word)) == INPUTS and inputs_of("imu") == ()
+    assert inputs_of("color") == ("skin", "color") and adapter_of(items[4]).kind == "skin"
     known = adapter_of(MarkerSet("m", 0.0, {}))
-    with pytest.raises(MeasurementError, match="expected a new kind and measurement"):
+    with pytest.raises(MeasurementError, match="expected a new kind, found 'markers' for MarkerSet"):
         adapters.register(known)
 
 

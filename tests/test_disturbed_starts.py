@@ -32,12 +32,13 @@ def test_the_first_start_is_the_recordings_own_and_the_others_are_near_it(distur
     own = voodoo.open_recording(BUNDLED).start["joints"]
     assert np.array_equal(started[0], np.array(list(own.values())))
     assert 0.002 < (started[1] - started[0]).std() < 0.006
-    row, _, total, far, near = capsys.readouterr().out.strip().splitlines()[2:]
+    row, _, total, far, near, *calibration = capsys.readouterr().out.strip().splitlines()[2:]
     errors = [float(word) for word in row.split("|")[2].split()]
     assert len(errors) == 2 and 0.5 < min(errors) <= max(errors) < 6.0, row
     assert "of 2 runs end with a joint lost" in total
     assert "limbs off by 10 cm: " in far
     assert int(near.split()[0]) > 100 and 0.0 <= float(near.split("nearer: ")[1].split()[0]) < 25.0
+    assert "## Standard deviations against exact truth" in calibration
 
 
 def test_a_lost_joint_is_named(disturbed, monkeypatch):
@@ -52,7 +53,7 @@ def test_a_lost_joint_is_named(disturbed, monkeypatch):
 
     monkeypatch.setattr(voodoo, "Tracker", Still)
     recording = voodoo.open_recording(BUNDLED, use=("depth",))
-    error, kind, lost, (far, near) = disturbed.run(recording, np.random.default_rng(0), 0.0)
+    error, kind, lost, (far, near), _ = disturbed.run(recording, np.random.default_rng(0), 0.0)
     assert error > 0.10 and kind == 0
     assert 0 < far[0] <= far[1] and near[1] > 0
     assert "l_wrist" in lost or "r_wrist" in lost, lost
@@ -75,5 +76,6 @@ def test_a_recording_played_backwards_is_tracked_from_its_end(disturbed):
     last = recording.reference.positions[-1]
     names = recording.reference.names
     assert np.array_equal(played.start["joints"]["l_wrist"], last[names.index("l_wrist")])
-    error, _, lost, _ = disturbed.run(played, np.random.default_rng(0), 0.0)
+    error, _, lost, _, found = disturbed.run(played, np.random.default_rng(0), 0.0)
     assert error < 0.06 and not lost, (error, lost)
+    assert np.linalg.norm(found.errors, axis=2).mean() == pytest.approx(error) and np.isfinite(found.sigma).all()

@@ -21,6 +21,7 @@ from voodoo.cli import app
 from voodoo.model.toml_io import parse_toml
 from voodoo.pipeline.start import Init
 from voodoo.recordings.calibration import read_calibration
+from voodoo.recordings.camera_files import read_camera_toml
 from voodoo.recordings.marker_files import MarkerMap
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -166,6 +167,8 @@ def test_files_can_be_read(page: Path, tmp_path: Path):
             keys = parse_toml(block.text, source=name(page), error=ValueError)
             if "limbs" in keys and "name" in keys:
                 assert voodoo.Body.load(file).site_names == ("tip",)
+            elif any(isinstance(table, dict) and "matrix" in table for table in keys.values()):
+                assert read_camera_toml(file)[0].camera.width == 1088
             elif "sites" in keys:
                 assert MarkerMap.load(file).sites
             else:

@@ -182,3 +182,27 @@ def test_a_constant_offset_of_a_joint_is_no_error():
     assert errors[5, 3] == pytest.approx(0.1) and np.isnan(errors[7]).all()
     errors[5, 3] = 0.0
     assert np.nanmax(errors) < 1e-9 < np.nanmin(metrics.joint_errors(estimate, reference))
+
+
+def test_joint_angles_are_those_of_a_skeleton_that_is_bent_by_them():
+    joints = {"shoulder": (0.2, 0.0, 1.4), "elbow": (0.2, 0.0, 1.1), "hip": (0.1, 0.0, 0.9), "knee": (0.1, 0.0, 0.5)}
+    rest = {**joints, "wrist": (0.2, 0.0, 0.8), "ankle": (0.1, 0.0, 0.1)}
+    standing = np.array([(sign * x, y, z) for joint in rest_order() for sign in (1, -1) for x, y, z in [rest[joint]]])
+    assert metrics.joint_angles(standing[None]) == pytest.approx(np.zeros((1, 8)), abs=1e-9)
+    bent = standing.copy()
+    elbow, wrist = metrics.JOINTS.index("l_elbow"), metrics.JOINTS.index("l_wrist")
+    turn = np.radians(70.0)
+    bent[wrist] = bent[elbow] + 0.3 * np.array([0.0, np.sin(turn), -np.cos(turn)])
+    found = np.degrees(metrics.joint_angles(bent[None])[0])
+    assert found == pytest.approx([70.0, 0, 0, 0, 0, 0, 0, 0], abs=1e-6)
+    # A turn of the whole body changes none of them; half the frames 70 degrees off is 35 in the mean of one angle of eight.
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = bent @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    assert metrics.joint_angles(turned[None])[0] == pytest.approx(np.radians(found), abs=1e-9)
+    mean, spread = metrics.angle_error(np.array([standing, bent]), np.array([standing, standing]))
+    assert (mean, spread) == pytest.approx((35.0 / 8.0, 35.0 / 8.0))
+    assert all(np.isnan(metrics.angle_error(np.full((2, 12, 3), np.nan), np.full((2, 12, 3), np.nan))))
+
+
+def rest_order():
+    return ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")

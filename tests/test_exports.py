@@ -163,14 +163,14 @@ def test_trc_read_by_a_plain_table_reader(tmp_path, tracked):
 def test_bag_read_by_rosbags(tmp_path, tracked):
     track, body = tracked
     write_bag(tmp_path / "bag", track, body, root_frame="odom", person="ab12c")
-    poses, states, shapes = [], [], []
+    poses, states, shapes, sure = [], [], [], []
     with AnyReader([tmp_path / "bag"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         for connection, stamp, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
-            {"/tf": poses, "/humans/bodies/ab12c/joint_states": states}.get(connection.topic, shapes).append(
-                (stamp, message)
-            )
-    assert len(poses) == len(states) == len(shapes) == len(track)
+            topic = connection.topic.removeprefix("/humans/bodies/ab12c")
+            known = {"/tf": poses, "/joint_states": states, "/markers": shapes, "/pose": sure}
+            known[topic].append((stamp, message))
+    assert len(poses) == len(states) == len(shapes) == len(sure) == len(track)
     for index, (stamp, message) in enumerate(poses):
         assert stamp == round(track.stamps[index] * 1e9)
         world = {"odom": np.eye(4)}
@@ -191,10 +191,14 @@ def test_bag_read_by_rosbags(tmp_path, tracked):
         assert {"body_ab12c", "torso_ab12c", "r_ankle_ab12c"} <= set(world)
     names = states[0][1].name
     assert "l_y_shoulder_ab12c" in names and len(names) == len(states[0][1].position)
-    assert {marker.ns for marker in shapes[0][1].markers} == {"limbs", "joints"}
-    assert len(shapes[0][1].markers) == len(body.limbs) + 1
+    assert {marker.ns for marker in shapes[0][1].markers} == {"limbs", "joints", "uncertainty"}
+    assert len(shapes[0][1].markers) == len(body.limbs) + 1 + len(track.joint_names)
+    assert {marker.type for marker in shapes[0][1].markers if marker.ns == "limbs"} == {3}  # cylinders
     with pytest.raises(VoodooError, match="does not exist"):
         write_bag(tmp_path / "bag", track, body, root_frame="odom")
+
+
+BY_FRAME = ("residual", "joints", "world_from_limb", "angles", "covariance", "root_covariance")
 
 
 def with_gaps(track):
@@ -213,7 +217,7 @@ def with_gaps(track):
         stamps=track.stamps[0] + np.arange(frames) / 30.0,
         status=tuple(next(status) if there else "searching" for there in found),
         limb_status={},
-        **{name: spread(getattr(track, name)) for name in ("residual", "joints", "world_from_limb", "angles")},
+        **{name: spread(getattr(track, name)) for name in BY_FRAME},
     )
 
 

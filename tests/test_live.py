@@ -2,6 +2,7 @@
 
 import math
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -331,6 +332,53 @@ def test_a_clock_of_the_host_does_not_go_back():
     assert times == sorted(times)
 
 
+class Cameras(ByHand):
+    """Images of walls, at a rate, for a third of a second."""
+
+    def __init__(self, name, sensor, *, root="base_link", every=0.02, placed=True):
+        self.name, self.sensor, self.root_frame, self.every, self.placed = name, sensor, root, every, placed
+        self.number = 0
+
+    def open(self, clock, faults):
+        self.clock, self.begun = clock, clock.now()
+
+    def read(self, timeout):
+        self.number += 1
+        time.sleep(max(self.begun + self.number * self.every - self.clock.now(), 0.0))
+        if self.number > 0.35 / self.every:
+            raise SourceEnded("done")
+        return [arrival_of(wall(self.clock.now(), sensor=self.sensor))]
+
+
+def test_the_first_of_several_sources_makes_the_frames():
+    with voodoo.live.open(Cameras("one", "front"), Cameras("two", "back", every=0.007)) as live:
+        frames = list(live)
+    assert 3 <= len(frames) <= 18
+    assert all(frame.measurements[-1].sensor == "front" for frame in frames)
+    assert all(len([item for item in frame.measurements if item.sensor == "back"]) <= 1 for frame in frames)
+    assert sum(len(frame.measurements) == 2 for frame in frames) >= 0.3 * len(frames)
+    assert live.received <= 18
+
+
+@pytest.mark.parametrize(
+    ("second", "told"),
+    [
+        (Cameras("one", "back"), "expected different ones"),
+        (Cameras("two", "back", placed=False), "two: expected a calibration"),
+        (Cameras("two", "back", root="camera"), "expected one root frame, found one in 'base_link', two in 'camera'"),
+    ],
+    ids=["same", "unplaced", "elsewhere"],
+)
+def test_sources_that_do_not_go_together_are_refused(second, told):
+    with pytest.raises(VoodooError, match=told), voodoo.live.open(Cameras("one", "front"), second) as live:
+        list(live)
+
+
 def test_sources_must_be_there():
     with pytest.raises(VoodooError, match="at least one"):
         voodoo.live.open()
+
+
+def test_a_loop_needs_the_with_block():
+    with pytest.raises(VoodooError, match="`with` block"):
+        next(iter(voodoo.live.open(Script())))

@@ -19,6 +19,7 @@ ROS = (
     "ros-jazzy-sensor-msgs",
     "ros-jazzy-visualization-msgs",
 )
+OURS = ("cyclonedds>=11", "pyrealsense2>=2.55", "rerun-sdk>=0.24", "websocket-client")
 INSTALL_S, CHECK_S = 900, 600
 
 pytestmark = pytest.mark.long
@@ -50,7 +51,9 @@ def check(python, name, **variables):
 
 @pytest.fixture(scope="module")
 def ours(request):
-    return environment(request.config.cache, "live", ("cyclonedds>=11", "pyrealsense2>=2.55", "rerun-sdk>=0.24"))
+    return environment(
+        request.config.cache, "live", ("cyclonedds>=11", "pyrealsense2>=2.55", "rerun-sdk>=0.24", "websocket-client")
+    )
 
 
 @pytest.fixture(scope="module")

@@ -186,7 +186,8 @@ def test_limb_columns_stand_behind_the_angles(tmp_path, supported):
     supported.save(tmp_path / "pose.csv")
     header = (tmp_path / "pose.csv").read_text().splitlines()[0].split(",")
     last = max(index for index, name in enumerate(header) if name.endswith("_rad"))
-    assert header[last + 1 :] == [f"{limb}_status" for limb in supported.limb_names]
+    sure = [f"{name}_sigma_m" for name in supported.joint_names]
+    assert header[last + 1 :] == [f"{limb}_status" for limb in supported.limb_names] + sure
 
 
 def test_readers_pass_over_columns_and_arrays_of_later_versions(tmp_path, supported):

@@ -247,7 +247,7 @@ def test_what_is_not_read_says_what_to_do(tmp_path):
         "a.mkv": "an Azure Kinect",
         "a.oni": "OpenNI",
         "a.svo": "ZED",
-        "film.mp4": "depth, or keypoints of several calibrated cameras",
+        "film.mp4": "depth, or a folder with the films of several cameras and their calibration",
     }.items():
         (tmp_path / name).touch()
         done = run("track", tmp_path / name)

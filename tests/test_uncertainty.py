@@ -13,8 +13,10 @@ from scipy.stats import norm
 
 import voodoo
 from voodoo.evaluation import metrics
-from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown, plot_calibration
-from voodoo.evaluation.evaluate import evaluate
+from voodoo.evaluation.calibration import Deviations, calibrate, sigma_of
+from voodoo.evaluation.evaluate import called_measured, differences
+from voodoo.evaluation.report import write_reports
+from voodoo.evaluation.score import FrameTable, Score
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import write_bag
 from voodoo.export.track import Track
@@ -184,16 +186,24 @@ def test_calibration_of_errors_that_are_as_large_as_said():
     assert calibrate([Deviations(np.full_like(errors, np.nan), sigma, measured)]) is None
 
 
-def test_the_evaluation_prints_and_draws_it(tmp_path):
-    score, frames = evaluate(sample_path(), use=("depth",))
-    assert score.exact and frames.deviations.errors.shape == (score.frames, len(metrics.JOINTS), 3)
-    sizes = np.linalg.norm(frames.deviations.errors, axis=2)
-    np.testing.assert_allclose(sizes, frames.errors, atol=1e-12)
-    found = calibrate([frames.deviations])
-    text = calibration_markdown(found, "exact truth")
-    assert "| ends of measured limbs |" in text and f"{100 * found.shares[0].within_one:.1f} %" in text
-    plot_calibration(tmp_path / "calibration.png", [frames.deviations])
-    assert (tmp_path / "calibration.png").stat().st_size > 10_000
+def test_the_evaluation_prints_and_draws_it(tmp_path, estimates):
+    recording = open_recording(sample_path(), use=("depth",))
+    errors = differences(recording, Track.of(estimates[0], body=estimates[1]))
+    measured = np.array([called_measured(estimate) for estimate in estimates[0]])
+    sigma = np.array([sigma_of(estimate) for estimate in estimates[0]])
+    assert errors.shape == sigma.shape == (len(estimates[0]), len(metrics.JOINTS), 3)
+    stamps, flat = np.array([estimate.stamp for estimate in estimates[0]]), np.zeros(len(errors))
+    sizes = np.linalg.norm(errors, axis=2)
+    deviations = Deviations(errors, sigma, measured)
+    frames = FrameTable(stamps, ("tracking",) * len(flat), sizes, sizes > 1.0, flat, flat, flat, deviations)
+    score = Score(
+        "sample", sample_path(), frames=len(flat), exact=True, joint_error_m=dict.fromkeys(metrics.JOINTS, 0.0)
+    )
+    files = write_reports(tmp_path, [score], [frames])
+    assert files[-1] == tmp_path / "calibration.png" and files[-1].stat().st_size > 10_000
+    found = calibrate([deviations])
+    text = (tmp_path / "summary.md").read_text(encoding="utf-8")
+    assert "against exact truth" in text and f"| {100 * found.shares[2].within_one:.1f} %" in text
     # The sample is walked with exact truth: most errors are as large as said.
     assert 0.5 < found.shares[0].within_one < 0.95 and found.shares[0].within_two > 0.8
 

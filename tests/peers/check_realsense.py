@@ -5,9 +5,9 @@ import time
 
 import numpy as np
 import pytest
+from live_camera import CAMERA, SoftwareCamera, pictures
 
 import voodoo
-from live_camera import CAMERA, SoftwareCamera, pictures
 from voodoo.live import Follower, Live
 from voodoo.live.session import Session
 from voodoo.live.sources.realsense import RealSenseSource

@@ -99,6 +99,9 @@ type Found = (
 /// Covariances of sites (nine numbers each), limbs (36) and joints (nine); standard deviations of lengths and girths.
 type Spread = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
 
+/// All of an estimate.
+type Kept = (Head, AllNames, Found, Spread);
+
 fn spread_of(found: &Covariances) -> Spread {
     let flat = |all: &[Mat3]| all.iter().flat_map(Mat3::to_cols_array).collect();
     let limbs = found.limbs.iter().flatten().flatten().copied().collect();
@@ -275,8 +278,8 @@ impl PyEstimate {
         Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
-    /// Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the origin
-    /// of the limb's frame, as in geometry_msgs/PoseWithCovariance.
+    /// Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the
+    /// origin of the limb's frame, as in geometry_msgs/PoseWithCovariance.
     #[getter]
     fn limb_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let (py, this) = (slf.py(), slf.get());
@@ -344,7 +347,7 @@ impl PyEstimate {
     }
 
     /// For pickle and copy.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Head, AllNames, Found, Spread))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
         let (found, names) = (&self.estimate, &*self.names);
         let pose = |pose: &Pose| (pose.translation.to_array(), pose.rotation.to_array());
         let source = |report: &SourceReport| (report.count, report.inliers, report.weight, report.residual);

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from voodoo.cli.batch import batch_command
 from voodoo.cli.demo import demo_command
 from voodoo.cli.evaluate import eval_command
 from voodoo.cli.ik import ik_command
@@ -62,6 +63,7 @@ app.command("demo", short_help="Track the bundled recording and draw what is fou
 app.command("init", short_help="Find the first pose and write it, to edit and give back.")(init_command)
 app.command("ik", short_help="Find postures from a few known sites and silhouettes.")(ik_command)
 app.command("eval", short_help="Measure the tracker on recordings with a truth.")(eval_command)
+app.command("batch", short_help="Track a thousand recordings, one task each.")(batch_command)
 app.command("info", short_help="Say what is in a recording.")(info_command)
 app.command("config", short_help="Print the default configuration as commented TOML.")(config_command)
 app.command("body", short_help="Print a body as TOML: the default human, or a file.")(body_command)

@@ -47,8 +47,8 @@ def eval_command(
     """Track recordings that bring a truth or a reference skeleton, and measure the result.
 
     Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
-    summary.csv, summary.md, errors.png and calibration.png. Ends with exit code 1 if a recording could not be tracked to its end. Ctrl-C keeps
-    the recordings that are done and ends with exit code 130.
+    summary.csv, summary.md, errors.png and calibration.png. Ends with exit code 1 if a recording could not be tracked to its
+    end. Ctrl-C keeps the recordings that are done and ends with exit code 130.
 
     With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
     switch turned over, the other solvers, no prediction, no jitter penalty)

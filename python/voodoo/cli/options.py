@@ -14,7 +14,10 @@ TOPICS = (*TOPIC_KINDS, "camera_info")
 """What a topic can be chosen for."""
 
 RecordingArgument = Annotated[
-    Path, typer.Argument(metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, Pose2Sim or PNG folder, .trc, .c3d.")
+    Path,
+    typer.Argument(
+        metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, folder of videos, Pose2Sim or PNGs, .trc."
+    ),
 ]
 LoaderOption = Annotated[
     str | None, typer.Option("--loader", metavar="NAME", help=f"Instead of a guess: {', '.join(LOADERS)}.")
@@ -79,6 +82,14 @@ StrictOption = Annotated[
         "--strict", help="Refuse a damaged recording; by default what cannot be used is left out and counted."
     ),
 ]
+BackgroundOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--background",
+        metavar="DIR",
+        help="Pictures of the empty scene, CAMERA_0.png, ..., for colour; by default background/ beside the recording.",
+    ),
+]
 NUMBERS = ("rate", "metres_per_unit", "tf_max_age")
 """Options of loaders that are numbers."""
 
@@ -93,5 +104,9 @@ LoaderNumberOption = Annotated[
 ]
 UseOption = Annotated[
     str | None,
-    typer.Option("--use", metavar="KIND,...", help=f"Inputs to use, by default all there are: {', '.join(INPUTS)}."),
+    typer.Option(
+        "--use",
+        metavar="KIND,...",
+        help=f"Inputs to use: {', '.join(INPUTS)}. By default all there are, color only where nothing else tells the pose.",
+    ),
 ]

@@ -45,16 +45,15 @@ def opened(path: Path, loader: str | None, frame: str | None, **options: Any) ->
     return open_recording(path, loader=loader, **options)
 
 
-def kinds_of(words: str | None) -> tuple[str, ...]:
-    """The kinds of inputs in "depth,scan"; all of them for None.
+def kinds_of(words: str | None) -> tuple[str, ...] | None:
+    """The kinds of inputs in "depth,scan"; None: whatever the recording is best tracked by.
 
     Raises:
         VoodooError: an unknown kind.
     """
-    chosen = (
-        FrontEndSettings() if words is None else FrontEndSettings(use=tuple(word.strip() for word in words.split(",")))
-    )
-    return chosen.use
+    if words is None:
+        return None
+    return FrontEndSettings(use=tuple(word.strip() for word in words.split(","))).use
 
 
 def depth_filter_of(words: str | None) -> DepthFilter | None:

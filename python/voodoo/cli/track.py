@@ -9,6 +9,7 @@ import typer
 
 from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both, say, states, topics_of
 from voodoo.cli.options import (
+    BackgroundOption,
     BodyOption,
     ConfigOption,
     ExcludeOption,
@@ -80,12 +81,16 @@ def track_command(
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
     exclude: ExcludeOption = None,
+    background: BackgroundOption = None,
     strict: StrictOption = False,
 ) -> None:
     """Find a person in a recording, follow them, and write one row a frame.
 
     All inputs the recording has are used: depth images, point clouds, laser scans, skin in colour images, 2-D
     keypoints, markers. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
+
+    Pictures of calibrated cameras alone (a bag, or a folder with videos and Calib*.toml) are followed by the colour regions of
+    the body; --use color does so where there is more. They need a start: --init FILE, or one that lies beside them.
 
     The start is the recording's own, if one comes with it. Else somebody is looked for: in markers, keypoints of several
     cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until then, and when the
@@ -115,6 +120,8 @@ def track_command(
 
     voodoo track a1_s1_t1_depth.mat --height 1.80 --out pose.npz --out pose.bvh --overlay look.mp4
 
+    voodoo track four_videos/ --init start.json --background empty/ --out walk.csv
+
     voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
     from dataclasses import replace
@@ -142,12 +149,17 @@ def track_command(
         beginning = no_starts(init) if several else beginning_of(init)
         markers = None if marker_map is None else MarkerMap.load(marker_map)
         numbers, others = numbers_of(option), with_ or ()
-        options = topics_of(topic) | loader_options(recording, loader, markers=markers, layout=layout, numbers=numbers)
+        about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": kinds}
+        options = topics_of(topic) | loader_options(recording, loader, **about)
+        if background is not None:
+            options["background"] = background
         # A number that no other recording takes is this one's, whose loader may refuse it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
-            opened(recording, loader, frame, left_out=left_out, **options, **bare_for(beginning)),
+            opened(
+                recording, options.pop("loader", loader), frame, left_out=left_out, **options, **bare_for(beginning)
+            ),
             keypoints=keypoint_folders(keypoints or ()),
             layout=layout,
             others=others,

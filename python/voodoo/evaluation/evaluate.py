@@ -27,6 +27,7 @@ from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
 from voodoo.names import SEARCHING, HumanModel
+from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import Automatic, start_tracker
 from voodoo.recordings.loaders import open_recording
@@ -70,7 +71,7 @@ def evaluate(
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, loader=loader)
+    recording = open_recording(path, **{"loader": loader} | pictures_alone(path, loader, use))
     tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
     steps = []
@@ -268,6 +269,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     distances = np.concatenate([step.witness.distances for step in steps])
     about_joints = np.concatenate([step.witness.about_joints for step in steps])
     measured = np.array([step.measured for step in steps])
+    angle_error, angle_spread = metrics.angle_error(positions, compared)
     first_wait, first_error = _first_pose(stamps, status, reference, errors0)
     far, near = (limb_ends(errors, far=which) for which in (True, False))
     score = Score(
@@ -307,6 +309,8 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         far_ends=int(far.sum()),
         near_ends=int(near.sum()),
         step_s=float(seconds.mean()),
+        angle_error_deg=angle_error,
+        angle_spread_deg=angle_spread,
     )
     within = np.array([step.witness.within for step in steps])
     sigma = np.array([step.sigma for step in steps])

@@ -82,6 +82,49 @@ def without_offsets(estimated: FloatArray, reference: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(differences, axis=2))
 
 
+def joint_angles(positions: FloatArray) -> FloatArray:
+    """Angles (F, 8) [rad] of a skeleton of JOINTS (F, 12, 3): flexion of elbows and knees, upper arms and thighs against the
+    trunk, left and right; the trunk's axis goes from between the hips to between the shoulders. Zero is a hanging, straight
+    limb."""
+    at = {name: positions[:, index] for index, name in enumerate(JOINTS)}
+    down = (at["l_hip"] + at["r_hip"] - at["l_shoulder"] - at["r_shoulder"]) / 2.0
+    bones = {
+        (side, bone): at[f"{side}_{end}"] - at[f"{side}_{start}"]
+        for side in ("l", "r")
+        for bone, start, end in (
+            ("upperarm", "shoulder", "elbow"),
+            ("forearm", "elbow", "wrist"),
+            ("thigh", "hip", "knee"),
+            ("calf", "knee", "ankle"),
+        )
+    }
+    pairs = [
+        (first, bones[side, second])
+        for side in ("l", "r")
+        for first, second in (
+            (bones[side, "upperarm"], "forearm"),
+            (bones[side, "thigh"], "calf"),
+            (down, "upperarm"),
+            (down, "thigh"),
+        )
+    ]
+    return np.column_stack([_between(first, second) for first, second in pairs])
+
+
+def _between(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Angles (F,) [rad] between vectors (F, 3)."""
+    across = np.linalg.norm(np.cross(first, second), axis=1)
+    return np.asarray(np.arctan2(across, np.einsum("fi,fi->f", first, second)))
+
+
+def angle_error(estimated: FloatArray, reference: FloatArray) -> tuple[float, float]:
+    """Mean absolute error of the joint angles of two skeletons (F, 12, 3), and the standard deviation of the signed error about
+    each angle's mean, averaged over the angles [deg]; NaN where nothing is known."""
+    errors = np.degrees(joint_angles(estimated) - joint_angles(reference))
+    spreads = [column[np.isfinite(column)].std() for column in errors.T if np.isfinite(column).any()]
+    return mean_or_nan(np.abs(errors)), float(np.mean(spreads)) if spreads else float("nan")
+
+
 def shifted(reference: FloatArray, lag: int) -> FloatArray:
     """The reference (F, ...) as an estimate that is `lag` frames late is compared with it; NaN where it has no frame."""
     moved = np.full(reference.shape, np.nan)

@@ -35,6 +35,8 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("reference_jitter_m", "... of the reference", lambda value: f"{1000 * value:.1f} mm"),
     ("standing_jitter_m", "second difference where the reference stands still", lambda value: f"{1000 * value:.1f} mm"),
     ("reference_standing_jitter_m", "... of the reference itself there", lambda value: f"{1000 * value:.1f} mm"),
+    ("angle_error_deg", "error of the joint angles", lambda value: f"{value:.1f} deg"),
+    ("angle_spread_deg", "... its standard deviation", lambda value: f"{value:.1f} deg"),
     ("degraded_share", "frames called degraded", lambda value: f"{100 * value:.1f} %"),
     ("lost_share", "frames called lost", lambda value: f"{100 * value:.1f} %"),
     ("searching_share", "frames without a pose", lambda value: f"{100 * value:.1f} %"),

@@ -50,6 +50,7 @@ class Score:
             limb was not called measured; and of the nearer ones.
         far_ends, near_ends: how many such joints there were, over all frames.
         step_s: mean time of a frame from measurements to estimate.
+        angle_error_deg, angle_spread_deg: of eight joint angles at the same lag, see metrics.angle_error [deg].
     """
 
     name: str
@@ -89,6 +90,8 @@ class Score:
     far_ends: int = 0
     near_ends: int = 0
     step_s: float = np.nan
+    angle_error_deg: float = np.nan
+    angle_spread_deg: float = np.nan
 
 
 @dataclass(frozen=True, eq=False, repr=False)

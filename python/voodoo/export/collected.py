@@ -31,7 +31,8 @@ def angles_of_estimates(estimates: Sequence[Estimate], body: Body | None) -> tup
 def covariances_of(
     estimates: Sequence[Estimate], joint_names: Sequence[str], limb_names: Sequence[str]
 ) -> tuple[FloatArray, FloatArray]:
-    """Covariances (F, J, 3, 3) of the joints and (F, 6, 6) of the first limb's pose; NaN where nothing is said."""
+    """Covariances (F, J, 3, 3) of the joints and (F, 6, 6) of the first limb's pose; NaN where nothing is said, and
+    (F, 0, 3, 3) where nothing ever is."""
     joints = np.full((len(estimates), len(joint_names), 3, 3), np.nan)
     root = np.full((len(estimates), 6, 6), np.nan)
     for index, estimate in enumerate(estimates):
@@ -39,4 +40,4 @@ def covariances_of(
             joints[index] = estimate.joint_covariances
         if limb_names and limb_names[0] in estimate.limb_covariance:
             root[index] = estimate.limb_covariance[limb_names[0]]
-    return joints, root
+    return (joints if np.isfinite(joints).any() else np.empty((len(estimates), 0, 3, 3))), root

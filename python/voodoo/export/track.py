@@ -201,6 +201,27 @@ class Track:
             left_out=dict(left_out or {}),
         )
 
+    @classmethod
+    def joined(cls, tracks: Sequence[Track]) -> Track:
+        """One track of several of the same body that follow each other.
+
+        Raises:
+            VoodooError: no tracks.
+        """
+        if not tracks:
+            raise VoodooError("tracks: expected at least one, found none")
+        arrays: dict[str, Any] = {}
+        for name in _BY_FRAME:
+            parts = [getattr(track, name) for track in tracks]
+            shape = max((part.shape[1:] for part in parts), key=lambda one: one[0] if one else 0)
+            # Where how sure a pose is was not known, there are no columns.
+            parts = [part if part.shape[1:] == shape else np.full((len(part), *shape), np.nan) for part in parts]
+            arrays[name] = np.concatenate(parts)
+        limbs = tracks[0].limb_status
+        words = {limb: tuple(word for track in tracks for word in track.limb_status[limb]) for limb in limbs}
+        status = tuple(word for track in tracks for word in track.status)
+        return replace(tracks[0], status=status, limb_status=words, **arrays)
+
     def save(self, path: str | Path) -> None:
         """Write .csv (positions to 1 um) or .npz (everything, exactly); the file appears only when it is complete.
 
@@ -331,7 +352,8 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         # Files of earlier versions have no angles.
         angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
         angles=content["angles"] if "angles" in content else np.empty((0, 0)),
-        **{name: content[name] for name in ("covariance", "root_covariance") if name in content},
+        covariance=content.get("covariance", np.empty((0, 0, 3, 3))),
+        root_covariance=content.get("root_covariance", np.empty((0, 6, 6))),
         **_told(content),
     )
 

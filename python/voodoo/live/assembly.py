@@ -137,10 +137,13 @@ class Assembler:
         """What other sensors measured up to a time, decoded; what is later waits for the next frame."""
         found: list[Measurement] = []
         for pending in self._others.values():
+            due = []
             while pending and pending[0].stamp <= stamp + self._wait:
                 arrival = pending.popleft()
-                if stamp - arrival.stamp > _STALE_S:
-                    continue
+                if stamp - arrival.stamp <= _STALE_S:
+                    due.append(arrival)
+            # A faster laser tells more; of a faster camera the last picture tells all.
+            for arrival in due if due and due[-1].kind in ("scan", "points") else due[-1:]:
                 try:
                     item = self._checked(arrival.measure(), now)
                     if self._eager and isinstance(item, ColorImage):

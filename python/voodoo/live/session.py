@@ -200,7 +200,7 @@ class Session:
         """Status of each person who is there; "lost" of all where the source is."""
         if self._last is None:
             return {}
-        lost = self.live.status == "lost"
+        lost = self.live.lost
         return {number: "lost" if lost else str(one.status) for number, one in self._last.estimates.items()}
 
     @property
@@ -213,13 +213,13 @@ class Session:
         """Rate, latency, drops and the status of each person, for people."""
         persons = ", ".join(f"{number} {word}" for number, word in self.persons().items()) or "nobody"
         status = self.live.status
-        if status == "waiting":
-            return "waiting for data"
+        if status == "waiting" or not self.published:
+            return "waiting for data" if status == "waiting" else f"no pose yet; {self.dropped} dropped"
         parts = [
             f"{self.rate_hz:.1f} Hz",
             f"latency {1e3 * self.latency.last:.1f} ms (median {1e3 * self.latency.percentile(50):.1f})",
             f"{self.dropped} dropped",
-            persons if status != "lost" else f"source lost for {self.live.silent:.1f} s: {persons}",
+            persons if not self.live.lost else f"source lost for {self.live.silent:.1f} s: {persons}",
         ]
         if len(self.live.faults):
             parts.append(f"{len(self.live.faults)} faults")

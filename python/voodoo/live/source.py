@@ -57,11 +57,13 @@ class Source(ABC):
         name: for messages.
         stays: a source that is gone may come back, and is opened again.
         unusable: what came for a frame and could not become an arrival.
+        placed: it is known where its sensors are among those of other sources.
     """
 
     name: str
     stays: bool = True
     unusable: int = 0
+    placed: bool = True
 
     @property
     @abstractmethod

@@ -5,9 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -90,7 +88,7 @@ class Files(Output):
                 for path in self._paths:
                     self.written += save_people(everybody, path, bodies=self._bodies, root_frame=self._root())
             else:
-                track = joined([Track.load(part) for part in parts])
+                track = Track.joined([Track.load(part) for part in parts])
                 for path in self._paths:
                     save(track, path, body=self._bodies[ONE], root_frame=self._root())
                     self.written.append(path)
@@ -98,19 +96,7 @@ class Files(Output):
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def joined(tracks: Sequence[Track]) -> Track:
-    """One track of several that follow each other."""
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(track, name) for track in tracks])
-        for name in ("stamps", "residual", "joints", "world_from_limb", "angles")
-    }
-    limbs = tracks[0].limb_status
-    words = {limb: tuple(word for track in tracks for word in track.limb_status[limb]) for limb in limbs}
-    status = tuple(word for track in tracks for word in track.status)
-    return replace(tracks[0], status=status, limb_status=words, **arrays)
-
-
 def _joined_people(parts: Sequence[PeopleTrack]) -> PeopleTrack:
     persons = sorted({person for part in parts for person in part.tracks})
-    tracks = {one: joined([part.tracks[one] for part in parts if one in part.tracks]) for one in persons}
+    tracks = {one: Track.joined([part.tracks[one] for part in parts if one in part.tracks]) for one in persons}
     return PeopleTrack(np.concatenate([part.stamps for part in parts]), tracks)

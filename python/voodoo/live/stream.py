@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Literal, TypeAlias
 
@@ -56,6 +57,7 @@ class Live:
         """Nothing is opened yet; entering the `with` block does that."""
         if not sources:
             raise VoodooError("sources: expected at least one, found none")
+        _check_joined(sources)
         self.sources = tuple(sources)
         self.clock: Clock = clock if clock is not None else HostClock()
         self.faults = Faults(tell)
@@ -96,8 +98,10 @@ class Live:
         """The newest frame each time, until the sources end or `stop` is called.
 
         Raises:
-            VoodooError: a source that cannot go on.
+            VoodooError: a source that cannot go on, or nobody entered the `with` block.
         """
+        if not self._threads and not self._frames.closed:
+            raise VoodooError("live sources: expected a `with` block around the loop, found none")
         while not self._frames.closed:
             frame = self.next(_TICK_S)
             if frame is not None:
@@ -137,7 +141,12 @@ class Live:
             return "ended"
         if self._good is None:
             return "waiting"
-        return "lost" if self.silent > self._patience else "running"
+        return "lost" if self.lost else "running"
+
+    @property
+    def lost(self) -> bool:
+        """Whether there was nothing usable for LOST_S, or two and a half periods of a slow source; also at its end."""
+        return self._good is not None and self.silent > self._patience
 
     @property
     def silent(self) -> float:
@@ -226,7 +235,8 @@ class Live:
                     is_open = True
                     self.faults.say(f"{source.name}: it is there again")
                 for arrival in source.read(_TICK_S):
-                    self.deliver(arrival)
+                    # The first source's images make the frames.
+                    self.deliver(arrival if source is self.sources[0] else replace(arrival, drives=False))
             except SourceEnded:
                 break
             except SourceGone as error:
@@ -267,7 +277,9 @@ class Live:
         if frame is None:
             return
         now = self.clock.now()
-        if self._stamp is not None and not frame.breaks:
+        if self._stamp is None:
+            self._check_roots()
+        elif not frame.breaks:
             self._period = frame.stamp - self._stamp
         self._stamp = frame.stamp
         if self._lost:
@@ -275,12 +287,35 @@ class Live:
         self._good, self._lost = now, False
         self._frames.put(frame)
 
+    def _check_roots(self) -> None:
+        roots = {source.name: source.root_frame for source in self.sources if source.root_frame}
+        if len(set(roots.values())) > 1:
+            told = ", ".join(f"{name} in {root!r}" for name, root in roots.items())
+            raise VoodooError(
+                f"sources: expected one root frame, found {told}; --calibration and --frame say where they are"
+            )
+
     @property
     def _patience(self) -> float:
         return max(LOST_S, _PERIODS * self._period)
 
     def _watch(self) -> None:
         """Tell that a source stalls."""
-        if not self._lost and self._good is not None and self.silent > self._patience and not self._inbox.closed:
+        if not self._lost and self.lost and not self._inbox.closed:
             self._lost = True
             self.faults.add("stalled", f"nothing usable for {self.silent:.1f} s: lost", self.clock.now())
+
+
+def _check_joined(sources: Sequence[Source]) -> None:
+    """Refuse several sources that cannot be told apart, or of which nobody says where they are."""
+    names = [source.name for source in sources]
+    if len(set(names)) < len(names):
+        raise VoodooError(
+            f"sources: expected different ones, found {', '.join(names)}; realsense:SERIAL tells cameras apart"
+        )
+    lost = [source.name for source in sources if not source.placed]
+    if len(sources) > 1 and lost:
+        raise VoodooError(
+            f"{lost[0]}: expected a calibration that says where it is beside other sources, found none (--calibration FILE, one "
+            "for each source in their order)"
+        )

@@ -13,7 +13,7 @@ from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.search import Search, nobody
 from voodoo.pipeline.starts.chosen import Starts
-from voodoo.sensors.adapters import Context, Memory, adapter_of, all_adapters
+from voodoo.sensors.adapters import Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.keypoints.sensor import KeypointReport
 from voodoo.sensors.motion import LimbMotion
@@ -115,7 +115,8 @@ class FrontEnd:
         self._predictor.update(recorded.stamp, estimate.joints)
         self._motion.update(recorded.stamp, estimate.world_from_limb)
         for item in recorded.measurements:
-            adapter_of(item).learn(item, estimate, self.memory, vouched=self._vouched)
+            for adapter in adapters_of(item):
+                adapter.learn(item, estimate, self.memory, vouched=self._vouched)
         self._vouched = False
 
     def _forget(self) -> None:
@@ -143,7 +144,7 @@ class FrontEnd:
         use = self.settings.use
         alive = self._frozen.without(recorded.measurements, use=use)
         if self.search.wanted(recorded.stamp):
-            used = [item for item in alive if adapter_of(item).kind in use]
+            used = [item for item in alive if any(adapter.kind in use for adapter in adapters_of(item))]
             if self.search.look(recorded.stamp, used, self.settings):
                 self._begin()
         frame = Frame(stamp=recorded.stamp)
@@ -164,9 +165,9 @@ class FrontEnd:
             memory=self.memory,
         )
         for item in alive:
-            adapter = adapter_of(item)
-            if adapter.kind in use and (self.search.posed or adapter.while_searching):
-                adapter.add(frame, item, context)
+            for adapter in adapters_of(item):
+                if adapter.kind in use and (self.search.posed or adapter.while_searching):
+                    adapter.add(frame, item, context)
         self.rays = context.rays
         if self.settings.agreement > 0.0:
             self.rays = agreed(self.rays, predicted=predicted, scale=self.settings.agreement)

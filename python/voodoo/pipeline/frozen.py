@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.measurements import Measurement
-from voodoo.sensors.adapters import adapter_of
+from voodoo.sensors.adapters import adapters_of
 
 
 class FrozenSensors:
@@ -42,10 +42,10 @@ class FrozenSensors:
         repeats: list[Measurement] = []
         changes = False
         for item in sorted(measurements, key=idle):
-            adapter = adapter_of(item)
             if idle(item) and not repeats:
                 continue
-            content = adapter.content(item) if adapter.kind in use else None
+            adapter = next((known for known in adapters_of(item) if known.kind in use), None)
+            content = None if adapter is None else adapter.content(item)
             if content is None:
                 continue
             before = self._contents.get(item.sensor)

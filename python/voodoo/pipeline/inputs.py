@@ -14,6 +14,7 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import LOADERS, guess_loader, open_recording, options_of
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
+from voodoo.recordings.videos import picture_sources
 
 
 def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
@@ -79,18 +80,32 @@ def loader_options(
     markers: MarkerMap | None,
     layout: str,
     numbers: Mapping[str, float] | None = None,
+    use: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """Of the options of `voodoo track` those that the loader of a recording takes.
+
+    Where pictures alone are to be used they make the frames: of a bag that has depth, of a folder that has keypoints.
 
     Raises:
         VoodooError: no loader for it.
     """
     if loader is None and not path.exists():
         return {}  # opening it says so
-    name = loader or guess_loader(path)
+    alone = pictures_alone(path, loader, use)
+    name = alone.get("loader") or loader or guess_loader(path)
     options: dict[str, dict[str, Any]] = {"markers": {"markers": markers}, "pose2sim": {"layout": layout}}
     known = options_of(name) if name in LOADERS else ()
-    return options.get(name, {}) | {key: value for key, value in (numbers or {}).items() if key in known}
+    return options.get(name, {}) | {key: value for key, value in (numbers or {}).items() if key in known} | alone
+
+
+def pictures_alone(path: Path, loader: str | None, use: Sequence[str] | None) -> dict[str, Any]:
+    """Options of `open_recording` by which pictures make the frames, if `use` names nothing but what is seen in them."""
+    if use is None or "color" not in use or not set(use) <= {"color", "skin"} or not path.exists():
+        return {}
+    name = loader or guess_loader(path)
+    if name in ("ros1", "ros2"):
+        return {"use": ("color",)}
+    return {"loader": "videos"} if loader is None and name == "pose2sim" and picture_sources(path) else {}
 
 
 def _open(

@@ -14,11 +14,15 @@ def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFra
     """The frames of a recording, each with the measurements that follow it within `wait` seconds.
 
     A colour picture taken a few milliseconds after a depth image belongs to it, not to the next one a whole period
-    later; the price is a latency of at most `wait`. The stamp of a frame stays that of its own measurement.
+    later; the price is a latency of at most `wait`. The stamp of a frame stays that of its own measurement. Frames that are
+    complete stay as they are.
 
     Raises:
         RecordingError: damage in the recording.
     """
+    if recording.complete:
+        yield from recording
+        return
     held: RecordedFrame | None = None
     for recorded in recording:
         if held is not None:

@@ -16,9 +16,9 @@ from voodoo.pipeline.people_keypoints import PeopleKeypoints
 from voodoo.pipeline.run import stepped
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
-from voodoo.sensors.adapters import Context, Memory, adapter_of
+from voodoo.sensors.adapters import Context, Memory, adapters_of
 from voodoo.sensors.gating import SiteGate, SitePredictor
-from voodoo.sensors.kinds import input_of
+from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.motion import LimbMotion
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
@@ -83,12 +83,15 @@ class PeopleFrontEnd:
             memory=self.memory,
         )
         for item in alive:
-            adapter = adapter_of(item)
-            if adapter.kind in chosen.use and adapter.while_searching:
-                adapter.add(frame, item, context)
-            elif isinstance(item, ColorImage) and adapter.kind in chosen.use and colored:
+            used = [adapter for adapter in adapters_of(item) if adapter.kind in chosen.use]
+            for adapter in used:
+                if adapter.while_searching:
+                    adapter.add(frame, item, context)
+            if used and isinstance(item, ColorImage) and colored:
                 # Clothes tell persons apart.
-                frame.add_color(item.image, camera=item.camera, world_from_sensor=item.root_from_sensor)
+                frame.add_color(
+                    item.image, camera=item.camera, world_from_sensor=item.root_from_sensor, source=item.sensor
+                )
         return frame
 
 
@@ -128,7 +131,7 @@ def track_people(
         VoodooError: a recording without depth images, damage in it, or a frame that is refused; names the frame.
     """
     chosen = settings or FrontEndSettings.of(recording)
-    has = {kind for sensor in recording.info().sensors if (kind := input_of(sensor.kind)) is not None}
+    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
     if not {"depth", "keypoints"} & has & set(chosen.use):
         raise MeasurementError(
             f"{recording.name}: several people are found in depth images or keypoints, expected some, found "

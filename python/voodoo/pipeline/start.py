@@ -28,9 +28,9 @@ from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
-from voodoo.sensors.kinds import input_of, inputs
+from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
-from voodoo.sensors.settings import FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings, inputs_for
 from voodoo.tracker import Tracker
 
 Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
@@ -265,20 +265,21 @@ def _upright(body: Body) -> float:
     return float(max(heights) - min(heights))
 
 
-def _kinds(recording: Recording, use: Sequence[str] | None) -> set[str | None]:
+def _kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
     """Kinds of inputs that a recording has and that are in use."""
-    return {input_of(sensor.kind) for sensor in recording.info().sensors} & set(use if use is not None else inputs())
+    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+    return has & set(use if use is not None else inputs_for(recording))
 
 
 def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
-    """Whether there is nothing but lasers to start from: skin tells no posture."""
-    return _kinds(recording, use) - {"skin"} == {"scan"}
+    """Whether there is nothing but lasers to start from: nobody is found in pictures."""
+    return _kinds(recording, use) - {"skin", "color"} == {"scan"}
 
 
 def _check_findable(recording: Recording, body: Body, use: Sequence[str] | None) -> None:
     """Refuse to look for a body that nothing in the recording can show."""
     kinds = _kinds(recording, use)
-    blind = {"points", "skin"}
+    blind = {"points", "skin", "color"}
     if not knows(body):
         blind.add("depth")
     if not serves(body):

@@ -6,6 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
 from voodoo.recordings.keypoint_files import read_openpose_json
@@ -61,6 +64,10 @@ class Joined(Recording):
         """See Recording."""
         return self._first.root_from(frame, stamp)
 
+    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+        """Those of all recordings."""
+        return {name: seen for one in (*self._others, self._first) for name, seen in one.empty_scene().items()}
+
     def info(self) -> RecordingInfo:
         """That of the first, with the sensors of all."""
         about = self._first.info()
@@ -113,7 +120,7 @@ class WithKeypoints(Recording):
         self._left_out = left_out
         self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
         self.start, self.reference, self.assumed = recording.start, recording.reference, recording.assumed
-        self._recording, self._layout = recording, layout
+        self._recording, self._layout, self.complete = recording, layout, recording.complete
         self._files: dict[str, list[Path]] = {}
         sensors = {item.name: item for item in recording.info().sensors if item.kind in ("color", "depth")}
         for name, folder in folders.items():
@@ -169,6 +176,10 @@ class WithKeypoints(Recording):
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""
         return self._recording.root_from(frame, stamp)
+
+    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+        """See Recording."""
+        return self._recording.empty_scene()
 
     def info(self) -> RecordingInfo:
         """That of the recording, with the keypoints."""

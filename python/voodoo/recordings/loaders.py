@@ -57,6 +57,12 @@ def _pose2sim() -> Callable[..., Recording]:
     return Pose2SimRecording
 
 
+def _videos() -> Callable[..., Recording]:
+    from voodoo.recordings.videos import VideosRecording
+
+    return VideosRecording
+
+
 def _markers() -> Callable[..., Recording]:
     from voodoo.recordings.marker_files import MarkerRecording
 
@@ -69,11 +75,12 @@ LOADERS: dict[str, Loader] = {
     "utd-mhad": Loader(_utd_mhad, "a *_depth.mat of UTD-MHAD"),
     "folder": Loader(_folder, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
     "pose2sim": Loader(_pose2sim, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
+    "videos": Loader(_videos, "a folder with Calib*.toml and videos/* or images/*/ of several cameras"),
     "markers": Loader(_markers, "a .trc or .c3d file of markers"),
 }
 
 
-_FILM = ("a film", "depth, or keypoints of several calibrated cameras (a folder of Pose2Sim)")
+_FILM = ("a film", "depth, or a folder with the films of several cameras and their calibration, Calib*.toml")
 _ADVICE = {
     ".mkv": ("a recording of an Azure Kinect, or a film", "its depth images as PNG files in a folder"),
     ".oni": ("a recording of OpenNI", "its depth images as PNG files in a folder"),
@@ -151,14 +158,17 @@ def guess_loader(path: Path) -> str:
             return "ros2"
     else:
         if any(path.glob("Calib*.toml")):
-            return "pose2sim"
+            return _of_cameras(path) or "pose2sim"
         if (path / "depth").is_dir() or (path / "depth.txt").is_file():
             return "folder"
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
             raise RecordingError(
-                f"{path}: expected depth images in depth/, found colour alone; depth of the same camera is needed, or "
-                "keypoints of several calibrated cameras (a folder of Pose2Sim); docs/how-to/cameras.md says how"
+                f"{path}: expected depth images in depth/, found colour alone; depth of the same camera is needed, or several "
+                "calibrated cameras (a folder with their videos and Calib*.toml); docs/how-to/color.md says how"
             )
+        cameras = _of_cameras(path)
+        if cameras is not None:
+            return cameras
         try:
             return "ros1" if find_bag(path).suffix == ".bag" else "ros2"
         except RecordingError as error:
@@ -167,6 +177,25 @@ def guess_loader(path: Path) -> str:
     if advice is not None:
         raise RecordingError(f"{path}: expected {advice[1]}, found {advice[0]}; docs/how-to/cameras.md says how")
     raise RecordingError(f"{path}: found no loader for it; {_listing()}")
+
+
+def _of_cameras(path: Path) -> str | None:
+    """The loader of a folder of several cameras: that of their keypoints, if there are some, else of their pictures; None: it is
+    none.
+
+    Raises:
+        RecordingError: videos without a calibration.
+    """
+    from voodoo.recordings.pose2sim import calibration_of, calibrations, keypoint_folders
+    from voodoo.recordings.videos import picture_sources
+
+    known = bool(calibrations(path))
+    if known and keypoint_folders(path):
+        return "pose2sim"
+    sources = picture_sources(path, anywhere=known)
+    if sources:
+        calibration_of(path, [source.stem for source in sources])
+    return "videos" if sources else None
 
 
 def _listing() -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +40,7 @@ FRAME = "world"
 class Pose2SimRecording(Recording):
     """A folder of Pose2Sim::
 
-        Calib_*.toml                     cameras, see read_camera_toml; world Z up, metres
+        Calib_*.toml                     cameras, see read_camera_toml; world Z up, metres; or in calibration/, ../calibration/
         keypoints/cam01_json/*.json      OpenPose files, one an image, sorted by name; or pose/cam01_json as Pose2Sim has it
         *.trc                            optional: triangulated joints, Y up
 
@@ -82,11 +82,8 @@ class Pose2SimRecording(Recording):
             raise RecordingError(f"{path}: {error}") from error
         self.layout = layout
         self.rate = number_option(path, "rate", rate, "images per second > 0", most=1e4)
-        calibration = sorted(path.glob("Calib*.toml"))
-        if len(calibration) != 1:
-            raise RecordingError(f"{path}: expected one Calib*.toml, found {len(calibration)}")
-        placed = read_camera_toml(calibration[0])
-        folders = next((found for part in ("keypoints", "pose") if (found := sorted((path / part).glob("*_json")))), [])
+        placed = read_camera_toml(calibration_of(path))
+        folders = keypoint_folders(path)
         if len(folders) != len(placed):
             raise RecordingError(
                 f"{path}: expected a folder keypoints/*_json for each of {len(placed)} cameras, found {len(folders)}"
@@ -101,17 +98,8 @@ class Pose2SimRecording(Recording):
         counts = {len(files) for files in self._files}
         if len(counts) != 1 or counts == {0}:
             raise RecordingError(f"{path}: expected as many keypoint files for every camera, found {sorted(counts)}")
-        self.reference = None if bare else self._read_reference()
-        self.start = None if self.reference is None else _start(self.reference)
-
-    def _read_reference(self) -> Reference | None:
-        files = sorted(self.path.glob("*.trc"), key=lambda file: (len(file.name), file.name))
-        if not files:
-            return None
-        markers = read_trc(files[0], world_from_file=Z_UP_FROM_Y_UP)
-        names, positions = markers.of(SITES)
-        # Rows are images; the file's own time starts at 1 / rate for image 0.
-        return Reference(np.arange(len(positions)) / self.rate, names, positions, exact=False)
+        self.reference = None if bare else read_triangulation(path, self.rate)
+        self.start = None if self.reference is None else start_of(self.reference)
 
     def __len__(self) -> int:
         """Number of images of each camera."""
@@ -167,7 +155,61 @@ class Pose2SimRecording(Recording):
         )
 
 
-def _start(reference: Reference) -> Start:
+def keypoint_folders(path: Path) -> list[Path]:
+    """The folders of keypoint files in a folder of Pose2Sim, one a camera."""
+    return next((found for part in ("keypoints", "pose") if (found := sorted((path / part).glob("*_json")))), [])
+
+
+def calibrations(path: Path) -> list[Path]:
+    """The calibration files of a folder of Pose2Sim: in it, or in `calibration/` of it or of the one above."""
+    places = (path, *(folder / name for folder in (path, path.parent) for name in ("calibration", "Calibration")))
+    return next((found for place in places if (found := sorted(place.glob("Calib*.toml")))), [])
+
+
+_TEMPLATE = """\
+[{name}]
+name = "{name}"
+size = [1920.0, 1080.0]                     # pixels
+matrix = [[1500.0, 0.0, 959.5], [0.0, 1500.0, 539.5], [0.0, 0.0, 1.0]]
+distortions = [0.0, 0.0, 0.0, 0.0]          # as OpenCV has them
+rotation = [1.57, 0.0, 0.0]                 # camera from world, Rodrigues vector in radians
+translation = [0.0, 1.0, 3.0]               # camera from world, metres
+"""
+
+
+def calibration_of(path: Path, names: Sequence[str] = ()) -> Path:
+    """The one calibration file of a folder of Pose2Sim.
+
+    Raises:
+        RecordingError: none, or several; it has a template of one for cameras of these names.
+    """
+    found = calibrations(path)
+    if len(found) != 1:
+        tables = "\n".join(_TEMPLATE.format(name=name) for name in names)
+        hint = (
+            f"Write {path / 'Calib.toml'} with the numbers of the cameras:\n\n{tables}" if names and not found else ""
+        )
+        told = "one Calib*.toml, the calibration of the cameras"
+        raise RecordingError(f"{path}: expected {told}, found {len(found) or 'none'}", hint=hint)
+    return found[0]
+
+
+def read_triangulation(path: Path, rate: float) -> Reference | None:
+    """The triangulated joints in a folder of Pose2Sim, of pictures k / rate; None without any.
+
+    Raises:
+        RecordingError: a .trc that cannot be read.
+    """
+    files = sorted(path.glob("*.trc"), key=lambda file: (len(file.name), file.name))
+    if not files:
+        return None
+    names, positions = read_trc(files[0], world_from_file=Z_UP_FROM_Y_UP).of(SITES)
+    # Rows are images; the file's own time starts at 1 / rate for image 0.
+    return Reference(np.arange(len(positions)) / rate, names, positions, exact=False)
+
+
+def start_of(reference: Reference) -> Start:
+    """The first row of a reference as a start."""
     joints = {}
     for name, position in zip(reference.names, reference.positions[0], strict=True):
         if np.isfinite(position).all():

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
 import numpy as np
+import numpy.typing as npt
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
@@ -124,6 +125,7 @@ class Recording(ABC):
         reference: joint positions to compare with, or None.
         assumed: what nothing in the recording tells and was assumed, or is not used, in words.
         people: where everybody is, of a recording of several people with a truth, or None.
+        complete: whether each frame holds all that was measured at its time, so that nothing of the next one belongs to it.
     """
 
     assumed: tuple[str, ...] = ()
@@ -133,6 +135,15 @@ class Recording(ABC):
     start: Start | None
     reference: Reference | None
     people: PeopleTruth | None = None
+    complete: bool = False
+
+    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+        """Sensor -> pictures (H, W, 3) BGR uint8 of what that camera sees when nobody is there; {}: none are known.
+
+        Raises:
+            RecordingError: a picture that cannot be read.
+        """
+        return {}
 
     @abstractmethod
     def __len__(self) -> int:

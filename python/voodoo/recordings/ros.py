@@ -14,6 +14,7 @@ from voodoo.errors import RecordingError, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
+from voodoo.recordings.empty_scene import find_background, no_pictures, pictures_of, read_pictures, scene_words
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import (
@@ -38,6 +39,7 @@ from voodoo.recordings.ros_messages import (
     stamp_of,
 )
 from voodoo.recordings.ros_topics import COMPRESSED, Source, TopicChoice, TopicFinder
+from voodoo.recordings.together import together
 from voodoo.recordings.transforms import TransformTree, matrix
 from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
 
@@ -50,15 +52,16 @@ _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 class RosRecording(Recording):
     """A ROS bag: depth images, clouds, laser scans and colour images in one root frame.
 
-    There is one frame for each depth image (without depth: for each cloud, else each scan, else each colour image);
-    it also holds what was recorded since the previous one. What comes after the last one is not yielded. Stamps are
-    header stamps in seconds; double precision keeps them to about 0.2 microseconds. Messages are read while iterating
-    and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover` repair
-    it), as is one whose index announces other messages than it holds.
+    There is one frame for each depth image (without depth: for each cloud, else each scan, else each picture of the first
+    camera); it also holds what was recorded since the previous one. Where there is nothing but pictures, those of all cameras
+    are used, and a frame holds those taken within half an interval of the first camera's. What comes after the last frame is
+    not yielded. Stamps are header stamps in seconds; double precision keeps them to about 0.2 microseconds. Messages are read
+    while iterating and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover`
+    repair it), as is one whose index announces other messages than it holds.
 
     truth.csv, truth_people.csv and init.json in the bag's folder or the one above become `reference`, `people` and `start`,
     unless `bare`. Their positions are in base_link, or else world, or else the first sensor's frame, or in the one that
-    init.json's key `frame` names.
+    init.json's key `frame` names. Pictures in `background/` in the bag's folder or the one above are the `empty_scene`.
 
     A .bag of librealsense's recorder has no ROS frames: its streams are frames of their own ("Depth_0").
 
@@ -72,7 +75,8 @@ class RosRecording(Recording):
             transforms know it, else the frame of the first sensor.
         metres_per_unit: of 16-bit depth images; None: what a bag of librealsense's recorder tells, else 0.001.
         tf_max_age: how old a changing transform may be [s].
-        bare: read nothing that lies beside the bag.
+        background: folder of pictures of the empty scene, instead of the one beside the bag.
+        bare: read neither reference nor start.
         left_out: counts what cannot be used, which is then left out; None: it is refused.
 
     Raises:
@@ -92,6 +96,7 @@ class RosRecording(Recording):
         root_frame: str | None = None,
         metres_per_unit: float | None = None,
         tf_max_age: float = 0.5,
+        background: str | Path | None = None,
         bare: bool = False,
         left_out: LeftOut | None = None,
     ) -> None:
@@ -103,6 +108,7 @@ class RosRecording(Recording):
         scale = number_option(path, "metres_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
+        self._info: RecordingInfo | None = None
         self._bag = Bag(path, left_out=left_out)
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices: dict[TopicKind, TopicChoice] = {
@@ -119,10 +125,16 @@ class RosRecording(Recording):
         self.root_frame = self._read_transforms(root_frame, sources)
         self._driver = sources[0]
         self._sources = {s.topic: s for s in sources if self._connected(s, optional=color_topic is None)}
+        self.complete = self._driver.kind == "color" and len(sources) > 1
+        if self.complete:
+            self._check_together(sources)
 
         place = path if path.suffix == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         self._read_beside(place, bare=bare)
+        self._background = find_background(place) if background is None else Path(background)
+        if background is not None and not self._background_files():
+            raise no_pictures(background, self._names_of_cameras())
 
     def __len__(self) -> int:
         """Number of messages on the topic that makes the frames."""
@@ -130,10 +142,21 @@ class RosRecording(Recording):
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the bag; see Recording."""
+        if self.complete:
+            yield from together(self._measurements(), self._driver.topic)
+            return
+        pending: list[Measurement] = []
+        for measured in self._measurements():
+            pending.append(measured)
+            if measured.sensor == self._driver.topic:
+                yield RecordedFrame(measured.stamp, tuple(pending))
+                pending.clear()
+
+    def _measurements(self) -> Iterator[Measurement]:
+        """All that is used, in the order in which it was recorded."""
         infos = {source.info_topic for source in self._sources.values() if source.info_topic is not None}
         last: dict[str, float] = {}
         numbers = dict.fromkeys(self._sources, -1)
-        pending: list[Measurement] = []
         for topic, message in self._bag.read([*self._sources, *infos]):
             if topic in infos:
                 if message is not None:
@@ -151,10 +174,7 @@ class RosRecording(Recording):
                 continue
             if self._left_out is not None:
                 self._left_out.numbers[topic, measured.stamp] = numbers[topic]
-            pending.append(measured)
-            if topic == self._driver.topic:
-                yield RecordedFrame(measured.stamp, tuple(pending))
-                pending.clear()
+            yield measured
 
     def _measured(self, topic: str, message: Message, last: dict[str, float]) -> Measurement:
         """The measurement of a message that is not older than the `last` of its topic."""
@@ -174,7 +194,12 @@ class RosRecording(Recording):
         return measured
 
     def info(self) -> RecordingInfo:
-        """Summarize; reads the first and last message of every topic in use."""
+        """Summarize; reads the first and last message of every topic in use, once."""
+        if self._info is None:
+            self._info = self._summary()
+        return self._info
+
+    def _summary(self) -> RecordingInfo:
         sensors = []
         duration = 0.0
         for source in self._sources.values():
@@ -198,7 +223,7 @@ class RosRecording(Recording):
             sensors=tuple(sensors),
             unused=tuple(self._unused),
             reference=reference_words(self.reference, self.people),
-            notes=self.assumed,
+            notes=(*self.assumed, *scene_words(self._background, self._background_files())),
         )
 
     def _unit(self, topic: str, otherwise: float, *, told: bool) -> float:
@@ -274,6 +299,34 @@ class RosRecording(Recording):
         except RecordingError:
             return False
         return True
+
+    def _check_together(self, sources: Sequence[Source]) -> None:
+        """Refuse pictures of several cameras of which nobody tells how they stand to each other; tell what is left out."""
+        if len(self._sources) == 1:
+            raise RecordingError(
+                f"{self.path}: expected transforms between the cameras on tf or tf_static, found none between "
+                f"{' and '.join(repr(source.frame) for source in sources)}; one camera alone is chosen with color_topic= "
+                "(--topic color=NAME)"
+            )
+        left = [topic for topic, _ in self._unused]
+        if left:
+            self.assumed = (*self.assumed, f"not used: {', '.join(left)}; voodoo info says why")
+
+    def _names_of_cameras(self) -> dict[str, tuple[str, ...]]:
+        """Topic -> by which names pictures of its empty scene may be known."""
+        return {
+            s.topic: (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame"))
+            for s in self._sources.values()
+            if s.kind == "color"
+        }
+
+    def _background_files(self) -> dict[str, tuple[Path, ...]]:
+        return {} if self._background is None else pictures_of(self._background, self._names_of_cameras())
+
+    def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
+        """See Recording."""
+        cameras = {s.topic: s.camera for s in self._sources.values() if s.camera is not None}
+        return read_pictures(self._background_files(), cameras, left_out=self._left_out)
 
     def _connected(self, source: Source, *, optional: bool) -> bool:
         optional = optional and source.kind == "color" and source is not self._driver

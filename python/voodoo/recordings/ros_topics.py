@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -51,8 +52,9 @@ class Source:
 class TopicFinder:
     """Chooses topics by type, name and encoding, or as told.
 
-    A kind for which several topics qualify needs a choice; colour, which nothing depends on, is left out instead
-    when it is ambiguous or not calibrated, and noted in `unused`.
+    A kind for which several topics qualify needs a choice; colour beside other kinds, on which nothing depends, is left out
+    instead when it is ambiguous or not calibrated, and noted in `unused`. Where there is nothing but pictures, those of all
+    calibrated cameras are used: in colour, or grey ones where none is.
 
     Args:
         bag: the bag.
@@ -79,7 +81,9 @@ class TopicFinder:
         for kind in TOPIC_KINDS:
             if kind not in use:
                 continue
-            if self._choices[kind] is None and kind == "color":
+            if self._choices[kind] is None and kind == "color" and not sources:
+                sources += self._cameras()
+            elif self._choices[kind] is None and kind == "color":
                 try:
                     sources += [self._source(name, kind) for name in self._automatic(kind)]
                 except RecordingError as error:
@@ -144,15 +148,38 @@ class TopicFinder:
         self.unused += [(item.split(" ")[0], "not a depth encoding") for item in refused]
         return usable
 
-    def _color_candidates(self, names: list[str]) -> list[str]:
+    def _cameras(self) -> list[Source]:
+        """Pictures of all cameras there are, one topic a camera."""
+        names = [topic.name for topic in self.bag.topics if topic.type in _TYPES["color"] and topic.messages]
+        names = self._pictures(names, channels=3) or self._pictures(names, channels=1)
+        bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
+        found: dict[str, Source] = {}
+        for name in sorted(bases.values(), key=_natural):
+            try:
+                source = self._source(name, "color")
+            except RecordingError as error:
+                self.unused.append((name, str(error)))
+                continue
+            if source.frame in found:
+                self.unused.append((name, f"the camera of {found[source.frame].topic} (frame {source.frame!r})"))
+            else:
+                found[source.frame] = source
+        return list(found.values())
+
+    def _pictures(self, names: list[str], *, channels: int) -> list[str]:
+        """Topics with pictures of at least so many channels."""
         usable = []
         for name in names:
             message = self._message(name)
             if self._topics[name].type == COMPRESSED:
                 if "compressedDepth" not in name and "compressedDepth" not in message.format:
                     usable.append(name)
-            elif COLOR_CHANNELS.get(message.encoding, 0) >= 3:
+            elif COLOR_CHANNELS.get(message.encoding, 0) >= channels:
                 usable.append(name)
+        return usable
+
+    def _color_candidates(self, names: list[str]) -> list[str]:
+        usable = self._pictures(names, channels=3)
         named = [name for name in usable if "color" in name.lower() or "rgb" in name.lower()]
         return named or usable
 
@@ -209,3 +236,8 @@ class TopicFinder:
                 name, good=good or ((lambda message: stamp_of(message, source)) if stamped else None)
             )
         return self._first[name]
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """cam_2 comes before cam_10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]

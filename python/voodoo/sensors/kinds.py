@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from voodoo.names import INPUTS
 
-_SERVES: dict[str, str] = {kind: kind for kind in INPUTS if kind != "skin"} | {"color": "skin"}
-_known: dict[str, str] = {kind: recorded for recorded, kind in _SERVES.items()}
+_known: dict[str, str] = {kind: "color" if kind == "skin" else kind for kind in INPUTS}
+"""Kind -> what recordings call its sensors."""
 
 
 def inputs() -> tuple[str, ...]:
@@ -14,9 +14,9 @@ def inputs() -> tuple[str, ...]:
     return INPUTS + others
 
 
-def input_of(recorded: str) -> str | None:
-    """Which input a recording's sensor of a kind serves (see `SensorInfo`); None: none."""
-    return next((kind for kind, name in _known.items() if name == recorded), None)
+def inputs_of(recorded: str) -> tuple[str, ...]:
+    """Which inputs a recording's sensor of a kind serves (see `SensorInfo`)."""
+    return tuple(kind for kind, name in _known.items() if name == recorded)
 
 
 def add_kind(kind: str, recorded: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -14,14 +14,22 @@ from voodoo.errors import MeasurementError
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
-from voodoo.sensors.kinds import input_of, inputs
+from voodoo.sensors.kinds import inputs, inputs_of
 from voodoo.sensors.model import PLANAR_LASER, POINTS_SHARING, PixelNoise, RangeNoise, SensorModel
 from voodoo.sensors.skin.settings import SkinSettings
 
 Box: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Two opposite corners [m], the lower one first."""
+ByteImage: TypeAlias = npt.NDArray[np.uint8]
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
+WHOLE_BODY = ("depth", "points", "keypoints", "markers")
+"""Inputs that tell the whole body's pose, so that colour regions are used beside them only where somebody asks for it."""
+
+
+def default_inputs() -> tuple[str, ...]:
+    """What is used unless somebody says otherwise: all inputs but colour regions."""
+    return tuple(kind for kind in inputs() if kind != "color")
 
 
 @dataclass(frozen=True)
@@ -29,7 +37,7 @@ class FrontEndSettings:
     """What is used, and how much it is believed.
 
     Args:
-        use: kinds of inputs, by default all there are; measurements of other kinds are left out.
+        use: kinds of inputs, by default all there are but "color"; measurements of other kinds are left out.
         model: standard deviation to weight.
         depth_noise: of depth images and point clouds; the weight is that at the predicted range of the body. None:
             every point weighs 1, as in the papers (a time-of-flight point at 3 m).
@@ -45,13 +53,14 @@ class FrontEndSettings:
         skin: settings of the skin-colour cue.
         exclude: boxes (low, high), two corners [m] in the root frame: nobody is looked for in them, and nothing in them is the
             body's.
+        empty_scene: sensor -> pictures (H, W, 3) of what that camera sees when nobody is there, for colour regions.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
 
     Raises:
         MeasurementError: an unknown kind, no finite least confidence, or a box without corners or without inside.
     """
 
-    use: tuple[str, ...] = field(default_factory=inputs)
+    use: tuple[str, ...] = field(default_factory=default_inputs)
     model: SensorModel = field(default_factory=SensorModel)
     depth_noise: RangeNoise | None = None
     scan_noise: RangeNoise | None = PLANAR_LASER
@@ -67,6 +76,7 @@ class FrontEndSettings:
     depth_filter: DepthFilter | None = None
     skin: SkinSettings = field(default_factory=SkinSettings)
     exclude: tuple[Box, ...] = ()
+    empty_scene: Mapping[str, Sequence[ByteImage]] = field(default_factory=dict)
     ground_z: float | None = None
 
     def __post_init__(self) -> None:
@@ -80,20 +90,31 @@ class FrontEndSettings:
 
     @classmethod
     def of(cls, recording: Recording, *, use: Sequence[str] | None = None) -> FrontEndSettings:
-        """The defaults for a recording, with all inputs or those in `use`.
+        """The defaults for a recording, with the inputs in `use`.
 
-        The floor is known where the root frame is one of LEVEL_FRAMES.
+        Without `use` all inputs, colour regions only where nothing tells the whole body's pose (see WHOLE_BODY), and no skin
+        in pictures that are all there is. The floor is known where the root frame is one of LEVEL_FRAMES.
 
         Raises:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
         """
-        settings = cls() if use is None else cls(use=tuple(use))
-        has = {kind for sensor in recording.info().sensors if (kind := input_of(sensor.kind)) is not None}
+        has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+        settings = cls(use=inputs_for(recording) if use is None else tuple(use))
         if has and not has & set(settings.use):
             raise MeasurementError(
                 f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(settings.use)}"
             )
-        return replace(settings, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
+        scene = recording.empty_scene() if "color" in settings.use else {}
+        return replace(settings, empty_scene=scene, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
+
+
+def inputs_for(recording: Recording) -> tuple[str, ...]:
+    """The inputs by which a recording is tracked unless somebody says otherwise, see `FrontEndSettings.of`."""
+    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+    if has & set(WHOLE_BODY) or "color" not in has:
+        return default_inputs()
+    alone = has == {"skin", "color"}
+    return tuple(kind for kind in inputs() if not (alone and kind == "skin"))
 
 
 def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:

@@ -18,19 +18,19 @@ from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
-from voodoo.sensors.adapters import Memory, adapter_of
+from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
 from voodoo.sensors.adapters.drawing import Pictured
 from voodoo.visualization.body_drawing import draw_body
 from voodoo.visualization.canvas import OverlayCanvas, same_place
 from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, Picture, person_color, point
 from voodoo.visualization.people_drawing import draw_people
-from voodoo.visualization.sheet import contact_sheet, side_by_side
+from voodoo.visualization.sheet import contact_sheet, in_rows
 
 __all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
 
 _STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250), SEARCHING: (230, 190, 110)}
 _LOOK_AHEAD, _MOST_PANELS = 5, 4
-_TARGET_HEIGHT = 640
+_TARGET_HEIGHT, _TARGET_HEIGHT_OF_FOUR = 640, 480
 _TOP_SIZE, _TOP_METRES = 720, 6.0
 
 
@@ -56,6 +56,10 @@ class Overlay:
                 if item.sensor not in found and (own or not any(same_place(item, other) for other in found.values())):
                     found[item.sensor] = item
         self._panels = dict(sorted(found.items(), key=lambda pair: adapter_of(pair[1]).panel or 0)[:_MOST_PANELS])
+        # Four in a row would be a ribbon, unless they are upright.
+        four = len(self._panels) == 4 and all(i.camera.width > i.camera.height for i in self._panels.values())
+        self._columns = 2 if four else max(len(self._panels), 1)
+        self._height = _TARGET_HEIGHT_OF_FOUR if four else _TARGET_HEIGHT
 
     def draw(
         self,
@@ -66,7 +70,7 @@ class Overlay:
         index: int,
         front_end: FrontEnd | None = None,
     ) -> Picture:
-        """Draw one frame over the picture of each camera, side by side, else as seen from above.
+        """Draw one frame over the picture of each camera, side by side or two by two, else as seen from above.
 
         Args:
             recorded: the measurements.
@@ -82,7 +86,7 @@ class Overlay:
                 self._centre = x, y, z
             top = TopView(self._centre, _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
             pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, body, estimate, front_end))
-        picture = side_by_side(pictures)
+        picture = in_rows(pictures, columns=self._columns)
         caption(picture, self._when(index, estimate.stamp), estimate)
         return picture
 
@@ -102,7 +106,7 @@ class Overlay:
             draw_people(canvas.picture, estimate, bodies, canvas.view)
             canvas.finish()
             pictures.append(canvas.picture)
-        picture = side_by_side(pictures)
+        picture = in_rows(pictures, columns=self._columns)
         told = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
         write_parts(picture, [(self._when(index, estimate.stamp), INK), *told])
         return picture
@@ -111,7 +115,7 @@ class Overlay:
         """The picture of each camera."""
         current = {item.sensor: item for item in _pictured(recorded)}
         for sensor, first in self._panels.items():
-            scale = _scale(first)
+            scale = _scale(first, self._height)
             seen = self._background(current.get(sensor), first)
             resized = cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
             item = current.get(sensor, first)
@@ -154,7 +158,8 @@ def _drawn(
     draw_body(canvas.picture, body, estimate, canvas.view)
     memory = Memory() if front_end is None else front_end.memory
     for item in recorded.measurements:
-        adapter_of(item).draw(item, canvas, memory)
+        for adapter in adapters_of(item):
+            adapter.draw(item, canvas, memory)
     if front_end is not None:
         canvas.rays(front_end.rays, estimate)
     canvas.finish()
@@ -181,10 +186,10 @@ def write_parts(picture: Picture, parts: Sequence[tuple[str, Color]]) -> None:
         x += cv2.getTextSize(part, cv2.FONT_HERSHEY_DUPLEX, size, 1)[0][0] + round(28 * size)
 
 
-def _scale(item: Pictured) -> float:
+def _scale(item: Pictured, target: int) -> float:
     """Small pictures are enlarged by a whole number, large ones reduced to the same height."""
     height = item.camera.height
-    return float(-(-_TARGET_HEIGHT // height)) if height <= _TARGET_HEIGHT else _TARGET_HEIGHT / height
+    return float(-(-target // height)) if height <= target else target / height
 
 
 def _grid(view: TopView) -> Picture:

@@ -23,7 +23,7 @@ from voodoo.model.body import Body
 from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.search import nobody
-from voodoo.sensors.adapters import Memory, adapter_of
+from voodoo.sensors.adapters import Memory, adapters_of
 from voodoo.visualization.body_geometry import bands, limb_colours, limb_mesh
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.rerun_log import StepLog, entity
@@ -138,7 +138,8 @@ class Viewer:
         memory = Memory() if front_end is None else front_end.memory
         log = StepLog(self._rr, self._stream, estimate, body, _MOST_POINTS)
         for item in () if recorded is None else recorded.measurements:
-            adapter_of(item).log(item, log, memory)
+            for adapter in adapters_of(item):
+                adapter.log(item, log, memory)
         if front_end is not None:
             self._log_rays(front_end, estimate)
         self._log_plots(estimate, seconds)
@@ -165,7 +166,8 @@ class Viewer:
             # Pictures and points belong to nobody in particular.
             log = StepLog(rr, self._stream, nobody(estimate.stamp), Body.human(), _MOST_POINTS)
             for item in recorded.measurements:
-                adapter_of(item).log(item, log, Memory())
+                for adapter in adapters_of(item):
+                    adapter.log(item, log, Memory())
         there = {person.id for person in estimate if person.estimate.joints}
         for gone in self._people - there:
             self._clear(f"world/people/{gone}")

@@ -26,6 +26,19 @@ def side_by_side(pictures: Sequence[Picture]) -> Picture:
     return np.asarray(np.hstack(row), dtype=np.uint8)
 
 
+def in_rows(pictures: Sequence[Picture], *, columns: int) -> Picture:
+    """Pictures in rows of so many, all rows as wide as the first one."""
+    rows = [side_by_side(pictures[start : start + columns]) for start in range(0, len(pictures), columns)]
+    width = rows[0].shape[1]
+    fitted = [
+        row
+        if row.shape[1] == width
+        else cv2.resize(row, (width, round(row.shape[0] * width / row.shape[1])), interpolation=cv2.INTER_AREA)
+        for row in rows
+    ]
+    return np.asarray(np.vstack(fitted), dtype=np.uint8)
+
+
 def contact_sheet(pictures: Sequence[Picture], *, columns: int, width: int = 1600, gap: int = 6) -> Picture:
     """Pictures of one size side by side, row by row.
 

@@ -66,6 +66,11 @@ impl Sizes {
         self.open && self.rough
     }
 
+    /// The sizes were found with the pose: nobody told how large the body is.
+    pub fn found(&self) -> bool {
+        self.rough
+    }
+
     /// Limbs of one length whose lengths are refined; none where they are known.
     pub fn followed(&self) -> &[Pair] {
         &self.pairs

@@ -345,7 +345,8 @@ impl Tracker {
             None => assessor.forget_spread(&model.body, estimate),
             Some(time_scale) => {
                 let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
-                let found = Found { body, poses, correspondences, pairs: sizes.followed(), time_scale, config };
+                let (pairs, sizes_found) = (sizes.followed(), sizes.found());
+                let found = Found { body, poses, correspondences, pairs, sizes_found, time_scale, config };
                 assessor.report_spread(found, hypotheses.rivals(), |limb| sizes.girth_sigma(body, limb), estimate);
             }
         }

@@ -5,9 +5,6 @@ use nalgebra::Matrix6;
 use crate::body::Body;
 use crate::math::{Mat3, Vec3};
 
-/// How far a joint or site lies from its place in the limb: models and persons differ by that, metres.
-const SITE_SIGMA: f64 = 0.01;
-
 /// Covariances of a frame's pose. World frame, metres, radians; NaN before the first frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Covariances {
@@ -42,8 +39,9 @@ impl Covariances {
         self.girths.clear();
     }
 
-    /// Adds a limb: the covariance of its turn and shift, and that of its joint's turns about `axes`.
-    pub(super) fn push_limb(&mut self, limb: &Matrix6<f64>, joint: &Matrix6<f64>, axes: [Vec3; 3]) {
+    /// Adds a limb: the covariance of its turn and shift, how far joints may lie from their places in it, and the covariance of
+    /// its joint's turns about `axes`.
+    pub(super) fn push_limb(&mut self, limb: &Matrix6<f64>, site_sigma: f64, joint: &Matrix6<f64>, axes: [Vec3; 3]) {
         let place = |index: usize| (index + 3) % 6;
         let mut own = [[0.0; 6]; 6];
         for (i, row) in own.iter_mut().enumerate() {
@@ -51,7 +49,7 @@ impl Covariances {
                 *value = limb[(place(i), place(j))];
             }
         }
-        (0..3).for_each(|axis| own[axis][axis] += SITE_SIGMA * SITE_SIGMA);
+        (0..3).for_each(|axis| own[axis][axis] += site_sigma * site_sigma);
         self.limbs.push(own);
         let axes = Mat3::from_cols_array_2d(&axes.map(|axis| axis.to_array()));
         let turns = Mat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| joint[(i, j)])));
@@ -95,7 +93,7 @@ mod tests {
         let limb = Matrix6::from_fn(|i, j| ((i * 5 + j * 3) % 7) as f64 - 3.0);
         let limb = limb * limb.transpose() * 1e-4;
         let mut told = Covariances::default();
-        told.push_limb(&limb, &Matrix6::zeros(), [Vec3::X, Vec3::Y, Vec3::Z]);
+        told.push_limb(&limb, 0.02, &Matrix6::zeros(), [Vec3::X, Vec3::Y, Vec3::Z]);
         told.push_site(0, lever);
         // Differences of where the site goes when the limb turns or shifts a little.
         let h = 1e-6;
@@ -105,7 +103,7 @@ mod tests {
         };
         for i in 0..3 {
             for j in 0..3 {
-                let mut expected = if i == j { SITE_SIGMA * SITE_SIGMA } else { 0.0 };
+                let mut expected = if i == j { 0.02 * 0.02 } else { 0.0 };
                 for a in 0..6 {
                     for b in 0..6 {
                         expected += column(a)[i] * limb[(a, b)] * column(b)[j];

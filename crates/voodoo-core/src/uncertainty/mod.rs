@@ -18,7 +18,7 @@ use crate::math::{Pose, Vec3};
 use crate::sizes::girth::ALIKE;
 use crate::solver::{ChainSolver, LENGTH_INFORMATION, Lengths, SITE_SCALE, Spread};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Sites, Surface, Term};
+use crate::terms::{Contour, Regions, Sites, Surface, Term};
 
 /// So many surface points a metre of limb err independently at most.
 const PATCHES_PER_METRE: f64 = 50.0;
@@ -27,7 +27,11 @@ const UNPROVEN: f64 = 0.01;
 /// Unexpected motion of a joint in 1/30 s, as a share of what its `motion` allows.
 const USUAL_MOTION: f64 = 0.35;
 /// Standard deviation of an unknown at most: radians of a turn, metres of the root's place.
-const UNKNOWN: f64 = 0.5;
+const MOST_UNSURE: f64 = 0.5;
+
+/// How far a joint or site lies from its place in the limb, metres: models and persons differ by that. Of a body that was set,
+/// and of one that was found, whose sizes nobody told.
+const SITE_SIGMA: [f64; 2] = [0.01, 0.015];
 
 /// What is known of a pose, from frame to frame.
 #[derive(Debug, Default)]
@@ -55,6 +59,8 @@ pub struct Found<'a> {
     pub correspondences: &'a Correspondences,
     /// Limbs of one length that are refined.
     pub pairs: &'a [Pair],
+    /// The sizes were found as well as the pose.
+    pub sizes_found: bool,
     /// Seconds since the last frame, as multiples of 1/30 s.
     pub time_scale: f64,
     /// Parameters.
@@ -88,7 +94,8 @@ impl Uncertainty {
                 .parent
                 .as_ref()
                 .map_or([Vec3::X, Vec3::Y, Vec3::Z], |(parent, joint)| joint_axes(joint, &found.poses[*parent]).0);
-            told.push_limb(&spread.of_limb(system, limb, pose.translation), &own, axes);
+            let site_sigma = SITE_SIGMA[usize::from(found.sizes_found)];
+            told.push_limb(&spread.of_limb(system, limb, pose.translation), site_sigma, &own, axes);
         }
         for site in found.body.sites() {
             told.push_site(site.limb, found.poses[site.limb].rotation * site.position);
@@ -119,7 +126,7 @@ impl Uncertainty {
         let mut expect = |sigma: f64| {
             let moved = (sigma * time_scale).powi(2);
             let before = variance.get(information.len()).copied().unwrap_or(moved);
-            information.push(1.0 / (before + moved).min(UNKNOWN * UNKNOWN));
+            information.push(1.0 / (before + moved).min(MOST_UNSURE * MOST_UNSURE));
         };
         for limb in body.limbs() {
             match &limb.parent {
@@ -144,13 +151,15 @@ impl Uncertainty {
         let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
         let sites = Sites { correspondences, information, scale: SITE_SCALE, biased: true };
         let contour = Contour { pairs: &correspondences.contour, information: edges, scale: 2.0 * scale };
+        let regions = Regions { pairs: &correspondences.regions };
         self.normal.clear(poses.len());
-        for term in [&surface as &dyn Term, &sites, &contour] {
+        for term in [&surface as &dyn Term, &sites, &contour, &regions] {
             term.add(body, poses, &mut self.normal);
         }
         for (limb, block) in self.normal.limbs.iter_mut().enumerate() {
             let most = PATCHES_PER_METRE * body.limbs()[limb].shape.length();
-            let alike = most / (most + correspondences.measured_weight(limb));
+            let lines = correspondences.regions.iter().filter(|pair| pair.limb == limb).count();
+            let alike = most / (most + correspondences.measured_weight(limb) + lines as f64);
             block.h *= if proven(limb) { alike } else { UNPROVEN * alike };
         }
     }
@@ -176,8 +185,16 @@ mod tests {
             (0..frames)
                 .map(|frame| {
                     let correspondences = fit.correspondences();
-                    let (body, config) = (&model.body, &config);
-                    let found = Found { body, poses: &poses, correspondences, pairs: &pairs, time_scale: 1.0, config };
+                    let (body, config, sizes_found) = (&model.body, &config, false);
+                    let found = Found {
+                        body,
+                        poses: &poses,
+                        correspondences,
+                        pairs: &pairs,
+                        sizes_found,
+                        time_scale: 1.0,
+                        config,
+                    };
                     uncertainty.tell(found, |limb| proven(frame, limb), &mut covariances);
                     let trace = |site: &crate::math::Mat3| site.col(0)[0] + site.col(1)[1] + site.col(2)[2];
                     (covariances.clone(), covariances.sites.iter().map(trace).collect())

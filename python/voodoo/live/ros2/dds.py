@@ -155,6 +155,10 @@ class Subscription:
         """Messages that came, as they were sent."""
         return [sample.data_as_sent for sample in self._reader.take(N=100) if hasattr(sample, "data_as_sent")]
 
+    def lost(self) -> int:
+        """How many messages the network has lost since the last time."""
+        return int(self._reader.get_sample_lost_status().total_count_change)
+
     @property
     def publishers(self) -> int:
         """How many publish on it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,11 +11,11 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from rosbags.typesys import Stores, get_typestore
 
 from voodoo.errors import RecordingError, reading
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Fault, Faults, kind_of
+from voodoo.live.ros2.types import STORE
 from voodoo.live.source import Arrival
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
@@ -47,8 +48,6 @@ _JUMP_S = 1.0
 _TF_PATIENCE_S = 0.05
 ROOT_PATIENCE_S = 1.0
 """How long the first frame waits for a chain of transforms to one of STANDING."""
-
-_STORE = get_typestore(Stores.ROS2_HUMBLE)
 
 
 @dataclass
@@ -92,11 +91,14 @@ class RosFeed:
         self._topics, self._faults, self._clock = tuple(topics), faults, clock
         self._scale, self._pose = metres_per_unit, sensor_pose
         self._tree = TransformTree("tf", max_age=tf_max_age)
+        self._lock = threading.Lock()  # transforms come in one thread and are asked for in another
         self._newest = -math.inf
         self._root = root_frame if sensor_pose is None else sensor_pose[0]
         self._since: float | None = None
         self._cameras: dict[str, _Calibrated] = {}
         self.expects_transforms = True
+        for kind in (*MEASURED, CAMERA_INFO, TF):
+            STORE.get_msgdef(kind)  # else the first message of a type takes tens of milliseconds
 
     @property
     def root_frame(self) -> str:
@@ -113,7 +115,8 @@ class RosFeed:
         Raises:
             RecordingError: no chain of transforms, or none near that time.
         """
-        return self._tree.lookup(self.root_frame, frame, stamp)
+        with self._lock:
+            return self._tree.lookup(self.root_frame, frame, stamp)
 
     def take(self, topic: str, kind: str, raw: bytes) -> list[Arrival]:
         """Take up a message.
@@ -125,7 +128,7 @@ class RosFeed:
         """
         try:
             with reading(topic, f"a {kind} message"):
-                message = _STORE.deserialize_cdr(raw, kind)
+                message = STORE.deserialize_cdr(raw, kind)
         except RecordingError as error:
             self._refuse(topic, error, "unreadable message")
             return []
@@ -136,7 +139,8 @@ class RosFeed:
         now = self._clock.now()
         try:
             if kind == TF:
-                self._take_transforms(message, static=topic.endswith("tf_static"))
+                with self._lock:
+                    self._take_transforms(message, static=topic.endswith("tf_static"))
             elif kind == CAMERA_INFO:
                 self._take_calibration(topic, message)
             elif topic in self._topics and kind in MEASURED and self._knows_root(topic, message, now):
@@ -197,7 +201,10 @@ class RosFeed:
         )
 
     def _is_ready(self, frame: str, stamp: float) -> bool:
-        return self._pose is not None or self.root_frame == frame or self._tree.covers(self.root_frame, frame, stamp)
+        if self._pose is not None or self.root_frame == frame:
+            return True
+        with self._lock:
+            return self._tree.covers(self.root_frame, frame, stamp)
 
     def _knows_root(self, topic: str, message: Message, now: float) -> bool:
         """Choose the root frame, if that can be done by now; before, nothing is measured."""
@@ -225,7 +232,8 @@ class RosFeed:
         if self._pose is not None and topic == self._topics[0]:
             return self._pose[1]
         try:
-            return self._tree.lookup(self.root_frame, frame, stamp)
+            with self._lock:
+                return self._tree.lookup(self.root_frame, frame, stamp)
         except RecordingError as error:
             raise Fault(kind_of(error, "transform missing"), f"{topic}, stamp {stamp:.6f}: {error}") from error
 
@@ -294,4 +302,4 @@ def _whole(message: Message) -> Iterator[None]:
 
 def _one(item: Message) -> Message:
     """A TFMessage of one transform: a bad one costs no other."""
-    return _STORE.types[TF](transforms=[item])
+    return STORE.types[TF](transforms=[item])

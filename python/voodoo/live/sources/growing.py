@@ -28,15 +28,24 @@ class GrowingSource(Source):
     """New images in depth/ and rgb/ of a folder, see `voodoo.recordings.folder.FolderRecording`; what lay there before is left.
 
     Args:
-        path: the folder, with calibration.toml; it may come later.
+        path: the folder; it may come later.
+        calibration: None: calibration.toml in the folder.
         rate: images per second where names are numbers of images; None: 30.
         sleep: waits for so many seconds.
     """
 
-    def __init__(self, path: Path, *, rate: float | None = None, sleep: Callable[[float], None] = time.sleep) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        calibration: Path | None = None,
+        rate: float | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         """Nothing is looked at yet."""
         self.name, self._path = path.resolve().name, path
         self._rate, self._sleep = rate, sleep
+        self._file = path / "calibration.toml" if calibration is None else calibration
         self._names: dict[str, set[str]] = {}
         self._changed: dict[str, int] = {}
         self._waiting: list[tuple[str, Path, float]] = []
@@ -50,9 +59,9 @@ class GrowingSource(Source):
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
         self._clock, self._faults = clock, faults
-        if not (self._path / "calibration.toml").is_file():
-            raise SourceGone(f"{self._path}: expected a folder with calibration.toml, found none yet")
-        self._calibration = read_calibration(self._path / "calibration.toml")
+        if not (self._path.is_dir() and self._file.is_file()):
+            raise SourceGone(f"{self._path}: expected a folder and {self._file.name}, found none yet")
+        self._calibration = read_calibration(self._file)
         if not self._names:
             # What comes while the source is gone is looked at when it is there again.
             self._names = {kind: set(self._listed(kind)) for kind in _SUFFIXES}

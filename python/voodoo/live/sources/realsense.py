@@ -19,7 +19,6 @@ from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.recordings.calibration import read_calibration
 
-DEPTH, COLOR = "realsense/depth", "realsense/color"
 _SIZE, _RATE = (640, 480), 30
 """What is asked for where the camera has it."""
 _WAITING = 4
@@ -60,6 +59,7 @@ class RealSenseSource(Source):
         self.name = "realsense" if serial is None else f"realsense:{serial}"
         self._serial, self._size, self._rate, self._wants_color = serial, size, rate, color
         self._root, self._root_from_depth = "camera_depth_optical_frame", np.eye(4)
+        self.placed = calibration is not None
         if calibration is not None:
             place = read_calibration(calibration)
             self._root, self._root_from_depth = place.root_frame, place.depth.root_from_sensor
@@ -137,17 +137,17 @@ class RealSenseSource(Source):
         return min(profiles, key=differs, default=None)
 
     def _depth_stream(self, profile: Any) -> Callable[[Any], Arrival]:  # noqa: ANN401
-        camera = camera_of(profile.get_intrinsics(), self.name)
+        camera, sensor = camera_of(profile.get_intrinsics(), self.name), f"{self.name}/depth"
 
         def take(frame: Any) -> Arrival:  # noqa: ANN401
             stamp, image = frame.get_timestamp() * 1e-3, np.array(frame.get_data(), dtype=np.uint16)
-            item = DepthImage(DEPTH, stamp, image, self._scale, camera, self._root_from_depth)
-            return Arrival(DEPTH, "depth", stamp, lambda: item, drives=True)
+            item = DepthImage(sensor, stamp, image, self._scale, camera, self._root_from_depth)
+            return Arrival(sensor, "depth", stamp, lambda: item, drives=True)
 
         return take
 
     def _color_stream(self, profile: Any) -> Callable[[Any], Arrival]:  # noqa: ANN401
-        camera = camera_of(profile.get_intrinsics(), self.name)
+        camera, sensor = camera_of(profile.get_intrinsics(), self.name), f"{self.name}/color"
         swapped = profile.format() == self._rs.format.rgb8
         root_from_color = self._root_from_depth @ _pose(profile.get_extrinsics_to(self._depth_profile))
 
@@ -156,8 +156,8 @@ class RealSenseSource(Source):
             image: npt.NDArray[np.uint8] = np.array(frame.get_data(), dtype=np.uint8)
             if swapped:
                 image = np.ascontiguousarray(image[:, :, ::-1])
-            item = ColorImage(COLOR, stamp, lambda: image, camera, root_from_color)
-            return Arrival(COLOR, "color", stamp, lambda: item)
+            item = ColorImage(sensor, stamp, lambda: image, camera, root_from_color)
+            return Arrival(sensor, "color", stamp, lambda: item)
 
         return take
 

@@ -124,6 +124,9 @@ class Ros2Source(Source):
         for subscription in sorted(self._subscriptions.values(), key=lambda one: one.kind in MEASURED):
             for raw in subscription.take():
                 arrivals += self._feed.take(subscription.topic, subscription.kind, raw)
+        lost = self._subscriptions[self._topics[0]].lost()
+        if lost:
+            self._faults.add("lost on the way", f"{self._topics[0]}: messages did not arrive", self._clock.now(), lost)
         if not arrivals:
             self._watch()
         return arrivals

@@ -8,6 +8,7 @@ from typing import Any
 
 from voodoo.errors import VoodooError
 from voodoo.live.source import Source
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 
 REALSENSE, ROS2, GROW = "realsense", "ros2", "grow"
@@ -30,7 +31,8 @@ def source_of(
         loop: of a recording: begin again at its end.
         root_frame: of a recording or of ROS 2, instead of its own.
         options: of the recording's loader.
-        calibration: of a camera: a calibration.toml that says where it is; its `root_frame` and `root_from_sensor` are used.
+        calibration: of a camera or a topic: a calibration.toml that says where it is; its `root_frame` and `root_from_sensor` are
+            used, of a folder all of it.
 
     Raises:
         VoodooError: no such recording, or an option out of range.
@@ -47,12 +49,16 @@ def source_of(
     if kind == GROW and colon:
         from voodoo.live.sources.growing import GrowingSource
 
-        return GrowingSource(Path(rest))
+        return GrowingSource(Path(rest), calibration=calibration)
     from voodoo.live.sources.played import PlayedSource
 
+    if calibration is not None:
+        raise VoodooError(f"{word}: expected no calibration, a recording brings its own, found {calibration}")
     if not 0.0 < rate < 1e6:
         raise VoodooError(f"rate: expected a number above 0, found {rate}")
     chosen = dict(options or {})
     if root_frame is not None:
         chosen["root_frame"] = root_frame
-    return PlayedSource(open_recording(word, bare=True, **chosen), rate=rate, loop=loop)
+    left_out = LeftOut()
+    recording = open_recording(word, bare=True, left_out=left_out, **chosen)
+    return PlayedSource(recording, rate=rate, loop=loop, left_out=left_out)

@@ -1,18 +1,39 @@
 """Adapters: all that front end, overlay and viewer know of a sensor.
 
-One adapter a file; `register` makes a new one known, see examples/uwb_tag.py.
+One adapter a file; `register` makes a new one known, see examples/uwb_tag.py. A measurement that serves several inputs has an
+adapter for each.
 """
 
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.color import ColorAdapter
 from voodoo.sensors.adapters.depth import DepthAdapter
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.adapters.keypoints import KeypointsAdapter
 from voodoo.sensors.adapters.markers import MarkersAdapter
 from voodoo.sensors.adapters.points import PointsAdapter, ScanAdapter
-from voodoo.sensors.adapters.registry import adapter_of, all_adapters, register, unregister
+from voodoo.sensors.adapters.registry import adapter_of, adapters_of, all_adapters, register, unregister
 from voodoo.sensors.adapters.skin import SkinAdapter
 
-for _adapter in (DepthAdapter(), PointsAdapter(), ScanAdapter(), KeypointsAdapter(), SkinAdapter(), MarkersAdapter()):
+for _adapter in (
+    DepthAdapter(),
+    PointsAdapter(),
+    ScanAdapter(),
+    KeypointsAdapter(),
+    SkinAdapter(),
+    ColorAdapter(),
+    MarkersAdapter(),
+):
     register(_adapter)
 
-__all__ = ["Adapter", "Canvas", "Context", "Log", "Memory", "adapter_of", "all_adapters", "register", "unregister"]
+__all__ = [
+    "Adapter",
+    "Canvas",
+    "Context",
+    "Log",
+    "Memory",
+    "adapter_of",
+    "adapters_of",
+    "all_adapters",
+    "register",
+    "unregister",
+]

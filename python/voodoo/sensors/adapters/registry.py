@@ -1,4 +1,4 @@
-"""The adapters that are known: one for each kind of measurement."""
+"""The adapters that are known: one for each kind of input, which may be several for a measurement."""
 
 from __future__ import annotations
 
@@ -8,29 +8,28 @@ from voodoo.errors import MeasurementError
 from voodoo.sensors.adapters.base import Adapter
 from voodoo.sensors.kinds import add_kind, remove_kind
 
-_adapters: dict[type, Adapter[Any]] = {}
+_adapters: dict[str, Adapter[Any]] = {}
 
 
 def register(adapter: Adapter[Any]) -> None:
     """Make a sensor known to front ends, overlays and viewers.
 
     Raises:
-        MeasurementError: its kind or its measurement has an adapter already.
+        MeasurementError: its kind has an adapter already.
     """
-    for known in _adapters.values():
-        if adapter.kind == known.kind or adapter.measurement is known.measurement:
-            raise MeasurementError(
-                f"adapter {adapter.kind!r} for {adapter.measurement.__name__}: expected a new kind and measurement, found "
-                f"{known.kind!r} for {known.measurement.__name__}"
-            )
-    _adapters[adapter.measurement] = adapter
+    known = _adapters.get(adapter.kind)
+    if known is not None:
+        raise MeasurementError(
+            f"adapter {adapter.kind!r} for {adapter.measurement.__name__}: expected a new kind, found "
+            f"{known.kind!r} for {known.measurement.__name__}"
+        )
+    _adapters[adapter.kind] = adapter
     add_kind(adapter.kind, adapter.recorded_as or adapter.kind)
 
 
 def unregister(kind: str) -> None:
     """Forget an adapter; nothing happens if there is none."""
-    for measurement in [known.measurement for known in _adapters.values() if known.kind == kind]:
-        del _adapters[measurement]
+    _adapters.pop(kind, None)
     remove_kind(kind)
 
 
@@ -39,14 +38,24 @@ def all_adapters() -> tuple[Adapter[Any], ...]:
     return tuple(_adapters.values())
 
 
-def adapter_of(item: object) -> Adapter[Any]:
-    """The adapter of a measurement, or of the nearest class it inherits from.
+def adapters_of(item: object) -> tuple[Adapter[Any], ...]:
+    """The adapters of a measurement, or of the nearest class it inherits from, in the order they were registered.
 
     Raises:
         MeasurementError: there is none.
     """
     for known in type(item).__mro__:
-        if known in _adapters:
-            return _adapters[known]
-    names = ", ".join(measurement.__name__ for measurement in _adapters)
+        found = tuple(adapter for adapter in _adapters.values() if adapter.measurement is known)
+        if found:
+            return found
+    names = ", ".join(dict.fromkeys(adapter.measurement.__name__ for adapter in _adapters.values()))
     raise MeasurementError(f"measurement: expected one of {names}, found {type(item).__name__}; see adapters.register")
+
+
+def adapter_of(item: object) -> Adapter[Any]:
+    """The first adapter of a measurement: what it looks like is the same for all of them.
+
+    Raises:
+        MeasurementError: there is none.
+    """
+    return adapters_of(item)[0]

@@ -1,0 +1,183 @@
+"""Handing recordings to Dask, and collecting what becomes of them."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import logging
+import queue
+import tempfile
+import threading
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from voodoo.batch.storage import Store, named
+from voodoo.batch.summary import DONE, Row, read_table, write_table
+from voodoo.batch.task import Job, Settings, do, failed
+from voodoo.errors import VoodooError
+
+SUMMARY, SETTINGS = "summary.csv", "settings.json"
+_EVERY_S = 2.0
+"""The table of summaries is written anew at most so often [s]."""
+_AHEAD = 4
+"""So many tasks a worker are known to the scheduler: a million at once would fill its memory."""
+_CONNECT_S, _LOOK_S = 30, 0.3
+
+
+class Batch:
+    """A folder of results and the recordings it is about.
+
+    Args:
+        sources: see voodoo.batch.storage.find_sources.
+        out: path or URL of the folder; what an earlier run of the same settings did there is kept.
+        settings: of all recordings.
+
+    Attributes:
+        rows: of the recordings that are done or failed, by name.
+        jobs: what is left to do: recordings that were not done, and those that failed.
+
+    Raises:
+        VoodooError: the folder cannot be used, or holds results of other settings.
+    """
+
+    def __init__(self, sources: Sequence[str], out: str, settings: Settings) -> None:
+        """See what is done."""
+        self._store = Store(out)
+        self._check_settings(settings)
+        text = self._store.read(SUMMARY)
+        known = {} if text is None else read_table(text, f"{out}/{SUMMARY}")
+        tables = self._store.recordings()
+        self.rows = {name: row for name, row in known.items() if row.status != DONE or name in tables}
+        pairs = named(sources, {name: row.source for name, row in known.items()})
+        done = {name for name, row in self.rows.items() if row.status == DONE}
+        self.jobs = [Job(name, source, out, settings) for name, source in pairs if name not in done]
+        self._written = -_EVERY_S
+
+    def _check_settings(self, settings: Settings) -> None:
+        told = settings.told()
+        before = self._store.read(SETTINGS)
+        if before is None:
+            self._store.write(SETTINGS, (json.dumps(told, indent=1) + "\n").encode())
+            return
+        try:
+            found = json.loads(before)
+        except ValueError:
+            found = None
+        if not isinstance(found, dict):
+            raise VoodooError(f"{self._store.url}/{SETTINGS}: expected the settings of a batch, found another file")
+        unlike = [f"{name} {found.get(name)!r}" for name, value in told.items() if found.get(name) != value]
+        if unlike:
+            raise VoodooError(
+                f"{self._store.url}: expected results of the same settings, found some of {', '.join(unlike)}; "
+                "give another --out, or the same settings"
+            )
+
+    def take(self, row: Row) -> None:
+        """Keep the row of a recording; the table is written now and then."""
+        self.rows[row.recording] = row
+        if time.monotonic() - self._written >= _EVERY_S:
+            self.save()
+
+    def save(self) -> None:
+        """Write the table of summaries."""
+        self._store.write(SUMMARY, write_table(self.rows.values()).encode())
+        self._written = time.monotonic()
+
+
+def run(
+    jobs: Sequence[Job], *, workers: int, scheduler: str | None = None, stop: threading.Event | None = None
+) -> Iterator[Row]:
+    """Do the jobs, one task each; their rows as they come, in any order.
+
+    A task whose worker dies is done once more, by another one; if that one dies, too, it has failed. What is done is taken off
+    the workers at once, so that nothing else is lost with them.
+
+    Args:
+        jobs: what is to be done.
+        workers: processes on this machine; not used with a scheduler.
+        scheduler: address of a Dask scheduler that runs already.
+        stop: once it is set, nothing more is begun, and what was begun is given up.
+
+    Raises:
+        VoodooError: Dask is not installed, the scheduler does not answer, or it has no worker.
+    """
+    distributed = _distributed()
+    with _client(distributed, workers, scheduler) as client:
+        threads = sum(client.nthreads().values()) or workers
+        waiting = iter(jobs)
+        running: dict[Any, Job] = {}
+        finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        prefix = f"voodoo-{time.time_ns():x}"
+
+        def submit(some: Iterable[Job]) -> None:
+            for job in some:
+                task = client.submit(do, job, key=f"{prefix}-{job.name}", pure=False)
+                running[task] = job
+                task.add_done_callback(finished.put)
+
+        submit(itertools.islice(waiting, _AHEAD * threads))
+        while running and not (stop is not None and stop.is_set()):
+            with contextlib.suppress(queue.Empty):
+                task = finished.get(timeout=_LOOK_S)
+                job = running.pop(task)
+                yield _row(task, job)
+                task.release()
+                submit(itertools.islice(waiting, 1))
+        client.cancel(list(running))
+
+
+def _row(task: Any, job: Job) -> Row:  # noqa: ANN401 - Dask has no types
+    try:
+        found = task.result()
+    except Exception as error:  # of the engine: a task itself never raises
+        if type(error).__name__ == "KilledWorker":
+            return failed(job, "the worker died, and another one that was given it again")
+        return failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}")
+    return found if isinstance(found, Row) else failed(job, f"expected a row, found {type(found).__name__}")
+
+
+@contextmanager
+def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[Any]:  # noqa: ANN401 - Dask has no types
+    import dask
+
+    with ExitStack() as stack:
+        if scheduler is None:
+            # A worker holds no task but the one it does, and a task is tried twice.
+            options = {"distributed.scheduler.allowed-failures": 1, "distributed.scheduler.worker-saturation": 1.0}
+            stack.enter_context(dask.config.set(options))
+            scratch = stack.enter_context(
+                tempfile.TemporaryDirectory(prefix="voodoo-dask-", ignore_cleanup_errors=True)
+            )
+            place: Any = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                    local_directory=scratch,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+        else:
+            place = scheduler
+        try:
+            client = stack.enter_context(distributed.Client(place, timeout=_CONNECT_S))
+        except (OSError, TimeoutError, ValueError) as error:
+            raise VoodooError(f"--scheduler: expected a Dask scheduler at {scheduler}, found: {error}") from error
+        try:
+            client.wait_for_workers(1, timeout=_CONNECT_S)
+        except TimeoutError as error:
+            raise VoodooError(f"--scheduler: expected a worker at {scheduler}, found none in {_CONNECT_S} s") from error
+        yield client
+
+
+def _distributed() -> Any:  # noqa: ANN401 - Dask has no types
+    try:
+        import distributed
+    except ImportError:
+        raise VoodooError("many recordings are run by Dask: pip install 'voodoo-tracker[batch]'") from None
+    return distributed

@@ -1,0 +1,220 @@
+"""Where recordings come from and results go to: fsspec URLs, of which a path is one."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+from voodoo.errors import RecordingError, VoodooError, reading
+from voodoo.evaluation.search import find_recordings
+
+_FILES = (".bag", ".mcap", ".db3", ".zip", ".trc", ".c3d")
+_OF_A_FOLDER = re.compile(r"(metadata\.yaml|Calib[^/]*\.toml|calibration\.toml|bag/[^/]*)$")
+"""What a folder that is a recording holds."""
+_TABLE = "part-0.parquet"
+
+
+def filesystem(url: str) -> tuple[Any, str]:
+    """The file system of a URL or path, and the path in it.
+
+    Raises:
+        VoodooError: fsspec, or what it needs for this protocol, is not installed, or the address cannot be.
+    """
+    try:
+        from fsspec.core import url_to_fs
+
+        found: tuple[Any, str] = url_to_fs(url)
+    except ImportError as error:
+        raise VoodooError(
+            f"{url}: fsspec and the library of its protocol are needed: pip install 'voodoo-tracker[batch]' ({error})"
+        ) from None
+    except Exception as error:
+        raise VoodooError(f"{url}: expected a path or a URL that fsspec knows, found: {error}") from error
+    return found
+
+
+def is_local(word: str) -> bool:
+    """Whether this is a path, not a URL of another machine or archive."""
+    return "://" not in word or word.startswith(("file://", "local://"))
+
+
+def local_path(word: str) -> Path:
+    """The path of what `is_local`."""
+    return Path(unquote(word.split("://", 1)[1]) if "://" in word else word).expanduser()
+
+
+def find_sources(words: Sequence[str], *, only: Sequence[str] = ()) -> list[str]:
+    """Recordings at paths and URLs; folders that are none are searched.
+
+    Args:
+        words: paths, URLs, or patterns of them (`s3://bucket/*.mcap`).
+        only: see voodoo.evaluation.search.find_recordings.
+
+    Raises:
+        VoodooError: nothing there, or a file system that cannot be reached.
+    """
+    found: list[str] = []
+    for word in words:
+        if is_local(word):
+            found += [str(path.absolute()) for path in find_recordings([local_path(word)], only=only)]
+        else:
+            found += _remote(word, only)
+    return list(dict.fromkeys(found))
+
+
+def _remote(url: str, only: Sequence[str]) -> list[str]:
+    from fnmatch import fnmatch
+
+    files, path = filesystem(url)
+    with reading(url, "recordings"):
+        if "*" in path:
+            tops = sorted(files.glob(path))
+        else:
+            tops = [path.rstrip("/")]
+        found: list[str] = []
+        for top in tops:
+            found += _in_folder(files, top) if files.isdir(top) else [top] if files.exists(top) else []
+    kept = [one for one in found if not only or any(fnmatch(one.rsplit("/", 1)[-1], pattern) for pattern in only)]
+    if not kept:
+        raise RecordingError(f"{url}: expected a recording or a folder of recordings, found none")
+    return [str(files.unstrip_protocol(one)) for one in kept]
+
+
+def _in_folder(files: Any, folder: str) -> list[str]:  # noqa: ANN401 - fsspec has no types
+    """The recordings in a folder, or the folder itself if it is one."""
+    names = [str(name)[len(folder) :].lstrip("/") for name in files.find(folder)]
+    if any(_OF_A_FOLDER.fullmatch(name) for name in names):
+        return [folder]
+    inside: list[str] = []
+    for name in sorted({name.split("/", 1)[0] for name in names}):
+        whole = f"{folder}/{name}"
+        if files.isdir(whole):
+            inside += _in_folder(files, whole)
+        elif name.endswith((*_FILES, "_depth.mat")):
+            inside.append(whole)
+    return inside
+
+
+@contextmanager
+def on_disk(source: str) -> Iterator[Path]:
+    """The recording as a path: itself, or a copy that is there until the end of the block.
+
+    Raises:
+        RecordingError: it cannot be fetched.
+    """
+    if is_local(source):
+        yield local_path(source)
+        return
+    with tempfile.TemporaryDirectory(prefix="voodoo-") as folder:
+        files, path = filesystem(source)
+        target = Path(folder) / path.rstrip("/").rsplit("/", 1)[-1]
+        with reading(source, "a recording that can be fetched"):
+            files.get(path.rstrip("/"), str(target), recursive=bool(files.isdir(path)))
+        yield target
+
+
+def name_of(source: str) -> str:
+    """A recording's name: that of its file or folder, without suffix."""
+    name = source.rstrip("/").rsplit("/", 1)[-1]
+    return re.sub(r"(_depth\.mat|\.mcap|\.db3|\.bag|\.zip|\.trc|\.c3d)$", "", name) or "recording"
+
+
+def named(sources: Sequence[str], taken: dict[str, str]) -> list[tuple[str, str]]:
+    """(name, source) of each; a name that stands for another source gets a number.
+
+    Args:
+        sources: where they are.
+        taken: name -> source of earlier runs; what was named there keeps its name.
+    """
+    known = {source: name for name, source in taken.items() if source}
+    used = dict(taken)
+    pairs = []
+    for source in sources:
+        name = known.get(source)
+        if name is None:
+            base, number = name_of(source), 1
+            name = base
+            while name in used:
+                number += 1
+                name = f"{base}~{number}"
+        used[name] = source
+        pairs.append((name, source))
+    return pairs
+
+
+@dataclass(frozen=True)
+class Store:
+    """The folder that results go to.
+
+    Args:
+        url: path or URL.
+    """
+
+    url: str
+
+    @cached_property
+    def _at(self) -> tuple[Any, str]:
+        url = self.url if not is_local(self.url) else str(local_path(self.url).absolute())
+        files, path = filesystem(url)
+        return files, path.rstrip("/")
+
+    def read(self, name: str) -> str | None:
+        """The text of a file; None: it is not there.
+
+        Raises:
+            VoodooError: it cannot be read.
+        """
+        files, top = self._at
+        with reading(f"{self.url}/{name}", "a readable file", error=VoodooError):
+            return files.cat_file(f"{top}/{name}").decode("utf-8") if files.exists(f"{top}/{name}") else None
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file, which appears when it is complete.
+
+        Raises:
+            VoodooError: it cannot be written.
+        """
+        files, top = self._at
+        with reading(f"{self.url}/{name}", "a place that can be written to", error=VoodooError):
+            place = f"{top}/{name}"
+            files.makedirs(place.rsplit("/", 1)[0], exist_ok=True)
+            if not is_local(self.url):
+                files.pipe_file(place, content)  # an object appears as a whole
+                return
+            target = Path(place)
+            for left in target.parent.glob(f".{target.name}.*"):  # by a worker that died
+                with contextlib.suppress(OSError):
+                    left.unlink()
+            part = target.with_name(f".{target.name}.{os.getpid()}-{os.urandom(4).hex()}")
+            try:
+                part.write_bytes(content)
+                os.replace(part, target)  # noqa: PTH105 - the replacement must be atomic
+            finally:
+                part.unlink(missing_ok=True)
+
+    def place_of(self, recording: str) -> str:
+        """The name of a recording's table."""
+        return f"frames/recording={quote(recording, safe=' ~+,@()')}/{_TABLE}"
+
+    def opened(self, recording: str) -> Any | None:  # noqa: ANN401 - a file of fsspec
+        """A recording's table as a binary file; None: it is not there."""
+        files, top = self._at
+        place = f"{top}/{self.place_of(recording)}"
+        return files.open(place, "rb") if files.exists(place) else None
+
+    def recordings(self) -> set[str]:
+        """Names of those that have a folder of results."""
+        files, top = self._at
+        if not files.isdir(f"{top}/frames"):
+            return set()
+        folders = (str(name).rstrip("/").rsplit("/", 1)[-1] for name in files.ls(f"{top}/frames", detail=False))
+        return {unquote(name.removeprefix("recording=")) for name in folders if name.startswith("recording=")}

@@ -1,0 +1,101 @@
+"""One row a recording: how it went; and the table of all of them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from voodoo.errors import VoodooError
+
+DONE, FAILED = "done", "failed"
+
+
+@dataclass(frozen=True)
+class Row:
+    """How one recording went.
+
+    Args:
+        recording: its name in the data set.
+        frames: how many have a row; 0 if it failed.
+        seconds: wall-clock time it took, reading and writing included [s].
+        status: "done" or "failed".
+        error: why it failed, in one line; "" if it did not.
+        recorded_s: its duration [s].
+        persons: how many were found.
+        tracking_share: share of the rows with the status tracking or degraded.
+        joint_error_m: mean error of the twelve joints where there is a truth or a reference: see `voodoo eval` [m].
+        left_out: how many measurements could not be used.
+        source: where it was read from.
+    """
+
+    recording: str
+    frames: int = 0
+    seconds: float = math.nan
+    status: str = DONE
+    error: str = ""
+    recorded_s: float = math.nan
+    persons: int = 0
+    tracking_share: float = math.nan
+    joint_error_m: float = math.nan
+    left_out: int = 0
+    source: str = ""
+
+    def cells(self) -> list[str]:
+        """The row as text; what is not known is empty."""
+        return [_cell(getattr(self, field.name)) for field in fields(self)]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Row:
+        """The row of a mapping from field to text or number.
+
+        Raises:
+            ValueError, TypeError: fields are missing, or are none.
+        """
+        kinds: dict[str, type] = {
+            field.name: {"int": int, "float": float}.get(str(field.type), str) for field in fields(cls)
+        }
+        found: dict[str, Any] = {}
+        for name, kind in kinds.items():
+            value = values.get(name)
+            if value is None or value == "":
+                value = math.nan if kind is float else 0 if kind is int else ""
+            found[name] = kind(value)
+        return cls(**found)
+
+
+COLUMNS = tuple(field.name for field in fields(Row))
+
+
+def write_table(rows: Iterable[Row]) -> str:
+    """summary.csv, in the order of the rows' names."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(row.cells() for row in sorted(rows, key=lambda row: row.recording))
+    return text.getvalue()
+
+
+def read_table(text: str, source: object) -> dict[str, Row]:
+    """The rows of a summary.csv by name.
+
+    Raises:
+        VoodooError: it is none.
+    """
+    try:
+        header, *rows = list(csv.reader(io.StringIO(text)))
+        found = [Row.of(dict(zip(header, row, strict=True))) for row in rows]
+    except (ValueError, TypeError, csv.Error) as error:
+        raise VoodooError(f"{source}: expected a summary.csv of voodoo batch, found another file: {error}") from error
+    if header[:5] != list(COLUMNS[:5]):
+        raise VoodooError(f"{source}: expected the columns {', '.join(COLUMNS[:5])}, found {', '.join(header[:5])}")
+    return {row.recording: row for row in found}
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.6f}"
+    return str(value)

@@ -1,0 +1,222 @@
+"""What a worker does: one recording, from its files to its table."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import cv2
+import numpy as np
+
+from voodoo.batch.storage import Store, on_disk
+from voodoo.batch.summary import DONE, FAILED, Row
+from voodoo.batch.table import columns_of, encode, note_of
+from voodoo.config import Config
+from voodoo.errors import RecordingError
+from voodoo.evaluation import metrics
+from voodoo.evaluation.evaluate import compare
+from voodoo.export.people import PeopleTrack
+from voodoo.export.track import Track
+from voodoo.model.body import Body
+from voodoo.names import HumanModel
+from voodoo.people import People, PeopleEstimate
+from voodoo.pipeline.inputs import pictures_alone
+from voodoo.pipeline.people import track_people
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import AUTO, start_tracker
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.loaders import open_recording
+from voodoo.recordings.recording import Recording
+from voodoo.sensors.settings import FrontEndSettings
+
+T = TypeVar("T")
+_TOGETHER = 500
+"""Frames whose estimates are held at a time."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How all recordings of a batch are tracked; see `voodoo track`.
+
+    Args:
+        use: kinds of inputs; None: what each recording is best tracked by.
+        init: "auto": look for somebody whatever start lies beside a recording; None: take that one.
+        model, loader: see start_tracker and open_recording.
+        people: 1: one person; a larger number: up to so many; None: any number.
+        strict: a damaged recording fails; else what cannot be used is left out.
+        config: the parameters that are not the defaults.
+        version: of voodoo.
+    """
+
+    use: tuple[str, ...] | None = None
+    init: str | None = None
+    model: str | None = None
+    loader: str | None = None
+    people: int | None = 1
+    strict: bool = False
+    config: Mapping[str, Any] | None = None
+    version: str = ""
+
+    def told(self) -> dict[str, Any]:
+        """As JSON has it."""
+        found = {**vars(self), "use": None if self.use is None else list(self.use)}
+        return {**found, "config": dict(self.config or {})}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One recording: its name, where it is, where its table goes, and how it is tracked."""
+
+    name: str
+    source: str
+    out: str
+    settings: Settings
+
+
+def do(job: Job) -> Row:
+    """Track a recording and write its table, unless that was done; never raises.
+
+    Raises:
+        Nothing: whatever goes wrong is in the row.
+    """
+    began = time.perf_counter()
+    _one_thread()
+    try:
+        done = row_of(job)
+        if done is not None:
+            return done
+        with on_disk(job.source) as path:
+            row, tracks = _track(job, path)
+            row = replace(row, seconds=time.perf_counter() - began)
+            note = {"row": dict(vars(row)), "settings": job.settings.told()}
+            Store(job.out).write(Store(job.out).place_of(job.name), encode(columns_of(tracks), note))
+            return row
+    except Exception as error:
+        # One recording of a thousand costs nothing but itself, whatever is wrong with it.
+        words = " ".join(str(error).split()) or "no further detail"
+        told = words if isinstance(error, (ValueError, OSError)) else f"{type(error).__name__}: {words}"
+        return failed(job, told, time.perf_counter() - began)
+
+
+def failed(job: Job, why: str, seconds: float = float("nan")) -> Row:
+    """The row of a recording that could not be tracked."""
+    return Row(job.name, status=FAILED, error=why, seconds=seconds, source=job.source)
+
+
+def row_of(job: Job) -> Row | None:
+    """The row in the table of a recording that was done before, from the same source and by the same settings; or None."""
+    file = Store(job.out).opened(job.name)
+    if file is None:
+        return None
+    with file:
+        note = note_of(file)
+    if note is None or note.get("settings") != job.settings.told():
+        return None
+    try:
+        row = Row.of(note["row"])
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return None
+    return row if row.source == job.source and row.status == DONE else None
+
+
+def _track(job: Job, path: Path) -> tuple[Row, Mapping[int, Track]]:
+    chosen = job.settings
+    left_out = None if chosen.strict else LeftOut()
+    options = {"loader": chosen.loader} | pictures_alone(path, chosen.loader, chosen.use)
+    recording = open_recording(path, left_out=left_out, bare=False, **options)
+    settings = FrontEndSettings.of(recording, use=chosen.use)
+    config = Config(**dict(chosen.config or {}))
+    error = float("nan")
+    tracks: Mapping[int, Track]
+    if chosen.people == 1:
+        tracks = _one_person(job, recording, settings, config, left_out)
+        error = _error(recording, tracks[1])
+    else:
+        tracks = _people(job, recording, settings, config)
+    words = [word for one in tracks.values() for word in one.status]
+    row = Row(
+        recording=job.name,
+        frames=len(words),
+        recorded_s=recording.info().duration,
+        persons=sum(bool(one.found.any()) for one in tracks.values()),
+        tracking_share=float(np.mean([word in ("tracking", "degraded") for word in words])) if words else float("nan"),
+        joint_error_m=error,
+        left_out=0 if left_out is None else len(left_out),
+        source=job.source,
+    )
+    return row, tracks
+
+
+def _one_person(
+    job: Job, recording: Recording, settings: FrontEndSettings, config: Config, left_out: LeftOut | None
+) -> Mapping[int, Track]:
+    model = cast(HumanModel | None, job.settings.model)
+    init = AUTO if job.settings.init == AUTO else None
+    tracker = start_tracker(recording, init=init, model=model, config=config, use=job.settings.use)
+    steps = track(recording, tracker, settings=settings, left_out=left_out)
+    parts = [Track.of(part, body=tracker.body) for part in _parts(step.estimate for step in steps)]
+    if not parts:
+        raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
+    return {1: joined(parts)}
+
+
+def _people(job: Job, recording: Recording, settings: FrontEndSettings, config: Config) -> Mapping[int, Track]:
+    body = None if job.settings.model is None else Body.human(model=cast(HumanModel, job.settings.model))
+    people = People(body, config=config, limit=job.settings.people)
+    bodies: dict[int, Body] = {}
+
+    def estimates() -> Iterator[PeopleEstimate]:
+        for step in track_people(recording, people, settings=settings):
+            bodies.update({person.id: people.body(person.id) for person in step.estimate})
+            yield step.estimate
+
+    found: dict[int, list[Track]] = {}
+    for part in _parts(estimates()):
+        for one, own in PeopleTrack.of(part, bodies=bodies).tracks.items():
+            found.setdefault(one, []).append(own)
+    return {one: joined(parts) for one, parts in sorted(found.items())}
+
+
+def _parts(items: Iterable[T]) -> Iterator[list[T]]:
+    """Lists of some hundred of them: the estimates of hours would fill the memory."""
+    stream = iter(items)
+    while part := list(itertools.islice(stream, _TOGETHER)):
+        yield part
+
+
+def joined(parts: Sequence[Track]) -> Track:
+    """The frames of several tracks of one body, one after the other, without the poses of the limbs, which no table has."""
+    first = next((part for part in parts if part.found.any()), parts[0])
+    return Track(
+        stamps=np.concatenate([part.stamps for part in parts]),
+        status=tuple(word for part in parts for word in part.status),
+        residual=np.concatenate([part.residual for part in parts]),
+        joint_names=first.joint_names,
+        joints=np.concatenate([part.joints for part in parts]),
+        limb_names=(),
+        world_from_limb=np.empty((sum(map(len, parts)), 0, 4, 4)),
+        angle_names=first.angle_names,
+        angles=np.concatenate([part.angles for part in parts]),
+        limb_status={
+            limb: tuple(itertools.chain.from_iterable(part.limb_status[limb] for part in parts))
+            for limb in first.limb_status
+        },
+    )
+
+
+def _error(recording: Recording, result: Track) -> float:
+    """Mean error of the twelve joints [m]: at lag 0 against exact truth, at the best lag against a reference; NaN without."""
+    if recording.reference is None:
+        return float("nan")
+    return metrics.mean_or_nan(compare(recording, result, at_best_lag=not recording.reference.exact))
+
+
+def _one_thread() -> None:
+    """The tasks are the parallelism."""
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
+    cv2.setNumThreads(1)

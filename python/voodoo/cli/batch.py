@@ -1,0 +1,133 @@
+"""`voodoo batch`."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from voodoo.cli.common import clear_errors, progressing, say, say_interrupted
+from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, PeopleOption, StrictOption, UseOption
+
+
+def batch_command(
+    recordings: Annotated[
+        list[str], typer.Argument(metavar="RECORDING...", help="Recordings, folders that hold some, or URLs of either.")
+    ],
+    out: Annotated[str, typer.Option(metavar="DIR", help="Folder or URL for results; what is done there is kept.")],
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine; by default one for each core.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler that runs already, tcp://HOST:PORT.")
+    ] = None,
+    init: Annotated[
+        str | None,
+        typer.Option(metavar="auto", help="auto: look for the person instead of taking the recordings' own starts."),
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
+    ] = None,
+    config: ConfigOption = None,
+    model: ModelOption = None,
+    use: UseOption = None,
+    people: PeopleOption = "1",
+    loader: LoaderOption = None,
+    strict: StrictOption = False,
+) -> None:
+    """Track many recordings, on this machine or on a cluster, one task each.
+
+    Writes DIR/frames/recording=NAME/, a Parquet data set with a row for every frame and person, and DIR/summary.csv, a row for
+    every recording: recording, frames, seconds, status (done, failed), error, and more. It needs
+    pip install 'voodoo-tracker[batch]'.
+
+    Run it again to go on: what is done is not done again, what failed is tried again. A recording that fails is a row that says
+    why, and ends the command with exit code 1. A worker that dies costs its task once more.
+
+    RECORDING and DIR may be URLs that fsspec knows (s3://, gs://, sftp://, with the library of the protocol). Whoever reaches
+    a Dask scheduler can run any code on its workers: it must be on a network that is trusted.
+
+    Examples
+
+    voodoo batch recordings/ --out results --workers 8
+
+    voodoo batch s3://lab/walks/ --out s3://lab/results --scheduler tcp://10.0.0.5:8786
+    """
+    from voodoo._core import __version__
+    from voodoo.batch.run import Batch, run
+    from voodoo.batch.storage import find_sources
+    from voodoo.batch.summary import DONE, FAILED
+    from voodoo.batch.task import Settings
+    from voodoo.cli.people import limit_of
+    from voodoo.cli.running import config_of, kinds_of
+    from voodoo.config import Config
+    from voodoo.errors import VoodooError
+    from voodoo.pipeline.start import AUTO
+
+    with clear_errors():
+        if init not in (None, AUTO):
+            raise typer.BadParameter(f"--init: expected auto, found {init!r}")
+        _, limit = limit_of(people)
+        chosen, plain = config_of(config), Config()
+        settings = Settings(
+            use=kinds_of(use),
+            init=init,
+            model=model,
+            loader=loader,
+            people=limit,
+            strict=strict,
+            config={name: value for name, value in chosen.model_dump().items() if value != getattr(plain, name)},
+            version=__version__,
+        )
+        sources = find_sources(recordings, only=only or ())
+        batch = Batch(sources, out if "://" in out else str(Path(out).expanduser().absolute()), settings)
+        before = len(sources) - len(batch.jobs)
+        interrupted = False
+        if batch.jobs:
+            count = workers or (
+                len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+            )
+            with _ctrl_c() as stop:
+                rows = run(batch.jobs, workers=count, scheduler=scheduler, stop=stop)
+                try:
+                    for row in progressing(rows, "tracking", len(batch.jobs)):
+                        batch.take(row)
+                        if row.status == FAILED:
+                            say(f"{row.recording}: {row.error}")
+                finally:
+                    batch.save()
+                interrupted = stop.is_set()
+        ours = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
+        done = sum(row.status == DONE for row in ours)
+        told = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
+        say_interrupted(interrupted, told)
+        typer.echo(told)
+        broken = [row for row in ours if row.status == FAILED]
+        if broken:
+            raise VoodooError(f"{len(broken)} recordings failed, the first: {broken[0].recording}: {broken[0].error}")
+
+
+@contextmanager
+def _ctrl_c() -> Iterator[threading.Event]:
+    """Ctrl-C within sets the event, so that the engine ends in order; a second one ends the program."""
+    stop = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def set_once(*_: object) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    signal.signal(signal.SIGINT, set_once)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,96 @@
+"""Pictures of the scene without anybody in it, beside a recording: whose they are goes by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError
+from voodoo.model.camera import Camera
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.pictures import decode_color
+from voodoo.recordings.stored import read_stored
+
+FOLDER = "background"
+PICTURES = (".png", ".jpg", ".jpeg")
+MOST = 100
+"""Pictures of a camera that are read, spread over all there are."""
+
+
+def find_background(place: Path) -> Path | None:
+    """`background/` beside what lies at `place`, in it, or one folder up."""
+    folder = place if place.is_dir() else place.parent
+    for candidate in (folder / FOLDER, folder.parent / FOLDER):
+        if candidate.is_dir():
+            return candidate
+    return None
+
+
+def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str, tuple[Path, ...]]:
+    """The files of each camera: NAME.jpg, NAME_0.jpg, NAME-7.png, ... or all in a folder NAME/.
+
+    Args:
+        folder: where they are.
+        cameras: sensor -> names that its pictures may have; a name that two cameras share is nobody's.
+
+    Returns:
+        Sensor -> its files in the order of their names; a sensor without any is missing.
+    """
+    names = [name for own in cameras.values() for name in set(own)]
+    owner = {name: sensor for sensor, own in cameras.items() for name in own if name and names.count(name) == 1}
+    found: dict[str, list[Path]] = {}
+    for file in sorted(item for item in folder.rglob("*") if item.suffix.lower() in PICTURES):
+        place = file.relative_to(folder)
+        word = place.parts[0] if len(place.parts) > 1 else file.stem
+        fit = [name for name in owner if re.fullmatch(rf"{re.escape(name)}([_.-].*)?", word)]
+        if fit:
+            found.setdefault(owner[max(fit, key=len)], []).append(file)
+    return {sensor: tuple(files) for sensor, files in found.items()}
+
+
+def read_pictures(
+    files: Mapping[str, Sequence[Path]], cameras: Mapping[str, Camera], *, left_out: LeftOut | None
+) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
+    """Decode them, at most MOST of a camera.
+
+    Args:
+        files: of each sensor.
+        cameras: of each sensor; a picture of another size is refused.
+        left_out: counts pictures that cannot be read, which are left out then; None: they are refused.
+
+    Raises:
+        RecordingError: it names the file.
+    """
+    read = {}
+    for sensor, paths in files.items():
+        camera, pictures = cameras[sensor], []
+        for path in paths[:: -(-len(paths) // MOST)]:
+            try:
+                pictures.append(decode_color(read_stored(path, "a picture"), path, (camera.width, camera.height)))
+            except RecordingError as error:
+                if left_out is None:
+                    raise
+                left_out.add("pictures of the empty scene", error)
+        if pictures:
+            read[sensor] = tuple(pictures)
+    return read
+
+
+def no_pictures(folder: str | Path, cameras: Mapping[str, Sequence[str]]) -> RecordingError:
+    """The error of a folder that was named and holds no camera's pictures."""
+    told = "; ".join(f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in cameras.items()) or "no camera"
+    return RecordingError(
+        f"{folder}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({told}), found none"
+    )
+
+
+def scene_words(folder: Path | None, files: Mapping[str, Sequence[Path]]) -> tuple[str, ...]:
+    """What is known of the empty scene, in words; () without a folder of pictures."""
+    if folder is None:
+        return ()
+    told = ", ".join(f"{sensor} {len(paths)}" for sensor, paths in files.items()) or "none that belongs to a camera"
+    return (f"pictures of the empty scene in {folder}: {told}",)

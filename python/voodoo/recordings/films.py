@@ -1,0 +1,186 @@
+"""Pictures of one camera after the other: a video, or a folder of picture files."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError, reading
+from voodoo.measurements import ColorImage
+from voodoo.model.camera import Camera
+from voodoo.recordings.camera_files import PlacedCamera
+from voodoo.recordings.empty_scene import PICTURES
+from voodoo.recordings.folder import Clock
+from voodoo.recordings.pictures import decode_color, picture_size
+from voodoo.recordings.stored import check_stored, read_stored
+
+ByteImage: TypeAlias = npt.NDArray[np.uint8]
+
+VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v")
+_MOST_BYTES = 2**40
+_PADDING_PX = 16
+"""Coders of videos cut or fill pictures at the right and below to a multiple of 16 pixels, or leave that to the player."""
+
+
+class Pictures(ABC):
+    """The pictures of one calibrated camera.
+
+    Args:
+        sensor: name of the video or folder.
+        placed: the camera, as calibrated.
+        size: (width, height) of the pictures [px].
+
+    Attributes:
+        stamps: of the pictures [s].
+        camera: calibration of the pictures as they are.
+
+    Raises:
+        RecordingError: the pictures have another size than calibrated.
+    """
+
+    stamps: Sequence[float]
+
+    def __init__(self, sensor: str, placed: PlacedCamera, size: tuple[int, int]) -> None:
+        """Check the size."""
+        calibrated = (placed.camera.width, placed.camera.height)
+        if max(abs(a - b) for a, b in zip(size, calibrated, strict=True)) >= _PADDING_PX:
+            raise RecordingError(
+                f"{sensor}: expected {calibrated[0]}x{calibrated[1]} px, as {placed.name} is calibrated, found "
+                f"{size[0]}x{size[1]}",
+                reason="of another size than calibrated",
+            )
+        self.sensor, self.placed = sensor, placed
+        self.camera: Camera = replace(placed.camera, width=size[0], height=size[1])
+
+    def __iter__(self) -> Iterator[ColorImage]:
+        """The pictures, each decoded when it is asked for; they are best asked for one after the other."""
+        picture = self._reader()
+        for index, stamp in enumerate(self.stamps):
+            yield ColorImage(
+                self.sensor, stamp, partial(picture, index), self.camera, np.array(self.placed.world_from_sensor)
+            )
+
+    @abstractmethod
+    def _reader(self) -> Callable[[int], ByteImage]:
+        """What gives the picture of a number; damage is a RecordingError."""
+
+
+class Video(Pictures):
+    """A video file.
+
+    Args:
+        path: the file.
+        sensor: its name.
+        placed: the camera, as calibrated.
+        rate: pictures a second; None: as the file says.
+
+    Raises:
+        RecordingError: no video, or of another size than calibrated.
+    """
+
+    def __init__(self, path: Path, sensor: str, placed: PlacedCamera, rate: float | None) -> None:
+        """Read size, rate and number of pictures."""
+        self._path = path
+        film = _opened(path)
+        count = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
+        size = (int(film.get(cv2.CAP_PROP_FRAME_WIDTH)), int(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
+        told = float(film.get(cv2.CAP_PROP_FPS))
+        film.release()
+        rate = told if rate is None else rate
+        if not (0 < count < 1e9 and np.isfinite(rate) and 0.0 < rate < 1e5):
+            raise RecordingError(f"{path}: expected pictures at a rate above zero, found {count} at {rate} a second")
+        super().__init__(sensor, placed, size)
+        self.stamps = (np.arange(count) / rate).tolist()
+
+    def _reader(self) -> Callable[[int], ByteImage]:
+        return _VideoReader(self._path, len(self.stamps), (self.camera.width, self.camera.height)).picture
+
+
+class PictureFolder(Pictures):
+    """A folder of PNG or JPEG files, named by stamps or numbered.
+
+    Args:
+        files: the pictures.
+        sensor: name of the folder.
+        placed: the camera, as calibrated.
+        clock: knows the stamps.
+
+    Raises:
+        RecordingError: the first picture cannot be read or has another size than calibrated, or two have one stamp.
+    """
+
+    def __init__(self, files: Sequence[Path], sensor: str, placed: PlacedCamera, clock: Clock) -> None:
+        """Find the stamps; see the class."""
+        first = min(files)
+        super().__init__(sensor, placed, picture_size(read_stored(first, "a readable picture"), first))
+        pairs = sorted(zip(clock.of([Path(_number(file)) for file in files]), files, strict=True))
+        self.stamps = [stamp for stamp, _ in pairs]
+        self._files = [file for _, file in pairs]
+        if len(set(self.stamps)) < len(pairs):
+            raise RecordingError(f"{sensor}: expected a number or stamp for each picture, found one twice")
+
+    def _reader(self) -> Callable[[int], ByteImage]:
+        size = (self.camera.width, self.camera.height)
+        return lambda index: decode_color(read_stored(self._files[index], "a picture"), self._files[index], size)
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """The picture files in a folder, in the order of their names."""
+    return sorted(item for item in folder.iterdir() if item.suffix.lower() in PICTURES)
+
+
+def _number(file: Path) -> str:
+    """The path with the stamp alone as its name: the last number of a name that is none."""
+    try:
+        float(file.stem)
+    except ValueError:
+        found = re.findall(r"\d+", file.stem)
+        return str(file.with_name(f"{found[-1]}{file.suffix}")) if found else str(file)
+    return str(file)
+
+
+def _opened(path: Path) -> cv2.VideoCapture:
+    check_stored(path, "a video", most=_MOST_BYTES)
+    film = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    if not film.isOpened():
+        raise RecordingError(f"{path}: expected a video that FFmpeg reads, found none")
+    return film
+
+
+class _VideoReader:
+    """Decodes a video one picture after the other; going back starts anew."""
+
+    def __init__(self, path: Path, count: int, size: tuple[int, int]) -> None:
+        self._path, self._count, self._size = path, count, size
+        self._film: cv2.VideoCapture | None = None
+        self._next = 0
+
+    def picture(self, index: int) -> ByteImage:
+        """A picture (H, W, 3) BGR uint8 by its number."""
+        with reading(self._path, "a readable video"):
+            if self._film is None or index < self._next:
+                self._film, self._next = _opened(self._path), 0
+            while self._next < index and self._film.grab():
+                self._next += 1
+            read, image = self._film.read() if self._next == index else (False, None)
+        if not read or image is None:
+            raise RecordingError(
+                f"{self._path}: expected {self._count} pictures, found damage or an end at {self._next}"
+            )
+        self._next += 1
+        if (image.shape[1], image.shape[0]) != self._size:
+            raise RecordingError(
+                f"{self._path}: expected pictures of {self._size[0]}x{self._size[1]} px, found "
+                f"{image.shape[1]}x{image.shape[0]}",
+                reason="of another size than calibrated",
+            )
+        return np.asarray(image, dtype=np.uint8)

@@ -1,0 +1,57 @@
+"""Pictures of several cameras as frames: one for each picture of the first camera, with what the others saw at that time."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+
+from voodoo.measurements import Measurement, RecordedFrame
+
+FARTHEST_S = 0.25
+"""A picture taken so much earlier or later [s] belongs to no frame, however rare the pictures are."""
+_AHEAD = 2
+
+
+def together(items: Iterable[Measurement], first: str) -> Iterator[RecordedFrame]:
+    """Frames of the first camera's pictures; those of the others within half an interval belong to them.
+
+    Args:
+        items: in the order in which they were recorded; stamps of each camera rise.
+        first: sensor whose pictures make the frames.
+
+    Yields:
+        Frames with one picture of each camera at most, that of the first camera last. The interval is the shortest to the
+        pictures before and after. A picture that arrives later than the second next one of the first camera is left out.
+    """
+    waiting: deque[Measurement] = deque()
+    others: dict[str, deque[Measurement]] = {}
+    before: list[float] = []
+
+    def frame() -> RecordedFrame:
+        stamps = [*before, *(item.stamp for item in waiting)]
+        this = waiting.popleft()
+        before[:] = [this.stamp]
+        half = min([FARTHEST_S, *(0.5 * (b - a) for a, b in pairwise(stamps))])
+        found = [_nearest(queue, this.stamp, half) for queue in others.values()]
+        beside = sorted((item for item in found if item is not None), key=lambda item: (item.stamp, item.sensor))
+        return RecordedFrame(this.stamp, (*beside, this))
+
+    for item in items:
+        if item.sensor != first:
+            others.setdefault(item.sensor, deque()).append(item)
+            continue
+        waiting.append(item)
+        if len(waiting) > _AHEAD:
+            yield frame()
+    while waiting:
+        yield frame()
+
+
+def _nearest(queue: deque[Measurement], stamp: float, half: float) -> Measurement | None:
+    """Take what is older than half an interval after a time; the nearest of it, if it is not older than as much before."""
+    taken = []
+    while queue and queue[0].stamp < stamp + half:
+        taken.append(queue.popleft())
+    near = [item for item in taken if item.stamp >= stamp - half]
+    return min(near, key=lambda item: abs(item.stamp - stamp)) if near else None

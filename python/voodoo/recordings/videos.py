@@ -1,0 +1,234 @@
+"""Folders with the videos, or image folders, of several calibrated cameras."""
+
+from __future__ import annotations
+
+import heapq
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import RecordingError
+from voodoo.measurements import FloatArray, RecordedFrame
+from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml
+from voodoo.recordings.empty_scene import (
+    FOLDER,
+    find_background,
+    no_pictures,
+    pictures_of,
+    read_pictures,
+    scene_words,
+)
+from voodoo.recordings.films import VIDEOS, PictureFolder, Pictures, Video, pictures_in
+from voodoo.recordings.folder import Clock
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation, start_of
+from voodoo.recordings.recording import (
+    Recording,
+    RecordingInfo,
+    SensorInfo,
+    mean_rate,
+    number_option,
+    reference_words,
+)
+from voodoo.recordings.together import together
+from voodoo.recordings.truth import find_beside, read_start, read_truth
+
+_ROOMS = ("videos", "images", ".")
+"""Where videos or image folders are looked for, the first place that has some."""
+_OTHERS = (FOLDER, "keypoints", "pose", "calibration", "Calibration", "pose-3d", "kinematics")
+
+
+class VideosRecording(Recording):
+    """A folder with the pictures of several calibrated cameras::
+
+        Calib_*.toml                 cameras, see read_camera_toml; world Z up, metres; or in calibration/, or ../calibration/
+        videos/cam01.mp4             a video a camera; or videos/cam01/, images/cam01/, of PNG or JPEG files, or beside the file
+        background/cam01_0.png       optional: pictures of the empty scene
+        init.json, truth.csv, *.trc  optional: first pose, truth, triangulated joints to compare with
+
+    Videos and cameras belong together by their names (`cam01` is `cam_01`), else, if there are as many, in the order of
+    names. There is one frame for each picture of the first camera; pictures of the others within half an interval belong to
+    it. All begin at the same time: stamps of a video are k / rate.
+
+    Args:
+        path: the folder.
+        rate: pictures a second; None: what each video says, 30 for pictures that are numbered.
+        color_topic: names of the cameras to use (`voodoo track --topic color=NAME`); None: all that have pictures.
+        background: folder of pictures of the empty scene, instead of `background/` in the folder or the one above.
+        bare: read none of init.json, truth.csv and *.trc.
+        left_out: counts pictures that cannot be read, which are left out then; None: they are refused.
+
+    Raises:
+        RecordingError: a part is missing or not of that form; it says which.
+    """
+
+    complete = True
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        rate: float | None = None,
+        color_topic: str | Sequence[str] | None = None,
+        background: str | Path | None = None,
+        bare: bool = False,
+        left_out: LeftOut | None = None,
+    ) -> None:
+        """Read calibration and the heads of the videos; see the class."""
+        self.path, self.name, self.root_frame = path, path.resolve().name, FRAME
+        self._left_out = left_out
+        rate = None if rate is None else number_option(path, "rate", rate, "pictures per second > 0", most=1e4)
+        sources = picture_sources(path)
+        if not sources:
+            raise RecordingError(f"{path}: expected videos in videos/, or folders of pictures in images/, found none")
+        placed = read_camera_toml(calibration_of(path, [source.stem for source in sources]))
+        clock = Clock(rate)
+        self._cameras: list[Pictures] = []
+        for camera, source in _chosen(path, _matched(path, placed, sources), color_topic):
+            sensor = source.relative_to(path).as_posix()
+            if source.is_dir():
+                self._cameras.append(PictureFolder(pictures_in(source), sensor, camera, clock))
+            else:
+                self._cameras.append(Video(source, sensor, camera, rate))
+        self.assumed = tuple(dict.fromkeys(clock.notes))
+        self._notes: tuple[str, ...] = ()
+        self._background = find_background(path) if background is None else Path(background)
+        if background is not None and not self._background_files():
+            raise no_pictures(background, self._names())
+        self._read_beside(bare=bare)
+
+    def _read_beside(self, *, bare: bool) -> None:
+        self.start, self.reference = None, None
+        if bare:
+            return
+        truth, start = (find_beside(self.path, name) for name in ("truth.csv", "init.json"))
+        self.reference = (
+            read_triangulation(self.path, self.info().rate_hz)
+            if truth is None
+            else read_truth(truth, lambda _: np.eye(4))
+        )
+        if start is not None:
+            self.start = read_start(start, lambda frame: self.root_from(frame or FRAME, 0.0))
+        elif self.reference is not None and not self.reference.exact:
+            self.start = start_of(self.reference)
+        if self.reference is not None and not self.reference.exact:
+            self._notes = ("the reference is triangulated from keypoints: another tracker's opinion",)
+
+    def __len__(self) -> int:
+        """Number of pictures of the first camera."""
+        return len(self._cameras[0].stamps)
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Pictures of all cameras; see Recording."""
+        pictures = heapq.merge(*self._cameras, key=lambda item: item.stamp)
+        return together(pictures, self._cameras[0].sensor)
+
+    def _names(self) -> dict[str, tuple[str, ...]]:
+        return {one.sensor: (one.placed.name, Path(one.sensor).stem) for one in self._cameras}
+
+    def _background_files(self) -> dict[str, tuple[Path, ...]]:
+        return {} if self._background is None else pictures_of(self._background, self._names())
+
+    def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
+        """See Recording."""
+        cameras = {one.sensor: one.camera for one in self._cameras}
+        return read_pictures(self._background_files(), cameras, left_out=self._left_out)
+
+    def info(self) -> RecordingInfo:
+        """Summarize."""
+        stamps: FloatArray = np.array(self._cameras[0].stamps)
+        duration = float(stamps[-1] - stamps[0])
+        sensors = []
+        for one in self._cameras:
+            words = f"{one.camera.width}x{one.camera.height} pictures"
+            each = mean_rate(len(one.stamps), one.stamps[-1] - one.stamps[0])
+            sensors.append(SensorInfo(one.sensor, "color", one.placed.name, len(one.stamps), each, words))
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader="videos",
+            frames=len(self),
+            start_stamp=float(stamps[0]),
+            duration=duration,
+            rate_hz=mean_rate(len(self), duration),
+            root_frame=FRAME,
+            sensors=tuple(sensors),
+            reference=reference_words(self.reference),
+            notes=(*self.assumed, *self._notes, *scene_words(self._background, self._background_files())),
+        )
+
+
+def picture_sources(path: Path, *, anywhere: bool = True) -> list[Path]:
+    """Videos, or folders of pictures, one a camera; in the order of their names.
+
+    Args:
+        path: where to look: in its videos/ or images/, or among what lies in it.
+        anywhere: folders beside videos/ and images/ count, too.
+    """
+    for room in _ROOMS:
+        folder = path / room
+        found = [item for item in folder.iterdir() if _is_source(item)] if folder.is_dir() else []
+        if room == "." and not anywhere:
+            found = [item for item in found if not item.is_dir()]
+        if found:
+            return sorted(found, key=lambda item: _natural(item.stem))
+    return []
+
+
+def _is_source(item: Path) -> bool:
+    if item.is_dir():
+        return item.name not in (*_OTHERS, *_ROOMS) and bool(pictures_in(item))
+    return item.suffix.lower() in VIDEOS
+
+
+def _matched(path: Path, placed: Sequence[PlacedCamera], sources: Sequence[Path]) -> list[tuple[PlacedCamera, Path]]:
+    """Each video with its camera, in the order of the calibration file.
+
+    Raises:
+        RecordingError: neither names nor numbers agree.
+    """
+    by_name = {_plain(source.stem): source for source in sources}
+    pairs = [(camera, by_name[_plain(camera.name)]) for camera in placed if _plain(camera.name) in by_name]
+    if len(pairs) == len(sources) == len(by_name):
+        return pairs
+    if len(placed) == len(sources):
+        return list(zip(sorted(placed, key=lambda camera: _natural(camera.name)), sources, strict=True))
+    raise RecordingError(
+        f"{path}: expected a video for each camera, by its name or as many as there are cameras "
+        f"({', '.join(camera.name for camera in placed)}), found {', '.join(source.name for source in sources)}"
+    )
+
+
+def _chosen(
+    path: Path, pairs: list[tuple[PlacedCamera, Path]], names: str | Sequence[str] | None
+) -> list[tuple[PlacedCamera, Path]]:
+    """Those that were asked for, by the name of the camera or of its video.
+
+    Raises:
+        RecordingError: one that there is not.
+    """
+    if names is None:
+        return pairs
+    wanted = [names] if isinstance(names, str) else list(names)
+    known = {
+        name: pair for pair in pairs for name in (pair[1].relative_to(path).as_posix(), pair[1].stem, pair[0].name)
+    }
+    unknown = [name for name in wanted if name not in known]
+    if unknown or not wanted:
+        raise RecordingError(
+            f"{path}: color_topic: expected some of {', '.join(camera.name for camera, _ in pairs)}, found "
+            f"{', '.join(unknown) or 'none'}"
+        )
+    return [known[name] for name in dict.fromkeys(wanted)]
+
+
+def _plain(name: str) -> str:
+    """cam01 and CAM_01 are the same."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]

@@ -1,0 +1,69 @@
+"""Colour regions of pictures as an input: where the colours of a limb end, its contour is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Frame
+from voodoo.measurements import ColorImage
+from voodoo.sensors.adapters.base import Adapter, Context
+from voodoo.sensors.pinhole import Pinhole
+from voodoo.tracker import Tracker
+
+_FARTHEST_S = 0.25
+"""A picture that is older or newer than its frame by more [s] shows another pose; the tracker would refuse the frame."""
+_GREY = 2
+"""Channels of a grey camera's picture differ by no more than coding makes of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What is kept of a camera: its lens, whether it sees no colours, and the tracker that was told of the empty scene."""
+
+    lens: Pinhole
+    grey: bool
+    told: object
+
+    def picture(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+        """What the tracker is given of a picture (H, W, 3): without distortion, (H, W) of a grey camera."""
+        seen = self.lens.apply(image)
+        return np.ascontiguousarray(seen[:, :, 1]) if self.grey else seen
+
+
+class ColorAdapter(Adapter[ColorImage]):
+    """Pictures as a pinhole camera would have taken them; `Memory` keeps what is known of each camera under "color"."""
+
+    kind = "color"
+    measurement = ColorImage
+
+    def content(self, item: ColorImage) -> npt.NDArray[Any]:
+        """The image."""
+        return item.image
+
+    def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
+        """As a picture with its own stamp; the first one of a camera after pictures of the empty scene, if there are some."""
+        if not isinstance(context.tracker, Tracker) or abs(item.stamp - context.stamp) > _FARTHEST_S:
+            return
+        known = context.memory.all(self.kind).get(item.sensor)
+        if known is None or known.lens.original != item.camera or known.told is not context.tracker:
+            known = _Known(Pinhole(item.camera), _is_grey(item.image), context.tracker)
+            empty = context.settings.empty_scene.get(item.sensor)
+            if empty is not None:
+                context.tracker.set_background(item.sensor, [known.picture(picture) for picture in empty])
+            context.memory.put(self.kind, item.sensor, known)
+        frame.add_color(
+            known.picture(item.image),
+            camera=known.lens.camera,
+            world_from_sensor=item.root_from_sensor,
+            stamp=item.stamp,
+            source=item.sensor,
+        )
+
+
+def _is_grey(image: npt.NDArray[np.uint8]) -> bool:
+    low, high = image.min(axis=2), image.max(axis=2)
+    return bool((high - low <= _GREY).all())

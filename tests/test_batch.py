@@ -1,0 +1,235 @@
+"""Many recordings: rows, names, tables and what a worker does. What needs the extra `batch` is skipped without it, and run
+with it by test_batch_cluster.py."""
+
+import csv
+import importlib.util
+import io
+import json
+import math
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from core_fakes import T_POSE
+from voodoo.batch import run as engine
+from voodoo.batch import task
+from voodoo.batch.run import Batch
+from voodoo.batch.storage import Store, find_sources, name_of, named, on_disk
+from voodoo.batch.summary import COLUMNS, DONE, FAILED, Row, read_table, write_table
+from voodoo.batch.table import columns_of, encode, note_of
+from voodoo.batch.task import Job, Settings, do, row_of
+from voodoo.cli import app
+from voodoo.errors import RecordingError, VoodooError
+from voodoo.export.track import Track
+from voodoo.recordings import sample_path
+
+needs = {name: importlib.util.find_spec(name) is not None for name in ("fsspec", "pyarrow", "distributed")}
+storing = pytest.mark.skipif(not (needs["fsspec"] and needs["pyarrow"]), reason="needs the extra batch")
+
+
+def track_of(stamps, offset=0.0):
+    count = len(stamps)
+    joints = np.array([list(T_POSE.values())] * count) + offset
+    status = tuple("searching" if k == 0 else "tracking" for k in range(count))
+    joints[0] = np.nan
+    return Track(
+        stamps=np.array(stamps), status=status, residual=np.where(np.arange(count) == 0, np.nan, 0.01),
+        joint_names=tuple(T_POSE), joints=joints, limb_names=(), world_from_limb=np.empty((count, 0, 4, 4)),
+        angle_names=("l_elbow_flexion",), angles=np.where(np.isnan(joints[:, :1, 0]), np.nan, 0.5),
+        limb_status={"torso": tuple("" if k == 0 else "measured" for k in range(count))},
+    )  # fmt: skip
+
+
+def test_a_table_of_summaries_is_read_as_it_was_written():
+    rows = [
+        Row("walk", frames=90, seconds=1.25, recorded_s=3.0, persons=1, tracking_share=0.5, source="/a,b/walk"),
+        Row("bad", status=FAILED, error='cut off, "here"\nand there', source="s3://x/bad"),
+    ]
+    text = write_table(rows)
+    assert text.startswith("recording,frames,seconds,status,error,")
+    found = read_table(text, "summary.csv")
+    assert list(found) == ["bad", "walk"]
+    assert found["walk"] == replace(rows[0], joint_error_m=found["walk"].joint_error_m)
+    assert math.isnan(found["walk"].joint_error_m) and found["bad"].error == rows[1].error
+    plain = {row["recording"]: row for row in csv.DictReader(io.StringIO(text))}
+    assert plain["walk"]["joint_error_m"] == "" and plain["bad"]["status"] == "failed"
+    for wrong in ("a,b\n1,2\n", "", ",".join(COLUMNS) + "\n1,2\n", ",".join(COLUMNS) + "\nx,many" + "," * 9 + "\n"):
+        with pytest.raises(VoodooError, match=r"expected"):
+            read_table(wrong, "summary.csv")
+
+
+def test_every_recording_has_a_name_of_its_own_and_keeps_it():
+    sources = ["/a/walk", "/b/walk.mcap", "s3://c/walk/", "/d/a1_s1_t1_depth.mat"]
+    first = named(sources, {})
+    assert [name for name, _ in first] == ["walk", "walk~2", "walk~3", "a1_s1_t1"]
+    again = named(["/e/walk", *reversed(sources)], dict(first))
+    assert dict(again[1:]) == dict(first) and again[0] == ("walk~4", "/e/walk")
+    assert name_of("/x/y.z.bag") == "y.z"
+
+
+def test_columns_hold_every_frame_of_everybody():
+    tracks = {1: track_of([0.0, 0.1, 0.2]), 2: track_of([0.1, 0.2, 0.3], offset=1.0)}
+    columns = columns_of(tracks)
+    assert columns["stamp_s"].tolist() == [0.0, 0.1, 0.1, 0.2, 0.2, 0.3]
+    assert columns["person"].tolist() == [1, 1, 2, 1, 2, 2]
+    assert columns["status"] == ["searching", "tracking", "searching", "tracking", "tracking", "tracking"]
+    assert columns["torso_status"] == ["", "measured", "", "measured", "measured", "measured"]
+    x = T_POSE["l_knee"][0]
+    np.testing.assert_allclose(columns["l_knee_x"], [np.nan, x, np.nan, x, x + 1.0, x + 1.0], rtol=1e-6)
+    assert {len(column) for column in columns.values()} == {6} and columns["l_knee_x"].dtype == np.float32
+    assert list(columns_of({}))[:4] == ["stamp_s", "person", "status", "residual_m"]
+
+
+def test_parts_of_a_track_are_the_whole():
+    whole = track_of([0.0, 0.1, 0.2, 0.3, 0.4])
+    parts = [whole.of_frames(np.arange(5) // 2 == k) for k in range(3)]
+    one, other = columns_of({1: whole}), columns_of({1: task.joined(parts)})
+    assert list(one) == list(other)
+    for name, column in one.items():
+        np.testing.assert_array_equal(column, other[name], err_msg=name)
+
+
+@storing
+def test_tables_are_one_data_set(tmp_path):
+    import pyarrow.dataset as dataset
+
+    store = Store(str(tmp_path / "out"))
+    note = {"row": {"recording": "x"}, "settings": {"use": None}}
+    for name in ("walk", "walk~2", "50 % of it/all"):
+        store.write(store.place_of(name), encode(columns_of({1: track_of([0.0, 0.1, 0.2])}), note))
+    assert store.recordings() == {"walk", "walk~2", "50 % of it/all"}
+    rows = dataset.dataset(tmp_path / "out" / "frames", partitioning="hive").to_table()
+    assert rows.num_rows == 9 and sorted(set(rows["recording"].to_pylist())) == ["50 % of it/all", "walk", "walk~2"]
+    assert rows["l_knee_x"].null_count == 3 and rows["torso_status"].null_count == 3
+    assert rows["stamp_s"].to_pylist()[:3] == [0.0, 0.1, 0.2]
+    with store.opened("walk") as file:
+        assert note_of(file) == note
+    assert note_of(io.BytesIO(b"PAR1 and nothing else")) is None and store.opened("other") is None
+
+
+@storing
+def test_a_file_appears_whole_and_leaves_nothing_beside_it(tmp_path, monkeypatch):
+    store = Store(str(tmp_path))
+    store.write("frames/recording=a/part-0.parquet", b"old")
+    place = tmp_path / "frames" / "recording=a"
+    (place / ".part-0.parquet.123-ab").write_bytes(b"of a worker that died")
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(VoodooError, match="No space left"):
+        store.write("frames/recording=a/part-0.parquet", b"new")
+    monkeypatch.undo()
+    assert [file.name for file in place.iterdir()] == ["part-0.parquet"]
+    assert (place / "part-0.parquet").read_bytes() == b"old"
+    store.write("frames/recording=a/part-0.parquet", b"new")
+    assert (place / "part-0.parquet").read_bytes() == b"new" and store.read("nothing") is None
+
+
+@storing
+def test_recordings_are_found_and_fetched_by_url(tmp_path):
+    import fsspec
+
+    files = fsspec.filesystem("memory")
+    for name in ("a/bag/metadata.yaml", "a/init.json", "b.mcap", "deep/c_depth.mat", "deep/readme.txt"):
+        files.pipe_file(f"/lab/{name}", name.encode())
+    found = find_sources(["memory://lab"])
+    assert found == ["memory:///lab/a", "memory:///lab/b.mcap", "memory:///lab/deep/c_depth.mat"]
+    assert find_sources(["memory://lab/*.mcap"]) == ["memory:///lab/b.mcap"]
+    assert find_sources(["memory://lab"], only=["a"]) == ["memory:///lab/a"]
+    with on_disk(found[0]) as path:
+        assert (path / "bag" / "metadata.yaml").read_text() == "a/bag/metadata.yaml" and path.name == "a"
+    with on_disk(found[1]) as path:
+        assert path.read_text() == "b.mcap"
+    assert not path.exists()
+    with pytest.raises(RecordingError, match="found none"):
+        find_sources(["memory://nowhere"])
+    with pytest.raises(VoodooError, match="nosuchprotocol"):
+        find_sources(["nosuchprotocol://x"])
+    for name in ("x.mcap", "y.mcap"):
+        (tmp_path / name).write_bytes(b"")
+    both = [str(tmp_path / "x.mcap"), str(tmp_path / "y.mcap")]
+    assert find_sources([f"file://{tmp_path}"]) == both == find_sources([str(tmp_path)])
+    store = Store("memory://results")
+    store.write("frames/recording=a/part-0.parquet", b"1234")
+    assert store.recordings() == {"a"} and store.opened("a").read() == b"1234"
+
+
+@pytest.fixture
+def job(tmp_path):
+    """The bundled recording by its depth, which is a second's work."""
+    return Job("sample", str(sample_path()), str(tmp_path / "out"), Settings(use=("depth",), version="1"))
+
+
+@storing
+def test_a_recording_is_done_once(job, monkeypatch):
+    import pyarrow.parquet as parquet
+
+    row = do(job)
+    assert (row.status, row.error, row.frames, row.persons) == (DONE, "", 90, 1)
+    assert row.joint_error_m < 0.05 and row.tracking_share > 0.9 and row.recorded_s == pytest.approx(2.967, abs=1e-3)
+    place = Path(job.out) / Store(job.out).place_of("sample")
+    table = parquet.read_table(place)
+    assert table.num_rows == 90 and {"l_wrist_z", "l_elbow_flexion_rad", "l_forearm_status"} <= set(table.column_names)
+    assert len(place.read_bytes()) < 200_000
+    monkeypatch.setattr(task, "_track", lambda *_: pytest.fail("it was done"))
+    assert do(job) == row == row_of(job)
+    other = replace(job, settings=replace(job.settings, init="auto"))
+    assert row_of(other) is None and row_of(replace(job, source="/elsewhere/sample")) is None
+    place.write_bytes(place.read_bytes()[:5000])
+    assert row_of(job) is None, "a damaged table is made anew"
+
+
+@storing
+def test_whatever_goes_wrong_is_a_row(job, tmp_path, monkeypatch):
+    row = do(replace(job, source=str(tmp_path / "nothing")))
+    assert row.status == FAILED and "found no such file or folder" in row.error and "\n" not in row.error
+    monkeypatch.setattr(task, "_track", lambda *_: 1 / 0)
+    row = do(job)
+    assert (row.status, row.error, row.frames) == (FAILED, "ZeroDivisionError: division by zero", 0)
+    assert not Store(job.out).recordings()
+
+
+@storing
+def test_an_interrupted_batch_goes_on_and_other_settings_do_not(tmp_path):
+    out, settings = str(tmp_path / "out"), Settings(version="1")
+    sources = ["/a/one", "/a/two", "/a/three", "/a/four"]
+    batch = Batch(sources, out, settings)
+    assert [job.name for job in batch.jobs] == ["one", "two", "three", "four"]
+    store = Store(out)
+    store.write(store.place_of("one"), b"")
+    batch.take(Row("one", frames=3, source="/a/one"))
+    batch.take(Row("two", status=FAILED, error="bad", source="/a/two"))
+    batch.take(Row("four", frames=3, source="/a/four"))  # whose table is gone
+    batch.save()
+    again = Batch([*sources, "/b/one"], out, settings)
+    assert [job.name for job in again.jobs] == ["two", "three", "four", "one~2"]
+    assert set(again.rows) == {"one", "two"}
+    assert json.loads((tmp_path / "out" / "settings.json").read_text())["people"] == 1
+    with pytest.raises(
+        VoodooError, match=r"expected results of the same settings, found some of use None; give another --out"
+    ):
+        Batch(sources, out, replace(settings, use=("depth",)))
+    (tmp_path / "out" / "settings.json").write_text("{")
+    with pytest.raises(VoodooError, match=r"settings.json: expected the settings of a batch"):
+        Batch(sources, out, settings)
+
+
+def test_what_is_missing_is_said_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(VoodooError, match=r"pip install 'voodoo-tracker\[batch\]'"):
+        next(engine.run([], workers=1))
+    monkeypatch.setitem(sys.modules, "fsspec.core", None)
+    done = CliRunner().invoke(app, ["batch", str(sample_path()), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1 and "pip install 'voodoo-tracker[batch]'" in done.stderr
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(VoodooError, match=r"pip install 'voodoo-tracker\[batch\]'"):
+        encode({}, {})
+    done = CliRunner().invoke(app, ["batch", str(tmp_path / "nothing"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1 and "expected a recording or a folder of recordings" in done.stderr
