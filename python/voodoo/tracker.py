@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,24 @@ from voodoo.config import Config
 from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.model.joint import number_of
+
+
+class RegionLines(NamedTuple):
+    """Lines across the contours of limbs in one picture, and where their colours end; pixels.
+
+    Args:
+        limbs: (N,) index in `Body.limb_names`.
+        places: (N, 2) where the contour of the posed body is seen.
+        normals: (N, 2) unit vectors outward.
+        offsets: (N,) how far outward the edge of the colours lies.
+        sigmas: (N,) its standard deviation; infinite where the colours tell nothing.
+    """
+
+    limbs: npt.NDArray[np.int64]
+    places: npt.NDArray[np.float32]
+    normals: npt.NDArray[np.float32]
+    offsets: npt.NDArray[np.float32]
+    sigmas: npt.NDArray[np.float32]
 
 
 class Tracker:
@@ -121,6 +140,11 @@ class Tracker:
         if not isinstance(frame, Frame):
             raise MeasurementError(f"frame: expected a voodoo.Frame, found {type(frame).__name__}")
         return self._core.step(frame)
+
+    def region_lines(self, source: str) -> RegionLines:
+        """The lines of the last step in the picture of the colour camera `source`; none where it gave no picture."""
+        rows = self._core._region_lines(source).reshape(-1, 7)
+        return RegionLines(rows[:, 0].astype(np.int64), rows[:, 1:3], rows[:, 3:5], rows[:, 5], rows[:, 6])
 
     def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside.

@@ -36,6 +36,8 @@ const REACHES: [usize; 4] = [15, 10, 6, 5];
 const SPACING: f64 = 0.035;
 const LEAST_LINES: usize = 3;
 const MOST_LINES: usize = 16;
+/// With more limbs in doubt than this none is frozen.
+const MANY: usize = 4;
 /// A unit is a pixel of a lens with this focal length, pixels.
 const FOCAL: f64 = 520.0;
 /// Standard deviation of the body's own contour, units: limbs are no cones.
@@ -254,9 +256,11 @@ impl Regions {
         let Self { cameras, groups, evidence, .. } = self;
         let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera) else { return };
         let unit = unit_of(&camera.lens);
+        // Where many limbs are in doubt at once, it is the light that has changed.
+        let light = evidence.iter().filter(|evidence| evidence.doubts()).count() > MANY;
         for line in &camera.lines {
-            let doubtful = evidence.get(usize::from(line.limb)).is_some_and(|evidence| evidence.doubts());
-            if !doubtful {
+            let doubtful = evidence.get(usize::from(line.limb)).is_some_and(Evidence::doubts);
+            if light || !doubtful {
                 scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
             }
         }

@@ -3,7 +3,7 @@
 use super::histogram::{Histogram, Kind};
 
 /// Share of a new frame in what is known of a limb's colours, and of those around it: a body keeps its clothes.
-const RATES: [f32; 2] = [0.05, 0.2];
+const RATES: [f32; 2] = [0.1, 0.2];
 /// Fewer pixels than this teach nothing.
 const LEAST_PIXELS: f32 = 30.0;
 

@@ -1,0 +1,139 @@
+"""Pose from colour regions on recordings of several colour cameras with exact truth, and under disturbances.
+
+    python benches/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] [--rounds 9] ...
+
+Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, joints that are more than 10 cm off in the
+last third of a second, and user time of a step. Pictures are decoded before the clock runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+import voodoo
+from voodoo.measurements import ColorImage
+from voodoo.recordings import open_recording
+
+JOINTS = [f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in "lr"]
+Picture = npt.NDArray[np.uint8]
+
+
+def start_of(folder: Path, seed: int | None) -> tuple[float, dict[str, npt.NDArray[np.float64]]]:
+    """Stature and joints of the first frame, each 3 to 5 cm off with a seed."""
+    known = json.loads((folder / "init.json").read_text())
+    joints = {name: np.array(place) for name, place in known["joints"].items()}
+    if seed is not None:
+        rng = np.random.default_rng(seed + 7)
+        for name in joints:
+            off = rng.normal(size=3)
+            joints[name] = joints[name] + off / np.linalg.norm(off) * rng.uniform(0.03, 0.05)
+    return known["height_m"], joints
+
+
+def truth_of(folder: Path) -> npt.NDArray[np.float64]:
+    """True places of the twelve joints, (frames, 12, 3)."""
+    with (folder / "truth.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    return np.array([[[float(row[f"{joint}_{axis}"]) for axis in "xyz"] for joint in JOINTS] for row in rows])
+
+
+def disturbed(picture: Picture, rng: np.random.Generator, options: argparse.Namespace, frame: int) -> Picture:
+    """R07's disturbances: uncorrelated noise on 15 % of the pixels, rectangles, and frames that show nothing."""
+    picture = picture.copy()
+    if options.noise:
+        hit = rng.random(picture.shape[:2]) < 0.15
+        picture[hit] = rng.integers(0, 256, (int(hit.sum()), 3), dtype=np.uint8)
+    for _ in range(12 if options.rectangles else 0):
+        height, width = rng.integers(15, 70, 2)
+        row, column = rng.integers(0, picture.shape[0] - height), rng.integers(0, picture.shape[1] - width)
+        picture[row : row + height, column : column + width] = rng.integers(0, 256, 3, dtype=np.uint8)
+    if options.corrupt and frame % 25 == 24:
+        picture = rng.integers(0, 256, picture.shape, dtype=np.uint8)
+    if options.dim:
+        picture = (picture * (1.0 - 0.5 * min(1.0, max(0.0, (frame - 30) / 20)))).astype(np.uint8)
+    return picture
+
+
+def shown(picture: Picture, grey: bool) -> Picture:
+    """The picture as the tracker gets it."""
+    return (picture @ np.array([0.114, 0.587, 0.299])).astype(np.uint8) if grey else picture
+
+
+def empty_scene(folder: Path, camera: int, grey: bool) -> list[Picture]:
+    """Pictures of the scene without anybody."""
+    import cv2
+
+    files = sorted((folder / "background").glob(f"cam_{camera}_*.jpg"))
+    return [shown(cv2.imread(str(file)), grey) for file in files]
+
+
+def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float64], list[float]]:
+    """Errors (frames, 12) in metres and seconds of user time of every step."""
+    frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in open_recording(folder)]
+    truth = truth_of(folder)
+    stature, joints = start_of(folder, options.start)
+    tracker = voodoo.Tracker(voodoo.Body.human(stature), config=voodoo.Config(**json.loads(options.config)))
+    estimate = tracker.reset(joints=joints, fit_sizes=not options.default_lengths)
+    if options.default_lengths:
+        tracker.reset(joints=dict(estimate.joints))
+    chosen = [int(camera) for camera in options.cameras.split(",")]
+    for camera in chosen if options.background else []:
+        tracker.set_background(f"/cam_{camera}/image_raw/compressed", empty_scene(folder, camera, options.grey))
+    rng = np.random.default_rng(7)
+    order = list(range(len(frames)))
+    if options.rounds:
+        order = (order + order[-2:0:-1]) * options.rounds
+    errors, seconds = [], []
+    for step, index in enumerate(order):
+        frame = voodoo.Frame(step / 30.0)
+        first = frames[index][-1].stamp
+        for item in frames[index]:
+            if int(item.sensor.split("/")[1].removeprefix("cam_")) not in chosen:
+                continue
+            picture = shown(disturbed(item.image, rng, options, step), options.grey)
+            frame.add_color(
+                np.ascontiguousarray(picture),
+                camera=item.camera,
+                world_from_sensor=item.root_from_sensor,
+                stamp=step / 30.0 + item.stamp - first,
+                source=item.sensor,
+            )
+        before = time.process_time()
+        estimate = tracker.step(frame)
+        seconds.append(time.process_time() - before)
+        places = np.array([estimate.joints[joint] for joint in JOINTS])
+        errors.append(np.linalg.norm(places - truth[index], axis=1))
+    return np.array(errors), seconds
+
+
+def main() -> None:
+    """Measure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recordings", nargs="+", type=Path)
+    parser.add_argument("--start", type=int, help="joints of the start 3 to 5 cm off, by this seed")
+    parser.add_argument("--cameras", default="0,1,2,3")
+    parser.add_argument("--rounds", type=int, default=0, help="forwards and backwards so many times")
+    parser.add_argument("--config", default="{}", help="JSON of configuration keys")
+    for switch in ("noise", "rectangles", "corrupt", "dim", "grey", "background", "default-lengths"):
+        parser.add_argument(f"--{switch}", action="store_true")
+    options = parser.parse_args()
+    for folder in options.recordings:
+        errors, seconds = run(folder, options)
+        lost = [joint for joint, error in zip(JOINTS, errors[-10:].mean(axis=0), strict=True) if error > 0.1]
+        print(
+            f"{folder.name}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
+            f" lost {lost}, first and last tenth {100 * errors[: len(errors) // 10].mean():.2f}"
+            f" {100 * errors[-len(errors) // 10 :].mean():.2f} cm, {1e3 * float(np.median(seconds)):.1f} ms",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
