@@ -64,7 +64,7 @@ class Wishes:
     config: Config
     several: bool
     limit: int | None
-    kinds: tuple[str, ...]
+    kinds: tuple[str, ...] | None
     depth_filter: DepthFilter | None
     boxes: tuple[Box, ...]
     targets: tuple[Path, ...] = ()
