@@ -18,7 +18,7 @@ use crate::math::{Pose, Vec3};
 use crate::sizes::girth::ALIKE;
 use crate::solver::{ChainSolver, LENGTH_INFORMATION, Lengths, SITE_SCALE, Spread};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Sites, Surface, Term};
+use crate::terms::{Contour, Regions, Sites, Surface, Term};
 
 /// So many surface points a metre of limb err independently at most.
 const PATCHES_PER_METRE: f64 = 50.0;
@@ -151,13 +151,15 @@ impl Uncertainty {
         let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
         let sites = Sites { correspondences, information, scale: SITE_SCALE, biased: true };
         let contour = Contour { pairs: &correspondences.contour, information: edges, scale: 2.0 * scale };
+        let regions = Regions { pairs: &correspondences.regions };
         self.normal.clear(poses.len());
-        for term in [&surface as &dyn Term, &sites, &contour] {
+        for term in [&surface as &dyn Term, &sites, &contour, &regions] {
             term.add(body, poses, &mut self.normal);
         }
         for (limb, block) in self.normal.limbs.iter_mut().enumerate() {
             let most = PATCHES_PER_METRE * body.limbs()[limb].shape.length();
-            let alike = most / (most + correspondences.measured_weight(limb));
+            let lines = correspondences.regions.iter().filter(|pair| pair.limb == limb).count();
+            let alike = most / (most + correspondences.measured_weight(limb) + lines as f64);
             block.h *= if proven(limb) { alike } else { UNPROVEN * alike };
         }
     }
