@@ -230,4 +230,11 @@ impl Correspondences {
         }
         (weight > 0.0).then(|| sum / weight)
     }
+
+    /// Mean of the squared distances of the edges of colour regions by what they tell, `None` without any.
+    pub fn mean_squared_edge(&self) -> Option<f64> {
+        let weight: f64 = self.regions.iter().map(|pair| pair.information).sum();
+        let sum: f64 = self.regions.iter().map(|pair| pair.information * pair.distance * pair.distance).sum();
+        (weight > 0.0).then(|| sum / weight)
+    }
 }

@@ -16,7 +16,8 @@ impl Estimate {
         candidates: &Candidates,
     ) {
         let (estimate, poses) = (self, &motion.poses);
-        estimate.mean_squared_distance = correspondences.mean_squared_distance().unwrap_or(f64::NAN);
+        let measured = correspondences.mean_squared_distance().or_else(|| correspondences.mean_squared_edge());
+        estimate.mean_squared_distance = measured.unwrap_or(f64::NAN);
         estimate.world_from_limb.clear();
         estimate.world_from_limb.extend(motion.world_from_limb());
         estimate.sites.clear();
@@ -54,6 +55,11 @@ impl Estimate {
             let report = entry(sources, pair.source);
             report.count += 1;
             report.add(pair.base_weight, (pair.x - pair.p).length_squared());
+        }
+        for pair in &correspondences.regions {
+            let report = entry(sources, pair.source);
+            report.count += 1;
+            report.add(pair.information, pair.distance * pair.distance);
         }
         sources.iter_mut().for_each(SourceReport::finish);
     }
