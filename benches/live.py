@@ -3,6 +3,7 @@
     python benches/live.py realsense [--rate 90]      a device of software, 640x480 (needs pyrealsense2)
     python benches/live.py overload [--seconds 60]    four times as many images as can be tracked
     python benches/live.py ros2 --peer PYTHON         a node by rclpy sends 640x480 depth, skeletons go back (needs cyclonedds)
+    python benches/live.py faults                     frames from good data to the right pose, for every kind of fault
 
 Prints JSON. Memory is that of the process that tracks, after ten seconds and at the end. The person is rendered, the noise is
 4 mm. On a busy machine `chrt -f 10` before the command keeps others away.
@@ -141,9 +142,33 @@ def ros2(peer: str, rate: float, seconds: float) -> dict[str, object]:
     }
 
 
+def faults() -> dict[str, int]:
+    """Images of good data (30 a second) until the pose is right and stays so: the faults of tests/test_live_faults.py."""
+    sys.path.insert(0, str(PEERS.parent))
+    from test_live_faults import FAULTY, RIGHT_M, Bus, error
+
+    found = {}
+    for name, fault in FAULTY.items():
+        bus = Bus()
+        bus.good(15)
+        fault(bus)
+        begun, before = bus.at, len(bus.rig.steps)
+        bus.good(min(40, 89 - bus.at))
+        images = {round(bus.images[number].stamp + bus.shift, 6): bus.images[number].stamp for number in range(bus.at)}
+        right = {}
+        for step in bus.rig.steps[before:]:
+            one = step.estimates[1]
+            stamp = images[round(step.stamp, 6)]
+            right[stamp] = bool(one.joints) and str(one.status) != "lost" and error(one, stamp) < RIGHT_M
+        stamps = [bus.images[number].stamp for number in range(begun, bus.at)]
+        wrong = [number for number, stamp in enumerate(stamps, 1) if not right.get(stamp, False)]
+        found[name] = max(wrong, default=0) + 1
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("realsense", "overload", "ros2"))
+    parser.add_argument("what", choices=("realsense", "overload", "ros2", "faults"))
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--peer", help="a Python with rclpy")
@@ -151,6 +176,8 @@ def main() -> None:
     sys.setswitchinterval(5e-4)
     if chosen.what == "realsense":
         found = realsense(chosen.rate, chosen.seconds)
+    elif chosen.what == "faults":
+        found = faults()
     elif chosen.what == "overload":
         found = overload(chosen.seconds)
     else:

@@ -1,8 +1,6 @@
-"""A ROS 2 node of your own: depth images in, transforms, joint states and markers out. For those who have ROS.
+"""A ROS 2 node of your own for those who have ROS: depth images in, transforms, joint states and markers out.
 
-    ros2 run ...    or    python ros2_node.py --ros-args -r depth:=/camera/depth/image_rect_raw
-
-Without ROS `voodoo live ros2:TOPIC` does the same.
+python ros2_node.py --ros-args -r depth:=/camera/depth/image_rect_raw
 """
 
 import rclpy
@@ -23,7 +21,7 @@ from voodoo.live.assembly import Assembler
 from voodoo.live.clock import HostClock
 from voodoo.live.ros2.feed import CAMERA_INFO, IMAGE, TF, RosFeed
 
-PERSON, BODY = "1", "/humans/bodies/body_1"
+BODY, CLOCK = "/humans/bodies/body_1", HostClock()
 
 
 class Skeletons(Node):
@@ -31,37 +29,32 @@ class Skeletons(Node):
 
     def __init__(self) -> None:
         super().__init__("voodoo")
-        depth = self.resolve_topic_name("depth")
-        faults = Faults(self.get_logger().warning)
-        self.feed, self.frames = RosFeed([depth], faults, HostClock()), Assembler(faults)
+        depth, faults = self.resolve_topic_name("depth"), Faults(self.get_logger().warning)
+        self.feed, self.frames = RosFeed([depth], faults, CLOCK), Assembler(faults)
         self.feed.expects_transforms = TFMessage is not None
         self.follower = Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
-        types = {f"{BODY}/joint_states": JointState, f"{BODY}/markers": MarkerArray}
-        latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        heard = [(depth, Image, IMAGE, qos_profile_sensor_data)]
-        heard += [(self.feed.info_topic(depth), CameraInfo, CAMERA_INFO, qos_profile_sensor_data)]
+        types = {"/tf": TFMessage, f"{BODY}/joint_states": JointState, f"{BODY}/markers": MarkerArray}
+        self.outputs = {name: self.create_publisher(kind, name, 10) for name, kind in types.items() if kind}
+        self.hear(depth, Image, IMAGE, qos_profile_sensor_data)
+        self.hear(self.feed.info_topic(depth), CameraInfo, CAMERA_INFO, qos_profile_sensor_data)
         if TFMessage is not None:
-            types["/tf"] = TFMessage
-            heard += [("/tf", TFMessage, TF, 100), ("/tf_static", TFMessage, TF, latched)]
-        self.outputs = {topic: self.create_publisher(kind, topic, 10) for topic, kind in types.items()}
-        for topic, kind, name, qos in heard:
-            take = lambda raw, topic=topic, name=name: self.take(topic, name, raw)  # noqa: E731
-            self.create_subscription(kind, topic, take, qos, raw=True)
+            self.hear("/tf", TFMessage, TF, 100)
+            self.hear("/tf_static", TFMessage, TF, QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+
+    def hear(self, topic: str, kind: type, name: str, qos: QoSProfile | int) -> None:
+        self.create_subscription(kind, topic, lambda raw: self.take(topic, name, raw), qos, raw=True)
 
     def take(self, topic: str, kind: str, raw: bytes) -> None:
         """A message came, as it was sent."""
-        now = self.get_clock().now().nanoseconds * 1e-9
         for arrival in self.feed.take(topic, kind, raw):
-            self.frames.feed(arrival, now)
-            frame = self.frames.flush(now)
+            self.frames.feed(arrival, CLOCK.now())
+            frame = self.frames.flush(CLOCK.now())
             if frame is not None:
-                step = self.follower.step(frame)
-                where = {"root_frame": self.feed.root_frame, "person": PERSON, "topic": BODY}
-                for name, message in instant(step.estimates[1], step.bodies[1], **where).items():
+                step, where = self.follower.step(frame), {"root_frame": self.feed.root_frame, "topic": BODY}
+                for name, message in instant(step.estimates[1], step.bodies[1], person="1", **where).items():
                     if name in self.outputs:
                         self.outputs[name].publish(cdr(message))
 
 
-if __name__ == "__main__":
-    rclpy.init()
-    rclpy.spin(Skeletons())
+rclpy.init()
+rclpy.spin(Skeletons())

@@ -110,6 +110,21 @@ def test_poses_are_those_of_the_recording(run):
     assert rig.counts == {}
 
 
+def test_damage_in_a_recording_is_a_fault(tmp_path):
+    """Of a copy of the first images as PNG files one is cut off; the others are tracked."""
+    frames = list(open_recording(sample_path(), use=("depth",)))[:12]
+    (tmp_path / "cut" / "depth").mkdir(parents=True)
+    (tmp_path / "cut" / "calibration.toml").write_text(calibration_of(depth_of(frames[0])))
+    for path, data, number in grown(tmp_path / "cut", frames):
+        path.write_bytes(data[:500] if number == 7 else data)
+    result = live(tmp_path / "cut", "--report", tmp_path / "r.json")
+    assert result.exit_code == 0, result.output
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["faults"] == {"unreadable message": 1}
+    assert report["received"] == 11
+    assert "unreadable message" in result.output
+
+
 def test_several_people_have_ids(tmp_path):
     result = live(sample_path(), "--rate", "4", "--people", "any", "--out", tmp_path / "all.csv", *FAST)
     assert result.exit_code == 0, result.output

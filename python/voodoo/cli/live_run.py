@@ -49,6 +49,8 @@ _STANDING = {
 }
 _TICK_S = 0.05
 _LINE_S = 1.0
+_NO_SCREEN = "--save FILE.rrd writes a file"
+"""What `Viewer` advises where there is no screen."""
 _SWITCH_S = 5e-4
 """How long a thread may keep Python from the others: the default of 5 ms is what a whole step takes."""
 
@@ -189,7 +191,10 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
         outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
         say(f"{wishes.record} stores pictures of people")
     if wishes.view or wishes.serve is not None:
-        viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
+        try:
+            viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
+        except VoodooError as error:
+            raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
         outputs.append(Shown(viewer, several=wishes.several))
         if viewer.address:
             say(f"look at {viewer.address} in a browser")

@@ -347,7 +347,8 @@ def instant(
     Raises:
         VoodooError: a stamp before zero.
     """
-    human = _Human(Track.of([estimate]), body, person, topic)
+    # Angles are not needed; of nobody the body tells the names.
+    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, topic)
     return human.messages(0, root_frame, markers=markers)
 
 

@@ -62,9 +62,12 @@ class Fault(RecordingError):
 
 def kind_of(error: VoodooError, otherwise: str) -> str:
     """The name in FAULTS of what raised an error."""
-    if isinstance(error, Fault):
-        return error.kind
-    return _OF_REASONS.get(getattr(error, "reason", ""), otherwise)
+    return error.kind if isinstance(error, Fault) else kind_of_reason(getattr(error, "reason", ""), otherwise)
+
+
+def kind_of_reason(reason: str, otherwise: str) -> str:
+    """The name in FAULTS of a reason for which recordings leave something out."""
+    return _OF_REASONS.get(reason, otherwise)
 
 
 class Faults:

@@ -213,8 +213,8 @@ class Session:
         """Rate, latency, drops and the status of each person, for people."""
         persons = ", ".join(f"{number} {word}" for number, word in self.persons().items()) or "nobody"
         status = self.live.status
-        if status == "waiting":
-            return "waiting for data"
+        if status == "waiting" or not self.published:
+            return "waiting for data" if status == "waiting" else f"no pose yet; {self.dropped} dropped"
         parts = [
             f"{self.rate_hz:.1f} Hz",
             f"latency {1e3 * self.latency.last:.1f} ms (median {1e3 * self.latency.percentile(50):.1f})",

@@ -98,8 +98,10 @@ class Live:
         """The newest frame each time, until the sources end or `stop` is called.
 
         Raises:
-            VoodooError: a source that cannot go on.
+            VoodooError: a source that cannot go on, or nobody entered the `with` block.
         """
+        if not self._threads and not self._frames.closed:
+            raise VoodooError("live sources: expected a `with` block around the loop, found none")
         while not self._frames.closed:
             frame = self.next(_TICK_S)
             if frame is not None:

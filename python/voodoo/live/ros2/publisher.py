@@ -17,7 +17,7 @@ TRACKED = "/humans/bodies/tracked"
 
 
 class Ros2Output(Output):
-    """`/tf`, `/humans/bodies/body_<id>/joint_states`, `.../markers`, and `/humans/bodies/tracked` (hri_msgs/IdsList).
+    """`/tf`, `/humans/bodies/body_<id>/joint_states`, `.../pose`, `.../markers`, and `/humans/bodies/tracked` (hri_msgs/IdsList).
 
     Stamps are those of the data. Who is lost or searched for is not among the tracked, and has no transforms.
 
@@ -40,6 +40,7 @@ class Ros2Output(Output):
         self._publish_on(TRACKED, IDS, 1)
         # Who listens finds them before the first pose.
         self._publish_on(f"{_body(1)}/joint_states", "sensor_msgs/msg/JointState", 10)
+        self._publish_on(f"{_body(1)}/pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10)
         self._publish_on(f"{_body(1)}/markers", "visualization_msgs/msg/MarkerArray", 10)
 
     def publish(self, step: Step) -> None:

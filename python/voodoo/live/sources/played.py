@@ -8,10 +8,11 @@ from dataclasses import replace
 from typing import Any
 
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Faults
+from voodoo.live.faults import Faults, kind_of_reason
 from voodoo.live.source import Arrival, Source, SourceEnded
 from voodoo.measurements import FloatArray, Measurement, RecordedFrame
 from voodoo.pipeline.pairing import paired
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import adapter_of
 
@@ -23,6 +24,7 @@ class PlayedSource(Source):
         recording: what is played.
         rate: how many times as fast as it was recorded.
         loop: begin again at its end; stamps go on.
+        left_out: what the recording leaves out because it is damaged; it is told as it comes.
         sleep: waits for so many seconds.
     """
 
@@ -34,11 +36,14 @@ class PlayedSource(Source):
         *,
         rate: float = 1.0,
         loop: bool = False,
+        left_out: LeftOut | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Nothing is read yet."""
         self.name, self.recording = recording.name, recording
         self._rate, self._loop, self._sleep = rate, loop, sleep
+        self._left_out = LeftOut() if left_out is None else left_out
+        self._told: dict[str, int] = {}
         self._frames: Iterator[RecordedFrame] = iter(())
         self._next: RecordedFrame | None = None
         self._shift = 0.0
@@ -52,7 +57,7 @@ class PlayedSource(Source):
 
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
-        self._clock = clock
+        self._clock, self._faults = clock, faults
         self._frames = iter(paired(self.recording))
         self._next = next(self._frames, None)
         self._first = 0.0 if self._next is None else self._next.stamp
@@ -76,6 +81,12 @@ class PlayedSource(Source):
 
     def _advance(self, frame: RecordedFrame) -> None:
         self._next = next(self._frames, None)
+        for reason, count in self._left_out.counts.items():
+            new = count - self._told.get(reason, 0)
+            if new:
+                kind = kind_of_reason(reason, "unreadable message")
+                self._faults.add(kind, self._left_out.first[reason], self._clock.now(), new)
+                self._told[reason] = count
         if self._next is None and self._loop:
             self._frames = iter(paired(self.recording))
             self._next = next(self._frames, None)

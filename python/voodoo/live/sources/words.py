@@ -8,6 +8,7 @@ from typing import Any
 
 from voodoo.errors import VoodooError
 from voodoo.live.source import Source
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 
 REALSENSE, ROS2, GROW = "realsense", "ros2", "grow"
@@ -58,4 +59,6 @@ def source_of(
     chosen = dict(options or {})
     if root_frame is not None:
         chosen["root_frame"] = root_frame
-    return PlayedSource(open_recording(word, bare=True, **chosen), rate=rate, loop=loop)
+    left_out = LeftOut()
+    recording = open_recording(word, bare=True, left_out=left_out, **chosen)
+    return PlayedSource(recording, rate=rate, loop=loop, left_out=left_out)

@@ -1,0 +1,264 @@
+"""ROS 2 messages of a live source, without a network: what they become, and what is published."""
+
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import pytest
+
+import voodoo
+from live_rig import HandClock, Rig, depth_of, follower_of, wall
+from voodoo.export.ros2 import cdr
+from voodoo.live import Faults, Step
+from voodoo.live.assembly import LiveFrame
+from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
+from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
+from voodoo.live.ros2.publisher import TRACKED, Ros2Output
+from voodoo.live.ros2.types import IDS, STORE, dds_name, ros_name
+from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
+from voodoo.pipeline.run import start_tracker, track
+from voodoo.pipeline.search import nobody
+from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.transforms import TransformTree
+
+DEPTH, INFO = "/camera/depth/image_raw", "/camera/depth/camera_info"
+
+
+def feed_of(*topics, told=None, **options):
+    clock = HandClock(1000.0)
+    faults = Faults(told.append if told is not None else None)
+    return RosFeed(topics or (DEPTH,), faults, clock, **options), clock, faults
+
+
+def moved(x):
+    pose = np.eye(4)
+    pose[0, 3] = x
+    return pose
+
+
+def send(feed, topic, kind, message):
+    return feed.take(topic, kind, cdr(message))
+
+
+def depth_message(stamp, frame="camera"):
+    return _depth(_header(stamp, frame), wall(stamp))
+
+
+def test_transforms_that_change_are_interpolated_and_waited_for():
+    feed, _, _ = feed_of(root_frame="base_link")
+    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    for stamp, x in ((1.0, 0.0), (1.1, 0.1)):
+        send(feed, "/tf", TF, transforms("base_link", "camera", stamp, moved(x)))
+    (arrival,) = send(feed, DEPTH, IMAGE, depth_message(1.14))
+    assert not arrival.ready()
+    assert arrival.patience > 0.0
+    assert arrival.measure().root_from_sensor[0, 3] == 0.1, "the latest, where no later one comes"
+    send(feed, "/tf", TF, transforms("base_link", "camera", 1.2, moved(0.2)))
+    assert arrival.ready()
+    assert arrival.measure().root_from_sensor[0, 3] == pytest.approx(0.14)
+    assert np.array_equal(arrival.measure().image, wall(1.14).image)
+
+
+def test_old_transforms_are_forgotten_and_those_that_hold_are_not():
+    feed, _, _ = feed_of(root_frame="base_link")
+    send(feed, "/tf_static", TF, transforms("head", "camera", 0.0, moved(1.0)))
+    for number in range(3000):
+        send(feed, "/tf", TF, transforms("base_link", "head", 1.0 + 0.02 * number, moved(0.001 * number)))
+    (edge,) = [edge for edge in feed._tree._edges.values() if not edge.constant]
+    assert len(edge.stamps) <= 10.0 / 0.02 + 1
+    assert feed.root_from("camera", 60.98)[0, 3] == pytest.approx(1.0 + 2.999)
+
+
+def test_transforms_follow_time_that_jumps_back():
+    feed, _, faults = feed_of(root_frame="base_link")
+    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    for stamp in (100.0, 100.1, 50.0, 50.1, 50.2):
+        send(feed, "/tf", TF, transforms("base_link", "camera", stamp, moved(0.01 * (stamp - 50.0))))
+    (arrival,) = send(feed, DEPTH, IMAGE, depth_message(50.15))
+    assert arrival.ready()
+    assert arrival.measure().root_from_sensor[0, 3] == pytest.approx(0.0015)
+    assert faults.counts == {}
+
+
+@pytest.mark.parametrize(
+    ("frames", "root"),
+    [
+        (("odom", "base_link", "camera"), "odom"),
+        (("map", "odom", "base_link", "camera"), "odom"),
+        (("map", "base_link", "camera"), "map"),
+        (("base_link", "camera"), "base_link"),
+        (("world", "camera"), "world"),
+    ],
+    ids="-".join,
+)
+def test_the_root_is_where_people_stand_still(frames, root):
+    feed, _, _ = feed_of()
+    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    assert send(feed, DEPTH, IMAGE, depth_message(1.0)) == [], "transforms may come"
+    for parent, child in pairwise(frames):
+        send(feed, "/tf_static", TF, transforms(parent, child, 0.0, moved(1.0)))
+    (arrival,) = send(feed, DEPTH, IMAGE, depth_message(1.1))
+    assert feed.root_frame == root
+    assert arrival.measure().root_from_sensor[0, 3] == len(frames) - frames.index(root) - 1
+
+
+def test_without_transforms_the_camera_is_the_root():
+    feed, clock, _ = feed_of()
+    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    assert send(feed, DEPTH, IMAGE, depth_message(1.0)) == []
+    clock.at += ROOT_PATIENCE_S
+    (arrival,) = send(feed, DEPTH, IMAGE, depth_message(2.0))
+    assert feed.root_frame == "camera"
+    assert np.array_equal(arrival.measure().root_from_sensor, np.eye(4))
+    # Where nobody publishes transforms, nobody is waited for.
+    feed, _, _ = feed_of()
+    feed.expects_transforms = False
+    assert len(send(feed, DEPTH, IMAGE, depth_message(1.0))) == 1
+    # And a calibration says where the camera is.
+    feed, _, _ = feed_of(sensor_pose=("base_link", moved(3.0)))
+    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    (arrival,) = send(feed, DEPTH, IMAGE, depth_message(1.0))
+    assert arrival.ready()
+    assert (feed.root_frame, arrival.measure().root_from_sensor[0, 3]) == ("base_link", 3.0)
+
+
+def test_every_type_becomes_its_measurement():
+    topics = (
+        DEPTH,
+        "/packed/depth/compressedDepth",
+        "/color/image_raw",
+        "/color/image_raw/compressed",
+        "/cloud",
+        "/scan",
+    )
+    feed, _, faults = feed_of(*topics, root_frame="camera")
+    camera = wall(1.0).camera
+    for info in {feed.info_topic(topic) for topic in topics[:4]}:
+        send(feed, info, CAMERA_INFO, camera_info(_header(1.0, "camera"), camera))
+    header = _header(1.0, "camera")
+    depth = wall(1.0)
+    metres = np.where(depth.image > 2050, np.nan, depth.image / 1000.0).astype(np.float32)
+    picture = np.random.default_rng(1).integers(0, 255, (24, 32, 3)).astype(np.uint8)
+    raw = {"header": header, "height": 24, "width": 32, "is_bigendian": 0}
+    packed = np.concatenate([np.zeros(12, np.uint8), cv2.imencode(".png", depth.image)[1].ravel()])
+    points = PointCloud("", 1.0, np.arange(12.0).reshape(4, 3), np.eye(4))
+    scan = LaserScan("", 1.0, np.full(5, 2.0, np.float32), -0.2, 0.1, 0.1, 10.0, np.eye(4))
+    messages = [
+        (DEPTH, IMAGE, _depth(header, depth)),
+        (DEPTH, IMAGE, _new(IMAGE, **raw, encoding="32FC1", step=128, data=metres.view(np.uint8).ravel())),
+        (topics[1], COMPRESSED, _new(COMPRESSED, header=header, format="16UC1; compressedDepth png", data=packed)),
+        (topics[2], IMAGE, _new(IMAGE, **raw, encoding="rgb8", step=96, data=picture[:, :, ::-1].ravel())),
+        (
+            topics[3],
+            COMPRESSED,
+            _new(COMPRESSED, header=header, format="png", data=cv2.imencode(".png", picture)[1].ravel()),
+        ),
+        (topics[4], CLOUD, _cloud(header, points)),
+        (topics[5], SCAN, _scan(header, scan)),
+    ]
+    found = [arrival.measure() for message in messages for arrival in send(feed, *message)]
+    assert faults.counts == {}
+    assert [type(item) for item in found] == [DepthImage] * 3 + [ColorImage] * 2 + [PointCloud, LaserScan]
+    for item, unit, image in zip(found, (0.001, 1.0, 0.001), (depth.image, metres, depth.image), strict=False):
+        assert np.array_equal(item.image, image, equal_nan=image.dtype.kind == "f")
+        assert item.metres_per_unit == unit
+    assert all(np.array_equal(item.image, picture) for item in found[3:5])
+    assert np.array_equal(found[5].points, points.points)
+    assert np.array_equal(found[6].ranges, scan.ranges)
+
+
+def test_a_tree_knows_how_far_its_transforms_reach():
+    tree = TransformTree("test", max_age=0.5)
+    assert not tree.covers("a", "b", 1.0)
+    for stamp in (1.0, 2.0):
+        tree.add_edge("a", "b", stamp, moved(stamp), static=False)
+    assert tree.covers("a", "b", 2.0)
+    assert not tree.covers("b", "a", 2.1)
+    tree.keep(10.0, 20.0)
+    with pytest.raises(voodoo.RecordingError, match="found the nearest usable one"):
+        tree.lookup("a", "b", 15.0)
+    tree.add_edge("a", "b", 3.0, moved(7.0), static=True)
+    assert tree.lookup("a", "b", 99.0)[0, 3] == 7.0, "it holds from now on"
+
+
+def test_names_of_types():
+    assert dds_name("sensor_msgs/msg/Image") == "sensor_msgs::msg::dds_::Image_"
+    assert ros_name("sensor_msgs::msg::dds_::Image_") == "sensor_msgs/msg/Image"
+    assert ros_name("DCPSParticipant") == ""
+
+
+class FakeNode:
+    """Keeps what is published."""
+
+    def __init__(self):
+        self.sent = []
+
+    def advertise(self, topic, kind, *, depth=10):
+        node = self
+
+        class Publication:
+            def write(self, message):
+                node.sent.append((topic, STORE.deserialize_cdr(message, kind)))
+
+        return Publication()
+
+    def take(self):
+        sent, self.sent = self.sent, []
+        return {topic: [message for name, message in sent if name == topic] for topic, _ in sent}
+
+
+def test_what_is_published_has_the_stamps_of_the_data():
+    node = FakeNode()
+    output = Ros2Output(lambda: "base_link", node=node)
+    recording = open_recording(sample_path(), use=("depth",))
+    tracker = start_tracker(recording)
+    step = next(track(recording, tracker))
+
+    def publish(stamp, estimate):
+        frame = LiveFrame(stamp, step.recorded.measurements, 0, 0.0, 0.0, False)
+        output.publish(Step(frame, {1: estimate}, {1: tracker.body}, 0.0))
+        return node.take()
+
+    sent = publish(step.estimate.stamp, step.estimate)
+    body = "/humans/bodies/body_1"
+    assert set(sent) == {"/tf", f"{body}/joint_states", f"{body}/markers", f"{body}/pose", TRACKED}
+    stamps = {
+        (message.header.stamp.sec, message.header.stamp.nanosec)
+        for message in (
+            *sent["/tf"][0].transforms,
+            *(sent[f"{body}/{name}"][0] for name in ("joint_states", "pose")),
+            *sent[TRACKED],
+        )
+    }
+    assert stamps == {divmod(round(step.estimate.stamp * 1e9), 1_000_000_000)}
+    names = {transform.child_frame_id: transform.header.frame_id for transform in sent["/tf"][0].transforms}
+    assert names["body_1"] == "base_link"
+    assert names["l_elbow_1"] == "l_shoulder_1"
+    assert sent[TRACKED][0].ids == ["1"]
+    gone = publish(step.estimate.stamp + 0.1, nobody(step.estimate.stamp + 0.1))
+    assert set(gone) == {f"{body}/markers", TRACKED}
+    assert [marker.action for marker in gone[f"{body}/markers"][0].markers] == [3], "they are deleted"
+    assert gone[TRACKED][0].ids == []
+    assert set(publish(step.estimate.stamp + 0.2, nobody(step.estimate.stamp + 0.2))) == {TRACKED}
+    assert gone[TRACKED][0].__msgtype__ == IDS
+
+
+def test_a_whole_recording_goes_through_the_bus():
+    """Messages as a driver sends them give what the recording gives, to the last bit."""
+    recording = open_recording(sample_path(), use=("depth",), bare=True)
+    rig = Rig(follower_of())
+    feed = RosFeed([DEPTH], rig.live.faults, rig.clock, root_frame="base_link")
+    images = [depth_of(frame) for frame, _ in zip(recording, range(20), strict=False)]
+    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), images[0].camera))
+    send(feed, "/tf_static", TF, transforms("base_link", "camera", 0.0, images[0].root_from_sensor))
+    for item in images:
+        for arrival in send(feed, DEPTH, IMAGE, _depth(_header(item.stamp, "camera"), item)):
+            rig.deliver(arrival)
+        rig.wait(1 / 30, tick=1 / 30)
+    assert [frame.stamp for frame in rig.frames] == pytest.approx([item.stamp for item in images], abs=1e-6)
+    for frame, item in zip(rig.frames, images, strict=True):
+        (found,) = frame.measurements
+        assert np.array_equal(found.image, item.image)
+        assert found.camera == item.camera
+        np.testing.assert_allclose(found.root_from_sensor, item.root_from_sensor, atol=1e-12)
+    assert str(rig.steps[-1].estimates[1].status) == "tracking"
