@@ -1,6 +1,7 @@
 //! No heap allocation in a step after warm-up, counted.
 #![allow(missing_docs, unsafe_code, clippy::unwrap_used, reason = "an allocator is unsafe by nature; a test may stop")]
 
+mod color_scene;
 mod scene;
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -178,6 +179,29 @@ fn allocations_of_a_rendering() -> usize {
     COUNT.load(Ordering::Relaxed) - before
 }
 
+/// Allocations of warm steps by colour pictures alone, of a body that stands and one that steps aside.
+fn region_allocations() -> usize {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let standing = color_scene::standing(&body);
+    let aside: Vec<Pose> =
+        standing.iter().map(|pose| Pose::from_parts(pose.translation + 0.03 * Vec3::X, pose.rotation)).collect();
+    let shoot = |poses: &[Pose], camera| color_scene::shoot(Some((&body, poses)), camera);
+    let pictures = [&standing, &aside].map(|poses| [0, 1, 2, 3].map(|camera| shoot(poses, camera)));
+    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    tracker.reset_pose(&standing).unwrap();
+    let mut count = 0;
+    for index in 0..WARM_UP {
+        let stamp = index as f64;
+        let colors = [0, 1, 2, 3].map(|camera| color_scene::picture(&pictures[index % 2][camera], camera, stamp));
+        let before = COUNT.load(Ordering::Relaxed);
+        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+        if index >= WARM_UP / 2 {
+            count += COUNT.load(Ordering::Relaxed) - before;
+        }
+    }
+    count
+}
+
 /// One test only: the counter is global, another test in this process would be counted, too.
 #[test]
 fn a_warm_step_or_rendering_allocates_nothing() {
@@ -187,6 +211,7 @@ fn a_warm_step_or_rendering_allocates_nothing() {
 
     assert_eq!(ik_allocations(), 0, "inverse kinematics");
     assert_eq!(allocations_of_a_rendering(), 0);
+    assert_eq!(region_allocations(), 0, "colour regions");
     // A detector looks for others once in six such frames, and at each of the two once in fifteen.
     let [allocating, all] = people_allocations();
     assert!(allocating <= all / 6 + 2 * all / 15, "{allocating} of {all} frames of two persons");

@@ -242,9 +242,9 @@ impl Fit {
     }
 
     /// Learns colours where the body was found.
-    pub fn learn_regions(&mut self, context: Context, poses: &[Pose]) {
+    pub fn learn_regions(&mut self, context: Context) {
         if context.config.regions {
-            self.regions.learn(context.seen.frame(), posed(context, poses));
+            self.regions.learn(context.seen.frame());
         }
     }
 

@@ -7,6 +7,9 @@ const TOLD: f32 = 0.15;
 /// The outer part of a limb begins at this share of its length.
 const OUTER_FROM: f64 = 0.6;
 
+/// A limb is in doubt when a smaller share of what can tell speaks for it.
+const DOUBTED: f64 = 0.15;
+
 /// Sums over the lines of a limb.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Evidence {
@@ -31,6 +34,11 @@ impl Evidence {
                 *sum += if counts { weight } else { 0.0 };
             }
         }
+    }
+
+    /// The limb may not be where it is thought to be: too little speaks for it.
+    pub(super) fn doubts(&self) -> bool {
+        self.told > 0.0 && self.support().own[0] < DOUBTED
     }
 
     pub(super) fn support(&self) -> RegionSupport {

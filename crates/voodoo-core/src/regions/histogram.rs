@@ -84,7 +84,7 @@ impl Histogram {
         if self.counted >= least {
             match kind {
                 Kind::Color => smooth_color(&mut self.counts, room),
-                Kind::Grey => (0..GREY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1)),
+                Kind::Grey => (0..GREY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, 256)),
             }
             let rate = if self.known { rate } else { 1.0 };
             let (keep, new) = (1.0 - rate, rate / self.counted);
@@ -104,20 +104,22 @@ impl Histogram {
 
 fn smooth_color(values: &mut [f32], room: &mut Vec<f32>) {
     for stride in [1, SIDE, SIDE * SIDE] {
-        smooth(values, room, stride);
+        smooth(values, room, stride, SIDE);
     }
 }
 
-/// Spreads values to their neighbours at a stride; those at the borders keep what would leave.
-fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize) {
+/// Spreads values to their neighbours at a stride, in rows of so many; those at the ends keep what would leave.
+fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
     room.clear();
     room.extend_from_slice(values);
-    let side = if values.len() == SIDE * SIDE * SIDE { SIDE } else { values.len() / stride };
-    for (index, value) in values.iter_mut().enumerate() {
-        let place = index / stride % side;
-        let here = room[index];
-        let low = if place > 0 { room[index - stride] } else { here };
-        let high = if place + 1 < side { room[index + stride] } else { here };
-        *value = here + SPREAD * (low + high - 2.0 * here);
+    for (values, before) in values.chunks_exact_mut(stride * row).zip(room.chunks_exact(stride * row)) {
+        let mut spread = |from: usize, to: usize| {
+            for index in 0..stride {
+                let flow = SPREAD * (before[from * stride + index] - before[to * stride + index]);
+                values[to * stride + index] += flow;
+                values[from * stride + index] -= flow;
+            }
+        };
+        (1..row).for_each(|place| spread(place - 1, place));
     }
 }

@@ -134,6 +134,7 @@ impl Regions {
             }
             camera.model.clear(kind, groups);
             camera.known = true;
+            self.evidence.clear();
             self.look(frame, picture, posed);
             self.teach(picture);
         }
@@ -210,11 +211,8 @@ impl Regions {
     }
 
     /// Learns colours where the body was found.
-    pub fn learn(&mut self, frame: &Frame, posed: Posed) {
-        for picture in frame.colors {
-            self.look(frame, picture, posed);
-            self.teach(picture);
-        }
+    pub fn learn(&mut self, frame: &Frame) {
+        frame.colors.iter().for_each(|picture| self.teach(picture));
         self.stamp = Some(frame.stamp);
     }
 
@@ -251,13 +249,16 @@ impl Regions {
         }
     }
 
-    /// Learns the colours along the lines of one picture.
+    /// Learns the colours along the lines of one picture, of limbs that are not in doubt.
     fn teach(&mut self, picture: &ColorImage) {
-        let Self { cameras, groups, .. } = self;
+        let Self { cameras, groups, evidence, .. } = self;
         let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera) else { return };
         let unit = unit_of(&camera.lens);
         for line in &camera.lines {
-            scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
+            let doubtful = evidence.get(usize::from(line.limb)).is_some_and(|evidence| evidence.doubts());
+            if !doubtful {
+                scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
+            }
         }
         camera.model.learn();
     }

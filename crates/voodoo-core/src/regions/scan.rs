@@ -1,6 +1,6 @@
 //! Looks along lines: log ratios of limb and surroundings, and what colours there are.
 
-use super::histogram::bin_of;
+use super::histogram::{Kind, bin_of};
 use super::labels::{Labels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::models::ColorModel;
@@ -12,6 +12,10 @@ use crate::observation::picture::ColorImage;
 const MOST_RATIO: f32 = 2.0;
 /// A limb wider than this is looked for by one edge alone, units.
 const WIDEST: usize = 48;
+/// How far from the contour brightness is compared, units.
+const LOCAL: f32 = 12.0;
+/// Least standard deviation of brightness beside the contour, of 255.
+const LEAST_SPREAD: f32 = 6.0;
 /// What is beside the contour is so many samples wide.
 const NEXT_TO: usize = 5;
 /// Colours are learnt from this far inside and outside of the contour, units.
@@ -63,11 +67,62 @@ impl Scanner {
         for (index, ratio) in self.ratios[..count].iter_mut().enumerate() {
             *ratio = view.ratio(line, group, start + index as f32);
         }
+        if view.model.kind == Kind::Grey {
+            self.compare_locally(view, line, start, count);
+        }
         let (inside, outside) = self.ratios[..count].split_at(reach + width);
         let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
         let near = NEXT_TO.min(reach);
         let beside = [mean(&inside[inside.len() - near..]), mean(&outside[..near])];
         Some(Found { edge: edge(&self.ratios[..count], reach, width), beside })
+    }
+}
+
+/// Brightness beside the contour: a Gaussian (R07).
+#[derive(Clone, Copy, Debug, Default)]
+struct Local {
+    count: f32,
+    sum: f32,
+    squares: f32,
+}
+
+impl Local {
+    fn of(values: impl Iterator<Item = f32>) -> Self {
+        values.fold(Self::default(), |all, value| Self {
+            count: all.count + 1.0,
+            sum: all.sum + value,
+            squares: all.squares + value * value,
+        })
+    }
+
+    /// Logarithm of the density at a value, up to a constant.
+    fn log(&self, value: f32) -> f32 {
+        let mean = self.sum / self.count;
+        let variance = (self.squares / self.count - mean * mean).max(LEAST_SPREAD * LEAST_SPREAD);
+        -0.5 * ((value - mean).powi(2) / variance + variance.ln())
+    }
+}
+
+impl Scanner {
+    /// Grey alone says little of a whole limb: the ratios become the mean of theirs and of those of what is beside the contour.
+    fn compare_locally(&mut self, view: &View, line: &Line, start: f32, count: usize) {
+        let value = |r: f32| {
+            let (pixel, ..) = pixel_at(view.picture, line, r * view.unit)?;
+            Some(f32::from(view.picture.pixels.get(pixel)[0]))
+        };
+        let side = |from: f32, to: f32| {
+            let steps = (to - from).max(0.0) as usize;
+            Local::of((0..steps).filter_map(|step| value(from + step as f32)))
+        };
+        let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
+        if inside.count < 3.0 || outside.count < 3.0 {
+            return;
+        }
+        for (index, ratio) in self.ratios[..count].iter_mut().enumerate().filter(|(_, ratio)| **ratio != 0.0) {
+            let Some(value) = value(start + index as f32) else { continue };
+            let local = (inside.log(value) - outside.log(value)).clamp(-MOST_RATIO, MOST_RATIO);
+            *ratio = 0.5 * (*ratio + local);
+        }
     }
 }
 

@@ -6,10 +6,9 @@ use crate::observation::picture::{ColorImage, ColorPixels};
 
 /// Least standard deviation of a channel, of 255: noise, and what compression makes of it.
 const LEAST_SIGMA: f32 = 6.0;
-/// A shadow or a lamp changes the brightness by these factors at most.
-const SHADED: [f32; 2] = [0.6, 1.2];
-/// How likely a pixel that shows no body shows what the scene was, and that it shows anything of the surroundings' colours.
-const AS_BEFORE: [f32; 2] = [0.8, 0.2];
+/// How likely a pixel without the body shows what it did before, and how likely anything of the surroundings' colours: shadows
+/// and lamps change many.
+const CHANGED: f32 = 0.5;
 
 /// The scene as one camera sees it.
 #[derive(Clone, Debug, Default)]
@@ -79,13 +78,10 @@ impl Scene {
     #[inline]
     pub(super) fn log(&self, index: usize, pixel: [u8; 3], around: f32) -> f32 {
         let (here, seen) = (self.mean[index].map(f32::from), pixel.map(f32::from));
-        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let shade = match self.kind {
-            Kind::Color => (dot(here, seen) / dot(here, here).max(1.0)).clamp(SHADED[0], SHADED[1]),
-            Kind::Grey => 1.0,
+        let square: f32 = match self.kind {
+            Kind::Color => (0..3).map(|channel| (seen[channel] - here[channel]).powi(2)).sum(),
+            Kind::Grey => (seen[0] - here[0]).powi(2),
         };
-        let off = [0, 1, 2].map(|channel| seen[channel] - shade * here[channel]);
-        let square = if self.kind == Kind::Color { dot(off, off) } else { off[0] * off[0] };
-        (self.most - self.narrow * square + AS_BEFORE[0].ln()).max(around + AS_BEFORE[1].ln())
+        (self.most - self.narrow * square).max(around) + CHANGED.ln()
     }
 }

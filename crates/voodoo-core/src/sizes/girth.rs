@@ -9,6 +9,10 @@ use crate::association::correspondence::LimbMatches;
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
+/// Gauss-Newton steps of the girth fit: points find their limbs anew in each.
+pub(super) const GIRTH_STEPS: usize = 6;
+/// A limb's tip in the first frame makes it shorter or longer by these factors at most.
+pub(super) const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
 /// Standard deviation of the shift of a limb's surface against its joints (metres) and of its relative girth: what
 /// anthropometry leaves open between persons, clothes and definitions of joint centres.
 pub(super) const SHIFT_SIGMA: f64 = 0.03;

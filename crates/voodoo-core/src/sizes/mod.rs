@@ -2,27 +2,19 @@
 
 pub mod girth;
 mod outline;
+mod unlike;
 
 use crate::association::contour::edges;
 use crate::body::{Body, Model, Pair};
 use crate::config::Config;
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
-use crate::hypotheses::{GAIN, overall_cost};
 use crate::math::{Pose, Vec3};
-use crate::solver::Gate;
-use girth::{Girth, GirthFit, girth_step};
-use outline::Outline;
+use girth::{GIRTH_STEPS, Girth, GirthFit, TIP_FACTORS, girth_step};
+use outline::Outlines;
+use unlike::{START_GATE, equalise_limb_lengths};
 
-/// Gauss-Newton steps of the girth fit: points find their limbs anew in each.
-const GIRTH_STEPS: usize = 6;
-/// Points farther than this from the set pose say nothing about sizes, metres.
-const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
 /// A limb becomes longer or shorter by at most this share in one frame.
 const LENGTH_STEP: f64 = 0.02;
-/// Nobody's arm is shorter than this share of the other one, nor a leg: one of them was set wrong.
-const UNLIKE_REACH: f64 = 0.88;
-/// A limb's tip in the first frame makes it shorter or longer by these factors at most.
-const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
 /// All frames together make a limb shorter or longer by these factors at most.
 const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
@@ -48,7 +40,7 @@ pub struct Sizes {
     /// What is known about the girths since the first frame fitted them; empty when they were given.
     girths: Vec<Girth>,
     /// The same by colours.
-    outlines: Vec<Outline>,
+    outlines: Outlines,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
     pairs: Vec<Pair>,
     stretched: Vec<f64>,
@@ -74,11 +66,6 @@ impl Sizes {
         self.open && self.rough
     }
 
-    /// The sizes are known: no frame changes them.
-    pub fn known(&self) -> bool {
-        self.set.is_none()
-    }
-
     /// The sizes were found with the pose: nobody told how large the body is.
     pub fn found(&self) -> bool {
         self.rough
@@ -92,6 +79,11 @@ impl Sizes {
     /// Standard deviation of the mean radius of a limb, metres; NaN where it was given.
     pub fn girth_sigma(&self, body: &Body, limb: usize) -> f64 {
         self.girths.get(limb).map_or(f64::NAN, |girth| girth.sigma(&body.limbs()[limb].shape))
+    }
+
+    /// The sizes are known: no frame changes them.
+    pub fn known(&self) -> bool {
+        self.set.is_none()
     }
 
     /// The body as it was set, before frames changed its sizes.
@@ -126,7 +118,7 @@ impl Sizes {
         }
         if setting.config.fit_girths {
             self.fit_girths(setting, model, poses, fit);
-            self.fit_outlines(setting, model, poses, fit);
+            self.outlines.start(setting, model, poses, fit);
         }
     }
 
@@ -164,30 +156,6 @@ impl Sizes {
         }
     }
 
-    /// Fits the limbs' surfaces to the edges of their colours, where nothing else shows them.
-    fn fit_outlines(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
-        if !setting.seen.candidates.is_empty() || setting.seen.frame().colors.is_empty() {
-            return;
-        }
-        self.outlines = vec![Outline::default(); poses.len()];
-        for _ in 0..GIRTH_STEPS {
-            fit.match_outline(setting.of(model), poses);
-            for (limb, outline) in self.outlines.iter_mut().enumerate() {
-                let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
-                let part = &model.body.limbs()[limb];
-                if part.match_caps[1] {
-                    let longer = outline.tip(&part.shape, &poses[limb], pairs.clone());
-                    model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
-                }
-                let Some(step) = outline.start(&model.body.limbs()[limb].shape, &poses[limb], pairs) else { continue };
-                if model.body.change_girth(limb, step.shift, step.axes()) {
-                    let pose = &mut poses[limb];
-                    pose.translation += pose.rotation * step.shift;
-                }
-            }
-        }
-    }
-
     /// Draws the sizes to what a frame shows of the body at `poses`: lengths unless it is `lost`, and with `girths` those of the
     /// limbs that are `relied_on`. Changed lengths leave the joints closed.
     pub fn refine(
@@ -206,22 +174,11 @@ impl Sizes {
         if !self.pairs.is_empty() && !reliance.lost {
             self.refine_lengths(setting, model, poses, predicted, fit);
         }
-        if reliance.girths && !self.outlines.is_empty() {
-            self.follow_outlines(setting, model, poses, fit);
+        if reliance.girths {
+            self.outlines.follow(setting, model, poses, fit);
         }
         if reliance.girths {
             self.refine_girths(model, fit, reliance.limb);
-        }
-    }
-
-    /// Draws the girths to the edges of colours.
-    fn follow_outlines(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
-        fit.match_outline(setting.of(model), poses);
-        for (limb, outline) in self.outlines.iter_mut().enumerate() {
-            let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
-            if let Some(step) = outline.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
-                model.body.change_girth(limb, step.shift, step.axes());
-            }
         }
     }
 
@@ -275,41 +232,6 @@ pub struct Reliance<F> {
     pub girths: bool,
     /// Whether the pose of a limb was known in the frame before.
     pub limb: F,
-}
-
-/// Where one arm or leg of the start is much longer than the other, gives one the lengths of the other if that explains the first
-/// frame clearly better: a skeleton whose foot is under the floor, or ends at the shin.
-fn equalise_limb_lengths(setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
-    for pair in model.body.pairs() {
-        let bones = |limb: &usize| model.extremities.iter().find(|c| c.upper == *limb).map(|c| [c.upper, c.lower]);
-        let [one, other] = pair.iter().filter_map(bones).collect::<Vec<_>>()[..] else { continue };
-        let lengths = [one, other].map(|bones| bones.map(|limb| model.body.limbs()[limb].shape.length()));
-        let [first, second] = lengths.map(|lengths| lengths.iter().sum::<f64>());
-        if first.min(second) > UNLIKE_REACH * first.max(second) {
-            continue;
-        }
-        let start = (model.body.clone(), poses.clone());
-        let (mut least, mut best) = (start_cost(setting, model, poses, fit) - GAIN, start.clone());
-        for (bones, own, wanted) in [(other, lengths[1], lengths[0]), (one, lengths[0], lengths[1])] {
-            (model.body, *poses) = start.clone();
-            for (limb, (own, wanted)) in bones.into_iter().zip(own.into_iter().zip(wanted)) {
-                model.body.change_length(limb, wanted / own);
-            }
-            model.body.close_joints(poses);
-            let cost = start_cost(setting, model, poses, fit);
-            if cost < least {
-                (least, best) = (cost, (model.body.clone(), poses.clone()));
-            }
-        }
-        *poses = best.1;
-        model.adopt(best.0);
-    }
-}
-
-/// What the first frame has against the pose that was set, in unexplained patches.
-fn start_cost(setting: Setting, model: &Model, poses: &[Pose], fit: &mut Fit) -> f64 {
-    fit.match_points(setting.of(model), poses, &START_GATE);
-    overall_cost(setting.of(model), fit.matched(poses)).evidence
 }
 
 #[cfg(test)]

@@ -2,8 +2,10 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-use super::girth::{GIRTH_SIGMA, GirthFit, REMEMBERED, SHIFT_SIGMA, girth_row, kernel};
+use super::girth::{GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel};
 use crate::association::correspondence::RegionPair;
+use crate::body::Model;
+use crate::fit::{Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
@@ -18,7 +20,7 @@ const TIP_SIGMA: f64 = 0.03;
 
 /// What is known of the surface of one limb.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Outline {
+struct Outline {
     information: SMatrix<f64, 5, 5>,
     total: GirthFit,
 }
@@ -60,7 +62,7 @@ fn asked<'a>(
 impl Outline {
     /// The surface of a limb whose pose is known, from its edges in the first frame: a Gauss-Newton step, the changes made so
     /// far drawn to none.
-    pub(super) fn start<'a>(
+    fn start<'a>(
         &mut self,
         shape: &TaperedEllipticCylinder,
         working_from_limb: &Pose,
@@ -76,7 +78,7 @@ impl Outline {
     }
 
     /// How much longer a limb with a free distal end is, as a factor, by the edges along the end's rim.
-    pub(super) fn tip<'a>(
+    fn tip<'a>(
         &self,
         shape: &TaperedEllipticCylinder,
         working_from_limb: &Pose,
@@ -98,7 +100,7 @@ impl Outline {
 
     /// The girth of a tracked limb: how far its axis is off in this frame is eliminated, and where it lies about the joints
     /// stays.
-    pub(super) fn follow<'a>(
+    fn follow<'a>(
         &mut self,
         shape: &TaperedEllipticCylinder,
         working_from_limb: &Pose,
@@ -130,4 +132,67 @@ impl Outline {
         self.total = total;
         Some(done)
     }
+}
+
+/// What is known of the surfaces of all limbs; nothing where depth tells it.
+#[derive(Debug, Default)]
+pub(super) struct Outlines {
+    limbs: Vec<Outline>,
+}
+
+impl Outlines {
+    /// Forgets everything.
+    pub(super) fn clear(&mut self) {
+        self.limbs.clear();
+    }
+
+    /// Fits the limbs' surfaces to the edges of their colours, where nothing else shows them.
+    pub(super) fn start(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
+        if !setting.seen.candidates.is_empty() || setting.seen.frame().colors.is_empty() {
+            return;
+        }
+        self.limbs = vec![Outline::default(); poses.len()];
+        level_pairs(model, poses);
+        for _ in 0..GIRTH_STEPS {
+            fit.match_outline(setting.of(model), poses);
+            for (limb, outline) in self.limbs.iter_mut().enumerate() {
+                let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
+                let part = &model.body.limbs()[limb];
+                if part.match_caps[1] {
+                    let longer = outline.tip(&part.shape, &poses[limb], pairs.clone());
+                    model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
+                }
+                let Some(step) = outline.start(&model.body.limbs()[limb].shape, &poses[limb], pairs) else { continue };
+                if model.body.change_girth(limb, step.shift, step.axes()) {
+                    let pose = &mut poses[limb];
+                    pose.translation += pose.rotation * step.shift;
+                }
+            }
+        }
+    }
+
+    /// Draws the girths to the edges of colours.
+    pub(super) fn follow(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
+        if self.limbs.is_empty() {
+            return;
+        }
+        fit.match_outline(setting.of(model), poses);
+        for (limb, outline) in self.limbs.iter_mut().enumerate() {
+            let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
+            if let Some(step) = outline.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
+                model.body.change_girth(limb, step.shift, step.axes());
+            }
+        }
+    }
+}
+
+/// Gives both limbs of a pair the mean of their lengths: in contours alone, a wrong start shows for long.
+fn level_pairs(model: &mut Model, poses: &mut [Pose]) {
+    for pair in model.body.pairs().iter().filter(|pair| pair.len() == 2) {
+        let lengths = [0, 1].map(|side| model.body.limbs()[pair[side]].shape.length());
+        for (limb, length) in pair.iter().zip(lengths) {
+            model.body.change_length(*limb, 0.5 * (lengths[0] + lengths[1]) / length);
+        }
+    }
+    model.body.close_joints(poses);
 }

@@ -216,7 +216,7 @@ impl Tracker {
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // What all that is worth.
         assessor.assess(setting.of(model), fit.matched(poses));
-        fit.learn_regions(setting.of(model), poses);
+        fit.learn_regions(setting.of(model));
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
         if relocalizes && self.relocalize(frame, known, share.is_some()) {

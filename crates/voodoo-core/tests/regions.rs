@@ -1,0 +1,183 @@
+//! Pose from colour regions alone: followed, told, refused and the same every time.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod color_scene;
+
+use color_scene::{CAMERAS, picture, shoot, standing};
+use voodoo_core::body::HumanModel;
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::picture::{ColorImage, ColorPixels};
+use voodoo_core::tracker::estimate::LimbStatus;
+use voodoo_core::{Body, Config, Estimate, Frame, Status, Tracker};
+
+const STEP: Vec3 = Vec3::new(0.02, 0.01, 0.0);
+const FRAMES: usize = 8;
+const RATE: f64 = 30.0;
+
+fn human() -> Body {
+    Body::human(1.75, HumanModel::Full).unwrap()
+}
+
+/// The body at a time, in frames: it walks on and lifts its left arm.
+fn posed(body: &Body, time: f64) -> Vec<Pose> {
+    let mut poses: Vec<Pose> =
+        standing(body).iter().map(|pose| Pose::from_parts(pose.translation + time * STEP, pose.rotation)).collect();
+    let upper = body.limb_index("l_upperarm").unwrap();
+    let joint = &body.limbs()[upper].parent.as_ref().unwrap().1;
+    let centre = poses[upper] * joint.limb_from_joint.translation;
+    let turn = Quat::from_axis_angle(Vec3::X, 0.3 + 0.06 * time);
+    for name in ["l_upperarm", "l_forearm", "l_hand"] {
+        let pose = &mut poses[body.limb_index(name).unwrap()];
+        *pose = Pose::from_parts(centre + turn * (pose.translation - centre), turn * pose.rotation);
+    }
+    poses
+}
+
+/// The pictures of all cameras at a time.
+fn pictures(body: &Body, time: impl Fn(usize) -> f64) -> Vec<Vec<[u8; 3]>> {
+    (0..CAMERAS).map(|camera| shoot(Some((body, &posed(body, time(camera)))), camera)).collect()
+}
+
+fn started(body: &Body, config: Config) -> Tracker {
+    let mut tracker = Tracker::new(body.clone(), config).unwrap();
+    tracker.reset_pose(&posed(body, 0.0)).unwrap();
+    tracker
+}
+
+/// Greatest distance of the sites from those of the body at a time, metres, and their mean.
+fn off(body: &Body, estimate: &Estimate, time: f64) -> (f64, f64) {
+    let poses = posed(body, time);
+    let far: Vec<f64> =
+        estimate.sites.iter().enumerate().map(|(site, at)| at.distance(body.site_position(&poses, site))).collect();
+    (far.iter().copied().fold(0.0, f64::max), far.iter().sum::<f64>() / far.len() as f64)
+}
+
+/// Follows the body through the frames; `late` is how much earlier each camera looked than the frame's stamp, in frames, and `told`
+/// whether its stamp says so.
+fn followed(config: Config, late: [f64; CAMERAS], told: bool, grey: bool) -> Estimate {
+    let body = human();
+    let mut tracker = started(&body, config);
+    for frame in 0..FRAMES {
+        let all = pictures(&body, |camera| frame as f64 - late[camera]);
+        let greys: Vec<Vec<u8>> =
+            all.iter().map(|one| one.iter().map(|[r, g, b]| r / 4 + g / 2 + b / 4).collect()).collect();
+        let stamp = frame as f64 / RATE;
+        let colors: Vec<ColorImage> = (0..CAMERAS)
+            .map(|camera| {
+                let image = picture(&all[camera], camera, stamp - if told { late[camera] / RATE } else { 0.0 });
+                if grey { ColorImage { pixels: ColorPixels::Grey(&greys[camera]), ..image } } else { image }
+            })
+            .collect();
+        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+    }
+    tracker.estimate().clone()
+}
+
+#[test]
+fn a_body_is_followed_by_colours_or_grey_alone_and_its_limbs_are_measured() {
+    let body = human();
+    for (grey, most, mean) in [(false, 0.045, 0.015), (true, 0.06, 0.02)] {
+        let estimate = followed(Config::default(), [0.0; CAMERAS], true, grey);
+        let (farthest, middle) = off(&body, &estimate, (FRAMES - 1) as f64);
+        assert!(farthest < most && middle < mean, "grey {grey}: {farthest} m, mean {middle} m");
+        assert_eq!(estimate.status, Status::Tracking, "grey {grey}");
+        for name in ["head", "l_forearm", "r_forearm", "l_thigh", "r_thigh", "l_calf", "r_calf"] {
+            let status = estimate.limb_status[body.limb_index(name).unwrap()];
+            assert_eq!(status, LimbStatus::Measured, "grey {grey}: {name}");
+        }
+    }
+    // Without regions the pictures say nothing: the body stays where it was.
+    let still = followed(Config { regions: false, ..Config::default() }, [0.0; CAMERAS], true, false);
+    assert!(off(&body, &still, (FRAMES - 1) as f64).1 > 0.1);
+}
+
+#[test]
+fn a_camera_that_looked_earlier_saw_the_body_of_then() {
+    let (body, late) = (human(), [0.0, 0.5, 0.8, 0.3]);
+    let [told, untold] = [true, false].map(|told| {
+        let estimate = followed(Config::default(), late, told, false);
+        off(&body, &estimate, (FRAMES - 1) as f64).1
+    });
+    assert!(told < 0.015 && untold > told + 0.003, "told {told} m, untold {untold} m");
+}
+
+#[test]
+fn a_body_that_is_not_in_the_pictures_is_not_tracked() {
+    let body = human();
+    let mut tracker = started(&body, Config::default());
+    let (seen, empty) = (pictures(&body, |_| 0.0), (0..CAMERAS).map(|camera| shoot(None, camera)).collect::<Vec<_>>());
+    for frame in 0..12 {
+        let stamp = frame as f64 / RATE;
+        let shown = if frame < 4 { &seen } else { &empty };
+        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&shown[camera], camera, stamp)).collect();
+        let status = tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap().status;
+        assert!(frame >= 4 || status == Status::Tracking, "{status:?} in frame {frame}");
+    }
+    assert_eq!(tracker.estimate().status, Status::Lost);
+}
+
+#[test]
+fn the_same_pictures_give_the_same_bits() {
+    let first = followed(Config::default(), [0.0; CAMERAS], true, false);
+    let again = followed(Config { threads: 2, ..Config::default() }, [0.0; CAMERAS], true, false);
+    assert_eq!(first.world_from_limb, again.world_from_limb);
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_and_changes_nothing() {
+    let body = human();
+    let mut tracker = started(&body, Config::default());
+    let seen = pictures(&body, |_| 0.0);
+    let good: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, 0.0)).collect();
+    tracker.step(&Frame { colors: &good, ..Frame::empty(0.0) }).unwrap();
+    let small = [[0_u8; 3]; 6];
+    tracker.set_background(0, &[(ColorPixels::Color(&small), [2, 3])]).unwrap();
+    let before = format!("{tracker:?}");
+    let refused = |tracker: &mut Tracker, pictures: &[ColorImage]| {
+        tracker.step(&Frame { colors: pictures, ..Frame::empty(0.1) }).unwrap_err().to_string()
+    };
+    let at = |camera: usize, stamp: f64| picture(&seen[camera], camera, stamp);
+    assert!(refused(&mut tracker, &[at(0, 0.1)]).contains("color[0].image: expected a picture like those"));
+    assert!(refused(&mut tracker, &[at(1, 0.1), at(1, 0.1)]).contains("color[1].source"));
+    assert!(refused(&mut tracker, &[at(1, 0.4)]).contains("color[0].stamp"));
+    let lens = ColorImage { intrinsics: [0.0, 1.0, 1.0, 1.0], ..at(1, 0.1) };
+    assert!(refused(&mut tracker, &[lens]).contains("color[0].camera"));
+    let unlike = [(ColorPixels::Color(&small[..]), [2, 3]), (ColorPixels::Color(&small[..4]), [2, 2])];
+    assert!(tracker.set_background(0, &unlike).unwrap_err().to_string().contains("images[1]"));
+    assert_eq!(format!("{tracker:?}"), before);
+    tracker.set_background(0, &[]).unwrap();
+    let next: Vec<ColorImage> = (0..CAMERAS).map(|camera| at(camera, 0.1)).collect();
+    assert!(tracker.step(&Frame { colors: &next, ..Frame::empty(0.1) }).is_ok());
+}
+
+#[test]
+fn pictures_of_the_empty_scene_help_where_clothes_are_as_the_room() {
+    let body = human();
+    let seen = |time: f64| pictures(&body, |_| time);
+    // A room of the shirt's colour, but for its noise.
+    let dye = |pixels: &mut Vec<[u8; 3]>, empty: &[[u8; 3]]| {
+        for (pixel, empty) in pixels.iter_mut().zip(empty) {
+            if *pixel == *empty {
+                *pixel = [pixel[0].saturating_add(40), 60, 60];
+            }
+        }
+    };
+    let rooms: Vec<Vec<[u8; 3]>> = (0..CAMERAS).map(|camera| shoot(None, camera)).collect();
+    let ends = [false, true].map(|shown| {
+        let mut tracker = started(&body, Config::default());
+        for camera in (0..CAMERAS).filter(|_| shown) {
+            let mut room = rooms[camera].clone();
+            dye(&mut room, &rooms[camera]);
+            tracker.set_background(camera as u16, &[(ColorPixels::Color(&room), [200, 240])]).unwrap();
+        }
+        for frame in 0..FRAMES {
+            let mut all = seen(frame as f64);
+            all.iter_mut().zip(&rooms).for_each(|(pixels, room)| dye(pixels, room));
+            let stamp = frame as f64 / RATE;
+            let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&all[camera], camera, stamp)).collect();
+            tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+        }
+        off(&body, tracker.estimate(), (FRAMES - 1) as f64).1
+    });
+    assert!(ends[1] < 0.02 && ends[1] < ends[0] + 0.002, "without {} m, with {} m", ends[0], ends[1]);
+}
