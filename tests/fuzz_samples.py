@@ -141,6 +141,18 @@ def pose2sim(folder: Path) -> None:
         (folder / "keypoints" / f"{name}_json" / "0.json").write_text(json.dumps(person))
 
 
+def videos(folder: Path) -> None:
+    camera = "size = [16.0, 12.0]\nmatrix = [[20.0, 0.0, 7.5], [0.0, 20.0, 5.5], [0.0, 0.0, 1.0]]\n"
+    camera += "distortions = [0.0, 0.0, 0.0, 0.0]\nrotation = [0.1, 0.2, 0.3]\ntranslation = [0.0, 0.0, 3.0]\n"
+    (folder / "Calib_x.toml").write_text(f"[a]\n{camera}[b]\n{camera}")
+    (folder / "videos").mkdir()
+    for name in "ab":
+        film = cv2.VideoWriter(str(folder / "videos" / f"{name}.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 30.0, (16, 12))
+        for level in range(3):
+            film.write(np.full((12, 16, 3), 60 * level, np.uint8))
+        film.release()
+
+
 def beside(folder: Path) -> None:
     bag(folder)
     (folder / "init.json").write_text(json.dumps({"height_m": 1.7, "frame": "cam", "joints": JOINTS}))
@@ -194,6 +206,7 @@ SAMPLES: dict[str, Sample] = {
     "c3d": Sample(c3d_file, ("x.c3d",), inside("x.c3d")),
     "trc": Sample(written("x.trc", TRC), ("x.trc",), inside("x.trc"), text=True),
     "pose2sim": Sample(pose2sim, ("Calib_x.toml", "keypoints/a_json/0.json"), inside(""), text=True),
+    "videos": Sample(videos, ("videos/a.avi",), inside("")),
     "init, truth": Sample(beside, ("init.json", "truth.csv"), inside("b"), text=True),
     "init": Sample(
         written("x.json", json.dumps({"height_m": 1.7, "stamp_s": 1.0, "joints": JOINTS})),

@@ -21,7 +21,7 @@ from voodoo.batch import task
 from voodoo.batch.run import Batch
 from voodoo.batch.storage import Store, find_sources, name_of, named, on_disk
 from voodoo.batch.summary import COLUMNS, DONE, FAILED, Row, read_table, write_table
-from voodoo.batch.table import columns_of, encode, note_of
+from voodoo.batch.table import columns_of, encode, note_of, stacked
 from voodoo.batch.task import Job, Settings, do, row_of
 from voodoo.cli import app
 from voodoo.errors import RecordingError, VoodooError
@@ -85,13 +85,19 @@ def test_columns_hold_every_frame_of_everybody():
     assert list(columns_of({}))[:4] == ["stamp_s", "person", "status", "residual_m"]
 
 
-def test_parts_of_a_track_are_the_whole():
+def test_parts_of_a_table_are_the_whole():
     whole = track_of([0.0, 0.1, 0.2, 0.3, 0.4])
     parts = [whole.of_frames(np.arange(5) // 2 == k) for k in range(3)]
-    one, other = columns_of({1: whole}), columns_of({1: task.joined(parts)})
+    one, other = columns_of({1: whole}), stacked([columns_of({1: part}) for part in parts])
     assert list(one) == list(other)
     for name, column in one.items():
         np.testing.assert_array_equal(column, other[name], err_msg=name)
+    np.testing.assert_array_equal(task.joined(parts).joints, whole.joints)
+    # What is not known of all parts is empty there.
+    sure = replace(parts[1], covariance=np.tile(np.diag([4e-4, 1e-4, 1e-4]), (2, len(T_POSE), 1, 1)))
+    mixed = stacked([columns_of({}), columns_of({1: parts[0]}), columns_of({1: sure})])
+    np.testing.assert_allclose(mixed["l_knee_sigma_m"], [np.nan, np.nan, 2e-4**0.5, 2e-4**0.5], rtol=1e-6)
+    assert mixed["stamp_s"].tolist() == [0.0, 0.1, 0.2, 0.3] and mixed["torso_status"][0] == ""
 
 
 @storing
@@ -176,7 +182,9 @@ def test_a_recording_is_done_once(job, monkeypatch):
     assert row.joint_error_m < 0.05 and row.tracking_share > 0.9 and row.recorded_s == pytest.approx(2.967, abs=1e-3)
     place = Path(job.out) / Store(job.out).place_of("sample")
     table = parquet.read_table(place)
-    assert table.num_rows == 90 and {"l_wrist_z", "l_elbow_flexion_rad", "l_forearm_status"} <= set(table.column_names)
+    assert table.num_rows == 90 and {"l_wrist_z", "l_elbow_flexion_rad", "l_forearm_status", "l_wrist_sigma_m"} <= set(
+        table.column_names
+    )
     assert len(place.read_bytes()) < 200_000
     monkeypatch.setattr(task, "_track", lambda *_: pytest.fail("it was done"))
     assert do(job) == row == row_of(job)

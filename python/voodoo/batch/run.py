@@ -20,8 +20,9 @@ from voodoo.batch.task import Job, Settings, do, failed
 from voodoo.errors import VoodooError
 
 SUMMARY, SETTINGS = "summary.csv", "settings.json"
-_EVERY_S = 2.0
-"""The table of summaries is written anew at most so often [s]."""
+_EVERY_S, _SHARE = 2.0, 0.05
+"""The table of summaries is written anew at most so often [s], and in at most so much of the time: of a million recordings it is
+large."""
 _AHEAD = 4
 """So many tasks a worker are known to the scheduler: a million at once would fill its memory."""
 _CONNECT_S, _LOOK_S = 30, 0.3
@@ -54,7 +55,7 @@ class Batch:
         pairs = named(sources, {name: row.source for name, row in known.items()})
         done = {name for name, row in self.rows.items() if row.status == DONE}
         self.jobs = [Job(name, source, out, settings) for name, source in pairs if name not in done]
-        self._written = -_EVERY_S
+        self._written, self._took = -_EVERY_S, 0.0
 
     def _check_settings(self, settings: Settings) -> None:
         told = settings.told()
@@ -78,13 +79,15 @@ class Batch:
     def take(self, row: Row) -> None:
         """Keep the row of a recording; the table is written now and then."""
         self.rows[row.recording] = row
-        if time.monotonic() - self._written >= _EVERY_S:
+        if time.monotonic() - self._written >= max(_EVERY_S, self._took / _SHARE):
             self.save()
 
     def save(self) -> None:
         """Write the table of summaries."""
+        began = time.monotonic()
         self._store.write(SUMMARY, write_table(self.rows.values()).encode())
         self._written = time.monotonic()
+        self._took = self._written - began
 
 
 def run(

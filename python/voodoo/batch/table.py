@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -23,7 +23,7 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
     """The columns of everybody's frames, in the order of time and person.
 
     `stamp_s` float64 [s], `person` int32, `status`, `residual_m`, NAME_x, NAME_y, NAME_z [m] and NAME_rad as float32 (a tenth of
-    a millimetre at a kilometre), LIMB_status. NaN and "" are what is not known.
+    a millimetre at a kilometre), LIMB_status, and NAME_sigma_m as in a result's .csv. NaN and "" are what is not known.
 
     Args:
         tracks: of each person, from 1; with the same joints.
@@ -56,6 +56,38 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
     found |= {f"{name}_rad": angles[:, number] for number, name in enumerate(first.angle_names)}
     for limb in first.limb_status:
         found[f"{limb}_status"] = words([word for track in tracks.values() for word in track.limb_status[limb]])
+    sure = [_sigmas(track) for track in tracks.values()]
+    if any(np.isfinite(part).any() for part in sure):
+        sigmas = np.concatenate(sure)[order].astype(np.float32)
+        found |= {f"{name}_sigma_m": sigmas[:, number] for number, name in enumerate(first.joint_names)}
+    return found
+
+
+def _sigmas(track: Track) -> npt.NDArray[np.float64]:
+    """Root mean square (F, J) of the standard deviations of each joint's coordinates [m]; NaN where nothing is said."""
+    if not track.covariance.size:
+        return np.full(track.joints.shape[:2], np.nan)
+    return np.asarray(np.sqrt(np.trace(track.covariance, axis1=2, axis2=3) / 3.0))
+
+
+def stacked(parts: Sequence[Columns]) -> Columns:
+    """The rows of several tables, one after the other; a column that one has not is not known there."""
+    counts = [len(part["stamp_s"]) for part in parts]
+    names = dict.fromkeys(name for part in sorted(parts, key=len, reverse=True) for name in part)
+    found: Columns = {}
+    for name in names:
+        kind = next(part[name] for part in parts if name in part)
+        if isinstance(kind, list):
+            words: list[str] = []
+            for part, count in zip(parts, counts, strict=True):
+                words += part.get(name, [""] * count)
+            found[name] = words
+        else:
+            pieces = [
+                part[name] if name in part else np.full(count, np.nan, kind.dtype)
+                for part, count in zip(parts, counts, strict=True)
+            ]
+            found[name] = np.concatenate(pieces)
     return found
 
 

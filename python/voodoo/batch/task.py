@@ -15,7 +15,7 @@ import numpy as np
 
 from voodoo.batch.storage import Store, on_disk
 from voodoo.batch.summary import DONE, FAILED, Row
-from voodoo.batch.table import columns_of, encode, note_of
+from voodoo.batch.table import Columns, columns_of, encode, note_of, stacked
 from voodoo.config import Config
 from voodoo.errors import RecordingError
 from voodoo.evaluation import metrics
@@ -91,10 +91,10 @@ def do(job: Job) -> Row:
         if done is not None:
             return done
         with on_disk(job.source) as path:
-            row, tracks = _track(job, path)
+            row, columns = _track(job, path)
             row = replace(row, seconds=time.perf_counter() - began)
             note = {"row": dict(vars(row)), "settings": job.settings.told()}
-            Store(job.out).write(Store(job.out).place_of(job.name), encode(columns_of(tracks), note))
+            Store(job.out).write(Store(job.out).place_of(job.name), encode(columns, note))
             return row
     except Exception as error:
         # One recording of a thousand costs nothing but itself, whatever is wrong with it.
@@ -124,20 +124,25 @@ def row_of(job: Job) -> Row | None:
     return row if row.source == job.source and row.status == DONE else None
 
 
-def _track(job: Job, path: Path) -> tuple[Row, Mapping[int, Track]]:
+def _track(job: Job, path: Path) -> tuple[Row, Columns]:
     chosen = job.settings
     left_out = None if chosen.strict else LeftOut()
     options = {"loader": chosen.loader} | pictures_alone(path, chosen.loader, chosen.use)
     recording = open_recording(path, left_out=left_out, bare=False, **options)
     settings = FrontEndSettings.of(recording, use=chosen.use)
     config = Config(**dict(chosen.config or {}))
-    error = float("nan")
-    tracks: Mapping[int, Track]
-    if chosen.people == 1:
-        tracks = _one_person(job, recording, settings, config, left_out)
-        error = _error(recording, tracks[1])
-    else:
-        tracks = _people(job, recording, settings, config)
+    one_only = chosen.people == 1
+    parts = (_one_person if one_only else _people)(job, recording, settings, config, left_out)
+    columns: list[Columns] = []
+    found: dict[int, list[Track]] = {}
+    for part in parts:
+        columns.append(columns_of(part))
+        for one, own in part.items():
+            found.setdefault(one, []).append(joined([own]))
+    if one_only and not columns:
+        raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
+    tracks = {one: joined(own) for one, own in found.items()}
+    error = _error(recording, tracks[1]) if one_only else float("nan")
     words = [word for one in tracks.values() for word in one.status]
     row = Row(
         recording=job.name,
@@ -149,23 +154,23 @@ def _track(job: Job, path: Path) -> tuple[Row, Mapping[int, Track]]:
         left_out=0 if left_out is None else len(left_out),
         source=job.source,
     )
-    return row, tracks
+    return row, stacked(columns)
 
 
 def _one_person(
     job: Job, recording: Recording, settings: FrontEndSettings, config: Config, left_out: LeftOut | None
-) -> Mapping[int, Track]:
+) -> Iterator[Mapping[int, Track]]:
     model = cast(HumanModel | None, job.settings.model)
     init = AUTO if job.settings.init == AUTO else None
     tracker = start_tracker(recording, init=init, model=model, config=config, use=job.settings.use)
     steps = track(recording, tracker, settings=settings, left_out=left_out)
-    parts = [Track.of(part, body=tracker.body) for part in _parts(step.estimate for step in steps)]
-    if not parts:
-        raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
-    return {1: joined(parts)}
+    for part in _parts(step.estimate for step in steps):
+        yield {1: Track.of(part, body=tracker.body)}
 
 
-def _people(job: Job, recording: Recording, settings: FrontEndSettings, config: Config) -> Mapping[int, Track]:
+def _people(
+    job: Job, recording: Recording, settings: FrontEndSettings, config: Config, _: LeftOut | None
+) -> Iterator[Mapping[int, Track]]:
     body = None if job.settings.model is None else Body.human(model=cast(HumanModel, job.settings.model))
     people = People(body, config=config, limit=job.settings.people)
     bodies: dict[int, Body] = {}
@@ -175,11 +180,8 @@ def _people(job: Job, recording: Recording, settings: FrontEndSettings, config: 
             bodies.update({person.id: people.body(person.id) for person in step.estimate})
             yield step.estimate
 
-    found: dict[int, list[Track]] = {}
     for part in _parts(estimates()):
-        for one, own in PeopleTrack.of(part, bodies=bodies).tracks.items():
-            found.setdefault(one, []).append(own)
-    return {one: joined(parts) for one, parts in sorted(found.items())}
+        yield PeopleTrack.of(part, bodies=bodies).tracks
 
 
 def _parts(items: Iterable[T]) -> Iterator[list[T]]:
@@ -190,7 +192,7 @@ def _parts(items: Iterable[T]) -> Iterator[list[T]]:
 
 
 def joined(parts: Sequence[Track]) -> Track:
-    """The frames of several tracks of one body, one after the other, without the poses of the limbs, which no table has."""
+    """The frames of several tracks of one body, one after the other, without what only the table has or nobody."""
     first = next((part for part in parts if part.found.any()), parts[0])
     return Track(
         stamps=np.concatenate([part.stamps for part in parts]),
@@ -200,12 +202,6 @@ def joined(parts: Sequence[Track]) -> Track:
         joints=np.concatenate([part.joints for part in parts]),
         limb_names=(),
         world_from_limb=np.empty((sum(map(len, parts)), 0, 4, 4)),
-        angle_names=first.angle_names,
-        angles=np.concatenate([part.angles for part in parts]),
-        limb_status={
-            limb: tuple(itertools.chain.from_iterable(part.limb_status[limb] for part in parts))
-            for limb in first.limb_status
-        },
     )
 
 

@@ -96,7 +96,8 @@ class Video(Pictures):
         told = float(film.get(cv2.CAP_PROP_FPS))
         film.release()
         rate = told if rate is None else rate
-        if not (0 < count < 1e9 and np.isfinite(rate) and 0.0 < rate < 1e5):
+        # A picture takes a byte at least: a damaged head may announce billions.
+        if not (0 < count <= path.stat().st_size and np.isfinite(rate) and 0.0 < rate < 1e5):
             raise RecordingError(f"{path}: expected pictures at a rate above zero, found {count} at {rate} a second")
         super().__init__(sensor, placed, size)
         self.stamps = (np.arange(count) / rate).tolist()
