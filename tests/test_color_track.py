@@ -3,7 +3,6 @@
 import csv
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -100,8 +99,6 @@ def test_errors_say_what_is_needed(films, tmp_path, monkeypatch):
     assert done.exit_code == 1 and "--init FILE" in done.stderr
     done = run("track", plain, "--init", films / "init.json", "--out", "p.csv")
     assert done.exit_code == 0 and len(rows_of("p.csv")) == FRAMES
-    done = run("track", plain, "--init", films / "init.json", "--background", films / "background", "--out", "p.csv")
-    assert done.exit_code == 0 and len(rows_of("p.csv")) == FRAMES
     done = run("track", plain, "--init", films / "init.json", "--background", "nothing", "--out", "p.csv")
     assert done.exit_code == 1 and "expected pictures NAME.png" in done.stderr
     done = run("track", plain, "--people", "any", "--out", "p.csv")
@@ -148,9 +145,7 @@ def test_damaged_pictures_cost_no_recording(bag, tmp_path, monkeypatch):
     rows = rows_of("p.csv")
     assert len(rows) == FRAMES and "left out" in done.stderr and rows[5]["residual_m"] == ""
     truth = scene.sequence(FRAMES).truth((FRAMES - 1) / scene.RATE)[1]
-    assert (
-        np.linalg.norm([float(rows[-1][f"l_knee_{axis}"]) - truth["l_knee"][k] for k, axis in enumerate("xyz")]) < 0.05
-    )
+    assert np.linalg.norm([float(rows[-1][f"l_knee_{axis}"]) - truth["l_knee"][k] for k, axis in enumerate("xyz")]) < 0.05
     assert run("track", "b", "--init", bag / "init.json", "--out", "p.csv", "--strict").exit_code == 1
 
 
@@ -172,8 +167,7 @@ def test_the_front_end_hands_over_pinhole_pictures_with_their_own_stamps(bag, mo
     shown = []
     monkeypatch.setattr(type(tracker), "set_background", lambda _, source, images: shown.append((source, len(images))))
     monkeypatch.setattr(module, "Frame", Recorder)
-    settings = replace(FrontEndSettings.of(recording), empty_scene=recording.empty_scene())
-    front_end = FrontEnd(tracker, settings=settings)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings.of(recording))
     frames = [front_end.frame(recorded) for recorded in list(recording)[:2]]
     assert sorted(shown) == [(f"/cam_{n}/image_raw/compressed", 2) for n in range(4)], "once a camera"
     for frame in frames:
