@@ -20,9 +20,7 @@ def found(voodoo_data, *parts):
     return path
 
 
-@pytest.mark.parametrize(
-    "name", [RENDERED[2], *(pytest.param(name, marks=pytest.mark.long) for name in RENDERED[:2])]
-)
+@pytest.mark.parametrize("name", [RENDERED[2], *(pytest.param(name, marks=pytest.mark.long) for name in RENDERED[:2])])
 def test_four_rendered_cameras_lose_nobody(voodoo_data, name):
     score, table = evaluate(found(voodoo_data, "multiview", name))
     assert score.frames == len(table.stamps) > 90 and score.exact
