@@ -77,7 +77,7 @@ mod tests {
 
     prop_compose! {
         /// A limb whose aspect changes by up to 15 %, and a camera beside it.
-        fn seen()(length in 0.1..0.6, a0 in 0.03..0.2, aspect in 0.6..1.6, taper in 0.6..1.5, change in 0.85..1.15, away in 1.5..6.0, round in 0.0..6.28, rise in -0.6..0.6)
+        fn seen()(length in 0.1..0.6, a0 in 0.03..0.2, aspect in 0.6..1.6, taper in 0.6..1.5, change in 0.85..1.15, away in 1.5..6.0, round in 0.0..std::f64::consts::TAU, rise in -0.6..0.6)
             -> (TaperedEllipticCylinder, Vec3) {
             let shape = TaperedEllipticCylinder::new(length, a0, a0 * aspect, a0 * taper, a0 * aspect * taper * change).unwrap();
             let (sin, cos) = f64::sin_cos(round);
