@@ -173,7 +173,7 @@ mod tests {
     use crate::testing::{before_wall, first_arm, standing, with_context, without_background};
 
     /// What is told of the standing body in frames of which so many prove each limb; the sums of variances of every site.
-    fn told(frames: usize, proven: impl Fn(usize, usize) -> bool) -> Vec<(Covariances, Vec<f64>)> {
+    fn told(frames: usize, sizes_found: bool, proven: impl Fn(usize, usize) -> bool) -> Vec<(Covariances, Vec<f64>)> {
         let (model, poses) = standing();
         let config = without_background();
         let pairs = model.body.pairs();
@@ -185,7 +185,7 @@ mod tests {
             (0..frames)
                 .map(|frame| {
                     let correspondences = fit.correspondences();
-                    let (body, config, sizes_found) = (&model.body, &config, false);
+                    let (body, config) = (&model.body, &config);
                     let found = Found {
                         body,
                         poses: &poses,
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn what_is_seen_is_known_to_centimetres_and_its_lengths_ever_better() {
-        let told = told(30, |_, _| true);
+        let told = told(30, false, |_, _| true);
         for variance in &told[29].1 {
             let sigma = (variance / 3.0).sqrt();
             assert!((0.008..0.05).contains(&sigma), "{sigma} m");
@@ -218,11 +218,21 @@ mod tests {
     }
 
     #[test]
+    fn joints_of_a_body_whose_sizes_nobody_told_are_known_less_and_its_turns_as_well() {
+        let [given, found] = [false, true].map(|sizes_found| told(3, sizes_found, |_, _| true).remove(2));
+        let more = 3.0 * (SITE_SIGMA[1].powi(2) - SITE_SIGMA[0].powi(2));
+        for (given, found) in given.1.iter().zip(&found.1) {
+            assert!((found - given - more).abs() < 1e-9);
+        }
+        assert_eq!(given.0.turns, found.0.turns);
+    }
+
+    #[test]
     fn an_arm_that_nothing_proves_is_known_less_from_frame_to_frame_and_at_once_when_it_shows() {
         let (model, _) = standing();
         let chain = &model.extremities[first_arm(&model)];
         let hidden: Vec<usize> = chain.limbs().collect();
-        let told = told(41, |frame, limb| !(5..40).contains(&frame) || !hidden.contains(&limb));
+        let told = told(41, false, |frame, limb| !(5..40).contains(&frame) || !hidden.contains(&limb));
         let hand = model.body.sites().iter().position(|site| hidden[2..].contains(&site.limb)).unwrap();
         let knee = model.body.site_index("l_knee").unwrap();
         let sigma = |frame: usize, site: usize| told[frame].1[site].sqrt();
