@@ -162,8 +162,9 @@ def test_pictures_of_the_empty_scene(folder, tmp_path):
     found = recording.empty_scene()
     assert {topic: len(pictures) for topic, pictures in found.items()} == dict.fromkeys(TOPICS, 2)
     np.testing.assert_array_equal(found[TOPICS[3]][1], scene.wall(3))
-    assert "--background uses: /cam_0" in str(recording.info())
-    assert FrontEndSettings.of(recording).empty_scene == {}, "not unless somebody asks for it"
+    assert "background: /cam_0" in str(recording.info())
+    assert set(FrontEndSettings.of(recording).empty_scene) == set(TOPICS)
+    assert FrontEndSettings.of(recording, use=("skin",)).empty_scene == {}
     other = tmp_path / "empty"
     (other / "cam_1").mkdir(parents=True)
     cv2.imwrite(str(other / "cam_1" / "any.png"), scene.wall(1))

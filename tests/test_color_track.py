@@ -3,7 +3,6 @@
 import csv
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,6 +12,7 @@ from typer.testing import CliRunner
 
 import color_scene as scene
 from bag_writer import write_bag
+from ik_cases import load_example
 from voodoo.cli import app
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.start import start_tracker
@@ -100,8 +100,6 @@ def test_errors_say_what_is_needed(films, tmp_path, monkeypatch):
     assert done.exit_code == 1 and "--init FILE" in done.stderr
     done = run("track", plain, "--init", films / "init.json", "--out", "p.csv")
     assert done.exit_code == 0 and len(rows_of("p.csv")) == FRAMES
-    done = run("track", plain, "--init", films / "init.json", "--background", films / "background", "--out", "p.csv")
-    assert done.exit_code == 0 and len(rows_of("p.csv")) == FRAMES
     done = run("track", plain, "--init", films / "init.json", "--background", "nothing", "--out", "p.csv")
     assert done.exit_code == 1 and "expected pictures NAME.png" in done.stderr
     done = run("track", plain, "--people", "any", "--out", "p.csv")
@@ -172,8 +170,7 @@ def test_the_front_end_hands_over_pinhole_pictures_with_their_own_stamps(bag, mo
     shown = []
     monkeypatch.setattr(type(tracker), "set_background", lambda _, source, images: shown.append((source, len(images))))
     monkeypatch.setattr(module, "Frame", Recorder)
-    settings = replace(FrontEndSettings.of(recording), empty_scene=recording.empty_scene())
-    front_end = FrontEnd(tracker, settings=settings)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings.of(recording))
     frames = [front_end.frame(recorded) for recorded in list(recording)[:2]]
     assert sorted(shown) == [(f"/cam_{n}/image_raw/compressed", 2) for n in range(4)], "once a camera"
     for frame in frames:
@@ -184,3 +181,9 @@ def test_the_front_end_hands_over_pinhole_pictures_with_their_own_stamps(bag, mo
             assert not about["camera"].distorted
             np.testing.assert_allclose(about["world_from_sensor"], scene.pose(n), atol=1e-9)
     assert json.loads((bag / "init.json").read_text())["height_m"] == 1.75
+
+
+def test_the_example_tells_how_many_cameras_it_takes(films, capsys):
+    means = load_example("color_cameras").main(films)
+    assert list(means)[:2] == ["all", "without videos/cam0.avi"] and max(means.values()) < 0.04
+    assert capsys.readouterr().out.count(" cm ") == 5

@@ -87,7 +87,7 @@ BackgroundOption = Annotated[
     typer.Option(
         "--background",
         metavar="DIR",
-        help="For colour: use pictures of the empty scene, CAMERA_0.png, ..., often those in background/ beside the recording.",
+        help="Pictures of the empty scene, CAMERA_0.png, ..., for colour; by default background/ beside the recording.",
     ),
 ]
 NUMBERS = ("rate", "metres_per_unit", "tf_max_age")

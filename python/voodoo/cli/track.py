@@ -193,8 +193,6 @@ def track_command(
         )
         with viewer_of(view, save, source.name) as viewer:
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
-            if background is not None and "color" in settings.use:
-                settings = replace(settings, empty_scene=source.empty_scene())
             how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
             result, _, _, interrupted = run(source, tracker, overlay, left_out=left_out, **how)
         for target in targets:

@@ -93,4 +93,4 @@ def scene_words(folder: Path | None, files: Mapping[str, Sequence[Path]]) -> tup
     if folder is None:
         return ()
     told = ", ".join(f"{sensor} {len(paths)}" for sensor, paths in files.items()) or "none that belongs to a camera"
-    return (f"pictures of the empty scene in {folder}, which --background uses: {told}",)
+    return (f"pictures of the empty scene in {folder}: {told}",)

@@ -93,9 +93,7 @@ class FrontEndSettings:
         """The defaults for a recording, with the inputs in `use`.
 
         Without `use` all inputs, colour regions only where nothing tells the whole body's pose (see WHOLE_BODY), and no skin
-        in pictures that are all there is. The floor is known where the root frame is one of LEVEL_FRAMES. Pictures of the empty
-        scene (`Recording.empty_scene`) are not used unless somebody asks for it: on recordings where the person wears other
-        colours than the room they made the pose worse.
+        in pictures that are all there is. The floor is known where the root frame is one of LEVEL_FRAMES.
 
         Raises:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
@@ -106,7 +104,8 @@ class FrontEndSettings:
             raise MeasurementError(
                 f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(settings.use)}"
             )
-        return replace(settings, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
+        scene = recording.empty_scene() if "color" in settings.use else {}
+        return replace(settings, empty_scene=scene, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
 
 
 def inputs_for(recording: Recording) -> tuple[str, ...]:
