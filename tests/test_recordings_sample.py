@@ -325,7 +325,8 @@ def test_loaders_options_and_paths_that_do_not_exist_are_named(tmp_path):
     with pytest.raises(RecordingError, match=r"ros2: .*ros1: .*utd-mhad: .*folder: "):
         open_recording(tmp_path)
     (tmp_path / "film.mp4").write_bytes(b"")
-    with pytest.raises(RecordingError, match=r"film\.mp4: expected depth, or keypoints of several.*, found a film"):
+    expected = r"film\.mp4: expected depth, or a folder with the films of several cameras.*, found a film"
+    with pytest.raises(RecordingError, match=expected):
         open_recording(tmp_path / "film.mp4")
     with pytest.raises(RecordingError, match="use: expected"):
         open_recording(sample_path(), use=("smell",))

@@ -158,7 +158,7 @@ def test_a_layout_nobody_knows_and_an_offset_that_is_none(recording):
 
 
 def test_inputs_that_the_recording_has_not(recording):
-    with pytest.raises(MeasurementError, match=r"\(depth, scan, skin\), found markers, keypoints"):
+    with pytest.raises(MeasurementError, match=r"\(color, depth, scan, skin\), found markers, keypoints"):
         FrontEndSettings.of(recording, use=("markers", "keypoints"))
     assert FrontEndSettings.of(recording, use=("markers", "scan")).use == ("markers", "scan")
     assert FrontEndSettings.of(recording).ground_z == 0.0

@@ -104,6 +104,8 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body
     solvers).
     """
+    regions: bool = True
+    """Draw the limbs' contours to the edges of their colours in colour pictures (whole-body solvers)."""
     facing: bool = True
     """Match depth pixels inside a limb to the side that faces their camera (whole-body solvers)."""
     limits: bool = True
