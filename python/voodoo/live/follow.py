@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.live.assembly import LiveFrame
-from voodoo.measurements import ColorImage
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate, Person
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.people import PeopleFrontEnd
+from voodoo.pipeline.run import decodable
 from voodoo.pipeline.search import knows
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.sensors.settings import FrontEndSettings
@@ -138,12 +138,5 @@ class Follower:
 
 def without_damaged(frame: LiveFrame) -> tuple[LiveFrame, list[VoodooError]]:
     """The frame without the pictures that do not decode, and why they do not."""
-    kept, errors = [], []
-    for item in frame.measurements:
-        try:
-            if isinstance(item, ColorImage):
-                _ = item.image
-            kept.append(item)
-        except VoodooError as error:
-            errors.append(error)
-    return replace(frame, measurements=tuple(kept)), errors
+    kept, errors = decodable(frame.measurements)
+    return replace(frame, measurements=kept), errors

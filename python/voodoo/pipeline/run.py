@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.measurements import ColorImage, RecordedFrame
+from voodoo.measurements import ColorImage, Measurement, RecordedFrame
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.start import Init, start_tracker
@@ -19,22 +19,22 @@ from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
-__all__ = ["Init", "TrackedFrame", "start_tracker", "stepped", "track"]
+__all__ = ["Init", "TrackedFrame", "decodable", "start_tracker", "stepped", "track"]
 
 T = TypeVar("T")
 
 
-def _readable(recorded: RecordedFrame, left_out: LeftOut) -> RecordedFrame:
-    """The frame without the pictures that do not decode; the rest of it is as good as ever."""
-    kept = []
-    for item in recorded.measurements:
+def decodable(measurements: Sequence[Measurement]) -> tuple[tuple[Measurement, ...], list[VoodooError]]:
+    """Measurements without the pictures that do not decode, and why they do not; the rest is as good as ever."""
+    kept, errors = [], []
+    for item in measurements:
         try:
             if isinstance(item, ColorImage):
                 _ = item.image
             kept.append(item)
         except VoodooError as error:
-            left_out.add_error(error)
-    return RecordedFrame(recorded.stamp, tuple(kept))
+            errors.append(error)
+    return tuple(kept), errors
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,10 @@ def stepped(
         except VoodooError as error:
             if left_out is None:
                 raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
-            recorded = _readable(recorded, left_out)
+            kept, damaged = decodable(recorded.measurements)
+            for problem in damaged:
+                left_out.add_error(problem)
+            recorded = RecordedFrame(recorded.stamp, kept)
             try:
                 estimate = step(recorded)
             except VoodooError as refusal:
