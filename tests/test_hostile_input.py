@@ -1,5 +1,6 @@
 """What a stranger or an adversary gives: an error of our own that names it, at once, and nothing else."""
 
+import json
 import os
 import signal
 import struct
@@ -29,6 +30,7 @@ from voodoo.model.camera import MOST_PIXELS
 from voodoo.recordings import open_recording, ros_bag, sample_path
 from voodoo.recordings.matlab import read_mat
 from voodoo.recordings.pictures import decode_color, decode_depth_png, picture_size
+from voodoo.recordings.truth import read_start
 
 BODY = voodoo.Body.human()
 FAR = standing_joints(BODY) | {"l_wrist": (1e300, 0.0, 0.0)}
@@ -356,3 +358,11 @@ def test_ctrl_c_ends_an_evaluation_at_once_and_keeps_what_is_done(tmp_path):
     assert took < 2.0, f"{took:.1f} s"  # on an idle machine 0.3 s
     if done:
         assert len((tmp_path / "report" / "sequences.csv").read_text().splitlines()) == 1 + done
+
+
+@pytest.mark.parametrize("number", [10**400, float("nan"), float("inf")])
+def test_a_start_beyond_all_numbers_is_refused(tmp_path, number):
+    file = tmp_path / "init.json"
+    file.write_text(json.dumps({"joints": {"l_wrist": [number, 0.0, 0.0]}}))
+    with pytest.raises(RecordingError, match=r"joint l_wrist: expected \[x, y, z\] in metres"):
+        read_start(file, lambda frame: np.eye(4))

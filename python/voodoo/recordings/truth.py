@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
@@ -69,9 +69,10 @@ def read_start(path: Path, root_from: RootFromStart) -> Start:
     joints = {}
     for name, value in content["joints"].items():
         numbers = isinstance(value, list) and len(value) == 3 and all(isinstance(v, (int, float)) for v in value)
-        if not numbers or not all(math.isfinite(v) for v in value):
+        # A whole number of JSON may be larger than any float.
+        if not numbers or not all(abs(v) <= sys.float_info.max for v in value):
             raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in metres, found {short(value)}")
-        x, y, z = (float(v) for v in root_from_base[:3, :3] @ np.array(value) + root_from_base[:3, 3])
+        x, y, z = (float(v) for v in root_from_base[:3, :3] @ np.array(value, dtype=np.float64) + root_from_base[:3, 3])
         joints[str(name)] = (x, y, z)
     start = Start(joints=joints)
     height = content.get("height_m")
