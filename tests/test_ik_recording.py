@@ -29,6 +29,7 @@ class Some(voodoo.recordings.Recording):
     """The first frames of a recording."""
 
     def __init__(self, recording, frames):
+        self.whole = recording
         self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
         self.start, self.reference = recording.start, recording.reference
         self.frames = [frame for _, frame in zip(range(frames), recording, strict=False)]
@@ -40,7 +41,7 @@ class Some(voodoo.recordings.Recording):
         return iter(self.frames)
 
     def info(self):
-        raise NotImplementedError
+        return self.whole.info()
 
 
 @pytest.fixture(scope="module")

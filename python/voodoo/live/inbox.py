@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import threading
-
+from voodoo.live.mailbox import Closing
 from voodoo.live.source import Arrival
 
 _OTHERS = 4
 """Of a sensor that joins frames: a laser may be faster than the camera."""
 
 
-class Inbox:
+class Inbox(Closing):
     """A bounded queue of arrivals.
 
     Attributes:
@@ -19,10 +18,9 @@ class Inbox:
 
     def __init__(self) -> None:
         """Nothing in it."""
+        super().__init__()
         self.dropped = 0
         self._items: list[tuple[Arrival, float]] = []
-        self._changed = threading.Condition()
-        self._closed = False
 
     def put(self, arrival: Arrival, now: float) -> None:
         """Put in what came at the host's time `now` [s]."""
@@ -39,19 +37,6 @@ class Inbox:
     def take(self, timeout: float) -> list[tuple[Arrival, float]]:
         """All that came, in the order of arrival; empty where nothing comes within `timeout` [s]."""
         with self._changed:
-            if not self._items and not self._closed:
-                self._changed.wait(timeout)
+            self._wait(timeout)
             items, self._items = self._items, []
             return items
-
-    def close(self) -> None:
-        """Nothing more comes; what is in it can still be taken."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
-    @property
-    def closed(self) -> bool:
-        """Whether nothing more comes and all was taken."""
-        with self._changed:
-            return self._closed and not self._items
