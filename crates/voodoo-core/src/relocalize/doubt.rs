@@ -8,12 +8,11 @@ use crate::math::{Pose, Vec3};
 const YOUNG: f64 = 1.0;
 /// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
 const EVERY: [usize; 2] = [3, 15];
-/// A detection is elsewhere when its shoulders and hips are this far from the tracked ones in the mean, metres: three times as far
-/// as a detector errs.
-const ELSEWHERE: f64 = 0.15;
-/// The same of knees and ankles, which cross unseen, and of elbows and wrists: twice as far as a detector errs.
-const LEGS_ELSEWHERE: f64 = 0.12;
-const ARMS_ELSEWHERE: f64 = 0.15;
+/// A detection is elsewhere when its trunk, legs or arms are this far from the tracked ones in the mean, metres: a body's joints are
+/// not quite those that a detector tells.
+const ELSEWHERE: f64 = 0.10;
+/// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
+const SIGMAS: f64 = 3.5;
 /// One detection counts for at most this, in log odds.
 const MOST_ODDS: f64 = 4.0;
 /// From this sum of log odds on it is tried.
@@ -28,17 +27,18 @@ const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 const LEGS: [&str; 4] = ["l_knee", "r_knee", "l_ankle", "r_ankle"];
 const ARMS: [&str; 4] = ["l_elbow", "r_elbow", "l_wrist", "r_wrist"];
 
-/// Mean distance of detected joints from the tracked ones, metres.
-fn apart(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0_f64);
+/// Whether detected joints are elsewhere than the tracked ones, by that many standard deviations.
+fn is_elsewhere(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str], sigmas: f64) -> bool {
+    let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
     for name in names {
         if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
             let tracked: Vec3 = body.site_position(world_from_limb, site);
-            sum += seen.position.distance(tracked);
+            apart += seen.position.distance(tracked);
+            spread += seen.sigma;
             count += 1.0;
         }
     }
-    sum / count.max(1.0)
+    apart > ELSEWHERE * count && apart > sigmas * spread
 }
 
 /// What detections said of a track.
@@ -91,12 +91,19 @@ impl Doubt {
         due
     }
 
-    /// Weighs a detection against the pose, world frame, by the trunk, and with `limbs` by legs and arms; whether the detection's
-    /// is to be tried.
-    pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose], limbs: bool) -> bool {
-        let apart = |names: &[&str]| apart(detection, body, world_from_limb, names);
-        let limbs_are = limbs && (apart(&LEGS) > LEGS_ELSEWHERE || apart(&ARMS) > ARMS_ELSEWHERE);
-        if apart(&TRUNK) > ELSEWHERE || limbs_are {
+    /// Weighs a detection against the pose, world frame: by the trunk, and by legs and arms where the track is `young` or one
+    /// `among` several; whether the detection's is to be tried.
+    pub(super) fn weigh(
+        &mut self,
+        detection: &Detection,
+        body: &Body,
+        world_from_limb: &[Pose],
+        young: bool,
+        among: bool,
+    ) -> bool {
+        let sigmas = if among { 0.0 } else { SIGMAS };
+        let elsewhere = |names: &[&str]| is_elsewhere(detection, body, world_from_limb, names, sigmas);
+        if elsewhere(&TRUNK) || (young || among) && (elsewhere(&LEGS) || elsewhere(&ARMS)) {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST_ODDS);
         } else {
             self.elsewhere = 0.0;
@@ -150,9 +157,14 @@ mod tests {
         let tracked = body.rest_pose(Pose::identity());
         let about = Pose::from_parts(Vec3::ZERO, Quat::from_rotation_z(std::f64::consts::PI));
         let aside = Pose::from_parts(0.4 * Vec3::X, Quat::IDENTITY);
-        let near = Pose::from_parts(0.1 * Vec3::X, Quat::IDENTITY);
-        let tried = |root| Doubt::default().weigh(&seen_at(root), &body, &tracked, false);
-        assert_eq!([about, aside, near].map(tried), [true, true, false]);
+        let near = Pose::from_parts(0.09 * Vec3::X, Quat::IDENTITY);
+        let tried = |root, sigma| {
+            let mut seen = seen_at(root);
+            seen.joints.iter_mut().for_each(|joint| joint.sigma = sigma);
+            [false, true].map(|among| Doubt::default().weigh(&seen, &body, &tracked, false, among))
+        };
+        assert_eq!([about, aside, near].map(|root| tried(root, 0.05)), [[true; 2], [true; 2], [false; 2]]);
+        assert_eq!(tried(aside, 0.2), [false, true], "unsure of it");
     }
 
     #[test]
