@@ -1,8 +1,7 @@
 //! What must hold for any pose, shift, weight: the step as K06 IV-B says, and the changes of the body.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod scene;
-
+use crate::scene;
 use proptest::prelude::*;
 use voodoo_core::body::kinematics::{hinge_axis, joint_turn, place};
 use voodoo_core::body::{HumanModel, Joint};

@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-use super::girth::{ALIKE, GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel};
+use super::girth::{
+    ALIKE, GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel,
+};
 use crate::association::correspondence::RegionPair;
 use crate::body::Model;
 use crate::fit::{Fit, Setting};
