@@ -38,7 +38,7 @@ def means(found, truth):
     return np.array([np.mean([errors[f"{side}_{joint}"] for side in "lr"]) for joint in ("elbow", "knee")])
 
 
-@pytest.mark.parametrize("name", ["dev_03_punch", "dev_05_walk"])
+@pytest.mark.parametrize("name", ["dev_03_punch", pytest.param("dev_05_walk", marks=pytest.mark.long)])
 def test_images_halve_the_error_of_the_inner_joints(sequence, solved, name):
     plain, one, two = (solved(name, views) for views in (0, 1, 2))
     for found in (one, two):
@@ -59,7 +59,7 @@ def test_images_halve_the_error_of_the_inner_joints(sequence, solved, name):
             assert (sequence.side[frame].distance[v[seen], u[seen]] < -1.0).all(), (frame, joint)
 
 
-@pytest.mark.parametrize("name", ["dev_03_punch", "dev_07_sword_cmu"])
+@pytest.mark.parametrize("name", [pytest.param("dev_03_punch", marks=pytest.mark.long), "dev_07_sword_cmu"])
 def test_the_mean_posture_helps_where_one_view_does_not_tell(solved, name):
     alone = solved(name, 1)
     plain, one, two = (solved(name, views, rest="mean") for views in (0, 1, 2))
@@ -96,6 +96,7 @@ def test_the_best_guess_among_turns():
     assert every == pytest.approx(9 / 4) and around == pytest.approx(1 / 3)
 
 
+@pytest.mark.long
 def test_four_real_cameras(voodoo_data):
     if not (voodoo_data / "pose2sim" / "videos").is_dir():
         pytest.skip("the videos of Pose2Sim are not there")
