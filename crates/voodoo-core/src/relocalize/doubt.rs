@@ -1,13 +1,14 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
+use super::turns::Turns;
 use crate::body::Body;
 use crate::detect::Detection;
 use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 const YOUNG: f64 = 1.0;
-/// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
-const EVERY: [usize; 2] = [3, 15];
+/// Seconds from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
+const EVERY: [f64; 2] = [0.1, 0.5];
 /// A detection is elsewhere when its trunk, legs or arms are this far from the tracked ones in the mean, metres: a body's joints are
 /// not quite those that a detector tells.
 const ELSEWHERE: f64 = 0.10;
@@ -48,8 +49,7 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    /// Frames since the last look.
-    waited: Option<usize>,
+    looks: Turns,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
     elsewhere: f64,
     nobody: f64,
@@ -78,17 +78,11 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
-    /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
+    /// Whether a detector shall look at a frame. `doubtful`: a limb is not where it should be, or the body is `lost`.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;
         self.since = self.since.or(Some(stamp));
-        self.waited = self.waited.map(|frames| frames + 1);
-        let every = if young { EVERY[0] } else { EVERY[1] };
-        let due = (young || doubtful) && self.waited.is_none_or(|frames| frames >= every);
-        if due {
-            self.waited = Some(0);
-        }
-        due
+        (young || doubtful) && self.looks.take(stamp, if young { EVERY[0] } else { EVERY[1] })
     }
 
     /// Weighs a detection against the pose, world frame: by the trunk, and by legs and arms where the track is `young` or one
@@ -139,9 +133,9 @@ mod tests {
         let count = |from: f64, doubtful, lost| {
             let mut doubt = Doubt::default();
             doubt.due(0.0, false, false);
-            (1..=30).filter(|frame| doubt.due(from + f64::from(*frame) / 60.0, doubtful, lost)).count()
+            (1..=57).filter(|frame| doubt.due(from + f64::from(*frame) / 60.0, doubtful, lost)).count()
         };
-        assert_eq!([count(0.0, false, false), count(2.0, false, true), count(2.0, true, false)], [10, 10, 2]);
+        assert_eq!([count(0.0, false, false), count(2.0, false, true), count(2.0, true, false)], [9, 11, 3]);
         assert_eq!(count(2.0, false, false), 0);
     }
 

@@ -11,6 +11,7 @@ mod posture;
 mod seeds;
 mod segment_motion;
 mod trials;
+mod turns;
 mod watch;
 
 use crate::association::correspondence::Correspondences;

@@ -2,16 +2,17 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-use super::girth::{GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel};
+use super::girth::{
+    ALIKE, GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel,
+};
 use crate::association::correspondence::RegionPair;
 use crate::body::Model;
 use crate::fit::{Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Edges of neighbouring lines, and of following frames, err alike: so many tell as much as one.
+/// Edges of neighbouring lines err alike: so many tell as much as one.
 const LINES_ALIKE: f64 = 3.0;
-const FRAMES_ALIKE: f64 = 10.0;
 /// How far the axis of a tracked limb is off across itself, metres.
 const AXIS_SIGMA: f64 = 0.02;
 
@@ -35,6 +36,11 @@ impl Default for Outline {
     }
 }
 
+/// What an edge counts for.
+fn weight(pair: &RegionPair) -> f64 {
+    kernel(pair.distance) * pair.information / LINES_ALIKE
+}
+
 /// Normal equations of a limb's edges: for shift and girth.
 struct Asked {
     h: SMatrix<f64, 5, 5>,
@@ -52,7 +58,7 @@ fn asked<'a>(
         let n = working_from_limb.inverse_transform_vector(pair.normal);
         let girth = girth_row(shape, foot, n);
         let row = SVector::from([n.x, n.y, girth.x, girth.y, girth.z]);
-        let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
+        let weight = weight(pair);
         h += weight * row * row.transpose();
         g += weight * pair.distance * row;
     }
@@ -91,7 +97,7 @@ impl Outline {
             if foot.z < shape.length() * 0.999 {
                 continue;
             }
-            let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
+            let weight = weight(pair);
             h += weight * along * along;
             g += weight * along * pair.distance;
         }
@@ -110,8 +116,8 @@ impl Outline {
         if h.trace() <= 0.0 {
             return None;
         }
-        let (h, g) = (h / FRAMES_ALIKE, g / FRAMES_ALIKE);
-        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * FRAMES_ALIKE);
+        let (h, g) = (h / ALIKE, g / ALIKE);
+        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * ALIKE);
         let mixed = h.fixed_view::<3, 2>(2, 0);
         let inverse = aside.try_inverse()?;
         let own = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
