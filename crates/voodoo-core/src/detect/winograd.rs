@@ -36,7 +36,7 @@ impl Winograd {
     pub(super) fn of(weights: &[f32], bias: &[f32]) -> Self {
         let none = vec![0.0; bias.len()];
         let inputs = weights.len().checked_div(bias.len() * KERNEL * KERNEL).unwrap_or(0);
-        let mut transformed = vec![Vec::with_capacity(bias.len() * inputs); PLACES];
+        let mut transformed = vec![Vec::new(); PLACES];
         for kernel in weights.chunks_exact((KERNEL * KERNEL * inputs).max(1)) {
             for input in 0..inputs {
                 let at = |ky: usize, kx: usize| kernel[(ky * KERNEL + kx) * inputs + input];

@@ -4,11 +4,11 @@ use crate::math::Vec3;
 use crate::observation::frame::Frame;
 
 /// What is measured so much nearer than a joint hides it, metres: more than half of a body is thick.
-const HIDES: f64 = 0.3;
+const COVERS: f64 = 0.3;
 /// A body is hidden when this share of its joints is: its own arms hide less of it, and who stands before it may be slimmer.
 const HIDDEN_SHARE: f64 = 0.33;
 /// What stands before a hidden body is at least so much nearer to a camera, metres.
-const BEFORE: f64 = 0.4;
+const NEARER: f64 = 0.4;
 /// Who was hidden is waited for so long, seconds.
 const WAITS: f64 = 2.0;
 
@@ -33,7 +33,7 @@ impl Hidden {
         let (mut hidden, mut all, mut root) = (0, 0, None);
         for joint in joints {
             let mut measured = frame.images.iter().filter_map(|image| image.measured(joint));
-            hidden += i32::from(measured.any(|[z, own]| z > 0.0 && z < own - HIDES));
+            hidden += i32::from(measured.any(|[z, own]| z > 0.0 && z < own - COVERS));
             all += 1;
             root = root.or(Some(joint));
         }
@@ -53,7 +53,7 @@ impl Hidden {
         let Some((_, own)) = self.last else { return false };
         frame.images.iter().any(|image| {
             let sensor_from_world = image.world_from_sensor.inverse();
-            (sensor_from_world * place).z < (sensor_from_world * own).z - BEFORE
+            (sensor_from_world * place).z < (sensor_from_world * own).z - NEARER
         })
     }
 }
