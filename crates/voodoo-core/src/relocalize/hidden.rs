@@ -8,14 +8,14 @@ const COVERS: f64 = 0.3;
 /// A body is hidden when this share of its joints is: its own arms hide less of it, and who stands before it may be slimmer.
 const HIDDEN_SHARE: f64 = 0.33;
 /// What stands before a hidden body is at least so much nearer to a camera, metres.
-const NEARER: f64 = 0.4;
+const IN_FRONT: f64 = 0.4;
 /// Who was hidden is waited for so long, seconds.
 const WAITS: f64 = 2.0;
 
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
 pub(super) struct Hidden {
-    /// It was seen and tracked since the start: one that was given wrongly may lie behind the body.
+    /// It was seen where it was thought to be: a start that was given wrongly may lie behind the body.
     seen: bool,
     /// When it was hidden the last time, seconds, and where it stood before or was tracked since, world frame.
     last: Option<(f64, Vec3)>,
@@ -27,8 +27,7 @@ impl Hidden {
         *self = Self::default();
     }
 
-    /// Notes what a frame shows where a body's joints are, the root's first, world frame; whether it is `tracked`, and whether it was
-    /// `seen` for certain.
+    /// Notes what a frame shows where a body's joints are, the root's first, world frame; whether it is `tracked`, or at least seen.
     pub(super) fn observe(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, seen: bool) {
         let (mut hidden, mut all, mut root) = (0, 0, None);
         for joint in joints {
@@ -53,7 +52,7 @@ impl Hidden {
         let Some((_, own)) = self.last else { return false };
         frame.images.iter().any(|image| {
             let sensor_from_world = image.world_from_sensor.inverse();
-            (sensor_from_world * place).z < (sensor_from_world * own).z - NEARER
+            (sensor_from_world * place).z < (sensor_from_world * own).z - IN_FRONT
         })
     }
 }

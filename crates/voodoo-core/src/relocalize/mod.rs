@@ -160,9 +160,8 @@ impl Relocalizer {
     }
 
     /// Notes what a frame shows where the body's joints are, the root's first, world frame: what hides the body is somebody else.
-    pub fn look_out(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool) {
-        let seen = tracked || !self.doubt.young(frame.stamp);
-        self.hidden.observe(frame, joints, tracked, seen);
+    pub fn look_out(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
+        self.hidden.observe(frame, joints, tracked, !lost);
     }
 
     /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; `among` several

@@ -253,7 +253,7 @@ impl Tracker {
         let lost = self.assessor.status() == Status::Lost;
         if !among {
             let joints = self.motion.world_from_limb().map(|limb| limb.translation);
-            self.relocalizer.look_out(frame, joints, self.assessor.status() == Status::Tracking);
+            self.relocalizer.look_out(frame, joints, self.assessor.status() == Status::Tracking, lost);
         }
         if known && self.relocalizer.detection().is_some() && !self.relocalizer.hides(frame) {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
