@@ -9,14 +9,16 @@ const COVERS: f64 = 0.3;
 const HIDDEN_SHARE: f64 = 0.33;
 /// What stands before a hidden body is at least so much nearer to a camera, metres.
 const IN_FRONT: f64 = 0.4;
+/// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
+const SEEN_FRAMES: usize = 10;
 /// Who was hidden is waited for so long, seconds.
 const WAITS: f64 = 2.0;
 
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
 pub(super) struct Hidden {
-    /// It was seen where it was thought to be: a start that was given wrongly may lie behind the body.
-    seen: bool,
+    /// Frames in which it was seen where it was thought to be.
+    seen: usize,
     /// When it was hidden the last time, seconds, and where it stood before or was tracked since, world frame.
     last: Option<(f64, Vec3)>,
 }
@@ -39,10 +41,10 @@ impl Hidden {
         let Some(root) = root else { return };
         if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
-            self.last = self.seen.then_some((frame.stamp, place));
+            self.last = (self.seen >= SEEN_FRAMES).then_some((frame.stamp, place));
             return;
         }
-        self.seen |= seen;
+        self.seen += usize::from(seen);
         let last = self.last.filter(|(last, _)| frame.stamp - last < WAITS);
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
@@ -77,8 +79,10 @@ mod tests {
                 [0.6 * Vec3::X, 0.6 * Vec3::Z, -0.6 * Vec3::Z].map(|off| hidden.by(frame, root + off))
             })
         };
-        assert_eq!(after(&covered, 0.0, false), [false; 3], "it was never tracked");
-        assert_eq!(after(&open, 0.1, true), [false; 3], "nothing stands before it");
+        assert_eq!(after(&covered, -2.0, false), [false; 3], "it was never seen");
+        for frame in 0..SEEN_FRAMES {
+            assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing stands before it");
+        }
         assert_eq!(after(&covered, 0.2, true), [false, false, true]);
         for tracked in [false, true] {
             assert_eq!(

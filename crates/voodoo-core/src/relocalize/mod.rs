@@ -28,7 +28,6 @@ use belief::Belief;
 pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 use doubt::Doubt;
 use facing::Known;
-use hidden::Hidden;
 use people::People;
 pub(crate) use people::sized;
 use posture::{Place, Postures};
@@ -58,7 +57,6 @@ pub struct Relocalizer {
     people: People,
     doubt: Doubt,
     belief: Belief,
-    hidden: Hidden,
     /// A detector knows bodies like this one.
     known: bool,
 }
@@ -68,7 +66,6 @@ impl Relocalizer {
     pub fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.watch.restart();
         self.doubt.restart();
-        self.hidden.restart();
         self.belief = Belief::default();
         self.known = People::know(&model.body);
         self.motion.clear();
@@ -146,7 +143,7 @@ impl Relocalizer {
     /// Whether what a detector saw stands before the body, which is hidden.
     pub fn hides(&self, frame: &Frame) -> bool {
         let place = self.people.seen().and_then(|seen| seen.joint("humanoid_root"));
-        place.is_some_and(|root| self.hidden.by(frame, root.position))
+        place.is_some_and(|root| self.watch.hidden.by(frame, root.position))
     }
 
     /// What a detector saw in this frame, if it looked.
@@ -161,7 +158,7 @@ impl Relocalizer {
 
     /// Notes what a frame shows where the body's joints are, the root's first, world frame: what hides the body is somebody else.
     pub fn look_out(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
-        self.hidden.observe(frame, joints, tracked, !lost);
+        self.watch.hidden.observe(frame, joints, tracked, !lost);
     }
 
     /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; `among` several
@@ -239,7 +236,7 @@ impl Relocalizer {
         self.watch.explained = None;
         fit.exchange(&mut self.matched);
         let mut found: Option<f64> = None;
-        let apart = |segment: &&Segment| !self.hidden.by(frame, segment.centre + origin);
+        let apart = |segment: &&Segment| !self.watch.hidden.by(frame, segment.centre + origin);
         let fitting = self.segments.found().iter().filter(|segment| self.postures.fits(segment)).filter(apart);
         for segment in fitting.take(MOST_SEGMENTS) {
             let bounds = Aabb::new(segment.low - Vec3::splat(MARGIN), segment.high + Vec3::splat(MARGIN));

@@ -1,5 +1,7 @@
 //! When a body is searched: after some frames in which it was lost, and for a while after it was found.
 
+use super::hidden::Hidden;
+
 /// The body is searched from this many frames on in which it was lost: a blurred frame is no loss.
 const LOST_PATIENCE: usize = 3;
 /// After it was found, every so manyth frame is searched again for so long, seconds, or until it was seen to walk: another
@@ -30,12 +32,15 @@ pub(super) struct Watch {
     frames: usize,
     /// Whether the present pose explains what may be the body, if anything may.
     pub(super) explained: Option<bool>,
+    /// What stands before it.
+    pub(super) hidden: Hidden,
 }
 
 impl Watch {
     /// The body was set anew: nothing is lost.
     pub(super) fn restart(&mut self) {
         (self.lost, self.until) = (0, None);
+        self.hidden.restart();
     }
 
     /// In how many of the last frames the body was lost, from the one on in which the search began; `None` otherwise.
