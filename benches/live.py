@@ -104,7 +104,7 @@ def overload(seconds: float) -> dict[str, object]:
         return {"source_hz": rate} | watched(Session(live, follower), seconds)
 
 
-def ros2(peer: str, rate: float, seconds: float) -> dict[str, object]:
+def ros2(peer: str, rate: float, seconds: float, queue: int) -> dict[str, object]:
     folder = Path(os.environ.get("TMPDIR", "/tmp"))
     images, report = folder / "voodoo-bench-images.npz", folder / "voodoo-bench-report.json"
     k = np.array([CAMERA.fx, 0, CAMERA.cx, 0, CAMERA.fy, CAMERA.cy, 0, 0, 1.0])
@@ -123,6 +123,8 @@ def ros2(peer: str, rate: float, seconds: float) -> dict[str, object]:
         str(rate),
         "--count",
         str(round(rate * seconds)),
+        "--queue",
+        str(queue),
     ]
     theirs = subprocess.Popen(command, env=without, stdout=subprocess.PIPE, text=True)
     time.sleep(min(60.0, seconds / 2))
@@ -172,6 +174,9 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--peer", help="a Python with rclpy")
+    parser.add_argument(
+        "--queue", type=int, default=10, help="images that wait in the peer, see tests/peers/ros_peer.py"
+    )
     chosen = parser.parse_args()
     sys.setswitchinterval(5e-4)
     if chosen.what == "realsense":
@@ -181,7 +186,7 @@ def main() -> None:
     elif chosen.what == "overload":
         found = overload(chosen.seconds)
     else:
-        found = ros2(chosen.peer or sys.executable, chosen.rate, chosen.seconds)
+        found = ros2(chosen.peer or sys.executable, chosen.rate, chosen.seconds, chosen.queue)
     print(json.dumps(found, indent=2))
 
 

@@ -27,13 +27,13 @@ def seconds(stamp):
 
 
 class Peer(Node):
-    def __init__(self, file, topic, sensor_data):
+    def __init__(self, file, topic, sensor_data, queue):
         super().__init__("peer")
         content = np.load(file)
         self.images = [array.array("B", image.tobytes()) for image in content["images"]]
         self.height, self.width = content["images"].shape[1:]
         self.k = content["k"].tolist()
-        qos = qos_profile_sensor_data if sensor_data else QoSProfile(depth=10)
+        qos = qos_profile_sensor_data if sensor_data else QoSProfile(depth=queue)
         self.pictures = self.create_publisher(Image, topic, qos)
         self.infos = self.create_publisher(CameraInfo, topic.rsplit("/", 1)[0] + "/camera_info", qos)
         self.create_subscription(JointState, "/humans/bodies/body_1/joint_states", self.take_state, 50)
@@ -69,10 +69,13 @@ def main():
     options.add_argument("--count", type=int, default=300)
     options.add_argument("--topic", default=TOPIC)
     options.add_argument("--sensor-data", action="store_true")
+    options.add_argument(
+        "--queue", type=int, default=10, help="images that wait to be confirmed before they are overwritten"
+    )
     options.add_argument("--wait", type=float, default=20.0, help="for somebody who listens [s]")
     chosen = options.parse_args()
     rclpy.init()
-    peer = Peer(chosen.images, chosen.topic, chosen.sensor_data)
+    peer = Peer(chosen.images, chosen.topic, chosen.sensor_data, chosen.queue)
     executor = SingleThreadedExecutor()
     executor.add_node(peer)
     until = time.time() + chosen.wait

@@ -1,7 +1,7 @@
 //! What hangs together in a depth image, and which of it may be a person.
 
 use super::view::View;
-use crate::math::Vec3;
+use crate::math::{Vec3, widest};
 use nalgebra::{Matrix3, Vector3};
 
 /// Neighbouring pixels hang together when their depths differ by less than this, metres, and so much of the depth.
@@ -118,7 +118,10 @@ pub(super) struct Components {
     parts: Vec<Part>,
     /// Surface of the part with a label, at the label's place.
     areas: Vec<f32>,
-    too_large: Vec<u32>,
+    /// 1 for every pixel that is to be joined to its neighbours.
+    again: Vec<u8>,
+    /// To which of its neighbours each pixel is joined, a bit for each.
+    linked: Vec<u8>,
 }
 
 impl Components {
@@ -126,14 +129,13 @@ impl Components {
     pub(super) fn find(&mut self, view: &View, candidates: &mut Vec<Candidate>) {
         self.labels.clear();
         self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
+        self.again.clear();
+        self.again.resize(view.depth.len(), 1);
         let mut finer = 1.0;
-        self.join(view, finer, |_| true);
+        self.join(view, finer);
         self.measure(view);
         for _ in 0..CUTS {
-            self.too_large.clear();
-            let too_large = self.areas.iter().enumerate().filter(|(_, area)| f64::from(**area) > AREA[1]);
-            self.too_large.extend(too_large.map(|(label, _)| label as u32));
-            if self.too_large.is_empty() {
+            if !self.areas.iter().any(|area| f64::from(*area) > AREA[1]) {
                 break;
             }
             finer *= CUT_FINER;
@@ -147,46 +149,36 @@ impl Components {
 
     /// Takes too large parts apart and joins their pixels again by smaller steps.
     fn cut(&mut self, view: &View, finer: f32) {
-        let mut again = vec![false; self.labels.len()];
-        for index in 0..self.labels.len() {
-            let label = self.labels[index];
-            again[index] = label != NONE && self.too_large.binary_search(&label).is_ok();
-        }
-        for index in 0..self.labels.len() {
-            if again[index] {
-                self.labels[index] = index as u32;
+        let Self { labels, areas, again, .. } = self;
+        again.clear();
+        let too_large = |label: &u32| *label != NONE && f64::from(areas[*label as usize]) > AREA[1];
+        again.extend(labels.iter().map(|label| u8::from(too_large(label))));
+        for ((label, again), index) in labels.iter_mut().zip(again).zip(0..) {
+            if *again > 0 {
+                *label = index;
             }
         }
-        self.join(view, finer, |index| again[index]);
+        self.join(view, finer);
     }
 
-    /// Joins neighbours, and pixels with one between them, for which `of` holds.
-    fn join(&mut self, view: &View, finer: f32, of: impl Fn(usize) -> bool) {
-        let (width, depth) = (view.width, &view.depth);
-        for row in 0..view.height {
-            for column in 0..width {
-                let index = row * width + column;
-                let z = depth[index];
-                if z <= 0.0 || !of(index) {
+    /// Joins neighbours, and pixels with one between them, of those that are `again` to be joined.
+    fn join(&mut self, view: &View, finer: f32) {
+        self.link(view, finer);
+        let width = view.width;
+        for index in 0..self.labels.len() {
+            let linked = self.linked[index];
+            if linked == 0 {
+                continue;
+            }
+            // No pixel that came before hangs on this one.
+            let mut root = index as u32;
+            for (bit, back) in [1, width, 2, 2 * width].into_iter().enumerate() {
+                if linked & (1 << bit) == 0 || self.labels[index - back] == root {
                     continue;
                 }
-                // No pixel that came before hangs on this one.
-                let mut root = index as u32;
-                for (other, there) in [
-                    (index.wrapping_sub(1), column >= 1),
-                    (index.wrapping_sub(width), row >= 1),
-                    (index.wrapping_sub(2), column >= 2),
-                    (index.wrapping_sub(2 * width), row >= 2),
-                ] {
-                    if !there || depth[other] <= 0.0 || !of(other) {
-                        continue;
-                    }
-                    if (z - depth[other]).abs() < finer * (STEP[0] + STEP[1] * z.min(depth[other])) {
-                        let other = self.root(other as u32);
-                        self.labels[root.max(other) as usize] = root.min(other);
-                        root = root.min(other);
-                    }
-                }
+                let other = self.root((index - back) as u32);
+                self.labels[root.max(other) as usize] = root.min(other);
+                root = root.min(other);
             }
         }
         for index in 0..self.labels.len() {
@@ -194,6 +186,38 @@ impl Components {
                 self.labels[index] = self.root(index as u32);
             }
         }
+    }
+
+    /// Which of the pixels to the left, above, two to the left and two above each pixel is near it, a bit for each.
+    fn link(&mut self, view: &View, finer: f32) {
+        let Self { linked, again, .. } = self;
+        let width = view.width;
+        linked.clear();
+        linked.resize(view.depth.len(), 0);
+        widest(
+            #[inline(always)]
+            || {
+                for (bit, back) in [1, width, 2, 2 * width].into_iter().enumerate() {
+                    let across = back < width;
+                    // Rows one by one: none has a neighbour in the one before it.
+                    for start in (0..view.depth.len()).step_by(width.max(1)) {
+                        let from = if across { start + back } else { start };
+                        let to = start + width;
+                        if from < back || from >= to {
+                            continue;
+                        }
+                        let (own, others) = (&view.depth[from..to], &view.depth[from - back..to - back]);
+                        let (again, again_others) = (&again[from..to], &again[from - back..to - back]);
+                        let pairs = own.iter().zip(others).zip(again).zip(again_others);
+                        for (linked, (((z, other), again), again_other)) in linked[from..to].iter_mut().zip(pairs) {
+                            let near = (z - other).abs() < finer * (STEP[0] + STEP[1] * z.min(*other));
+                            let seen = (*z > 0.0) & (*other > 0.0);
+                            *linked |= (u8::from(near & seen) & again & again_other) << bit;
+                        }
+                    }
+                }
+            },
+        );
     }
 
     fn root(&mut self, mut index: u32) -> u32 {

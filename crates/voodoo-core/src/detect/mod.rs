@@ -1,6 +1,7 @@
 //! Finding people in a depth image: what may be one, what a network says of it, and where its joints are.
 
 mod components;
+mod convolution;
 pub mod crop;
 mod floor;
 mod names;
@@ -11,6 +12,7 @@ pub mod segmentation;
 mod skeleton;
 mod view;
 pub mod weights;
+mod winograd;
 
 use crate::math::{Aabb, Pose, Vec3};
 use crate::observation::frame::DepthImage;

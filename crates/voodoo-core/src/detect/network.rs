@@ -1,85 +1,15 @@
-//! The network that looks at a picture: convolutions as products of matrices.
+//! The network that looks at a picture.
 //!
-//! Maps lie channel by channel for every pixel, row by row. The structure is that of A2J (Xiong et al., "A2J: Anchor-to-Joint
-//! Regression Network", ICCV 2019) on a small residual network: every cell of a 12 x 12 grid says of every joint how much it
-//! counts and where the joint is from there.
+//! The structure is that of A2J (Xiong et al., "A2J: Anchor-to-Joint Regression Network", ICCV 2019) on a small residual network:
+//! every cell of a 12 x 12 grid says of every joint how much it counts and where the joint is from there.
 
+use super::convolution::{Convolution, Map, Working, rectify};
 use super::crop::{SIZE, WIDTH};
-use super::product::{Panels, ROWS};
+use super::product::Panels;
 use super::weights::{Weights, WeightsError};
 
 /// Numbers a cell gives for a joint: how much it counts, offset to the right, offset down, depth.
 const A_JOINT: usize = 4;
-
-/// A square map of features.
-#[derive(Clone, Debug, Default)]
-struct Map {
-    edge: usize,
-    channels: usize,
-    values: Vec<f32>,
-}
-
-/// A convolution, with what happens to its edge.
-#[derive(Debug)]
-struct Convolution {
-    panels: Panels,
-    kernel: usize,
-    stride: usize,
-    padding: usize,
-}
-
-impl Convolution {
-    fn take(weights: &mut Weights, name: &str, stride: usize) -> Result<Self, WeightsError> {
-        let (panels, kernel) = weights.layer(name, 4)?;
-        Ok(Self { panels, kernel, stride, padding: usize::from(kernel > 1) })
-    }
-
-    fn inputs(&self) -> usize {
-        self.panels.inputs / (self.kernel * self.kernel)
-    }
-
-    fn outputs(&self) -> usize {
-        self.panels.outputs
-    }
-
-    /// The map after it; `columns` is working memory.
-    fn apply(&self, map: &Map, out: &mut Map, columns: &mut Vec<f32>, relu: bool) {
-        out.edge = (map.edge + 2 * self.padding - self.kernel) / self.stride + 1;
-        out.channels = self.outputs();
-        self.gather(map, out.edge, columns);
-        self.panels.apply(columns, out.edge * out.edge, &mut out.values);
-        if relu {
-            rectify(&mut out.values);
-        }
-    }
-
-    /// What the kernel sees at every pixel, one after the other; zeros outside of the map.
-    fn gather(&self, map: &Map, edge: usize, columns: &mut Vec<f32>) {
-        let row_of = self.kernel * map.channels;
-        columns.clear();
-        let pixels = edge * edge;
-        columns.resize(pixels.div_ceil(ROWS) * ROWS * self.kernel * row_of, 0.0);
-        for (number, chunk) in columns.chunks_exact_mut(row_of).take(pixels * self.kernel).enumerate() {
-            let (pixel, ky) = (number / self.kernel, number % self.kernel);
-            let Some(row) = (pixel / edge * self.stride + ky).checked_sub(self.padding).filter(|row| *row < map.edge)
-            else {
-                continue;
-            };
-            let left = pixel % edge * self.stride;
-            let skipped = self.padding.saturating_sub(left);
-            let first = (left + skipped) - self.padding;
-            let count = (self.kernel - skipped).min(map.edge - first);
-            let from = (row * map.edge + first) * map.channels;
-            let to = skipped * map.channels;
-            let length = count * map.channels;
-            chunk[to..to + length].copy_from_slice(&map.values[from..from + length]);
-        }
-    }
-}
-
-fn rectify(values: &mut [f32]) {
-    values.iter_mut().for_each(|value| *value = value.max(0.0));
-}
 
 /// Two convolutions beside the identity.
 #[derive(Debug)]
@@ -89,15 +19,15 @@ struct Residual {
 }
 
 impl Residual {
-    fn take(weights: &mut Weights, name: &str) -> Result<Self, WeightsError> {
-        let first = Convolution::take(weights, &format!("{name}.a"), 1)?;
-        Ok(Self { first, second: Convolution::take(weights, &format!("{name}.b"), 1)? })
+    fn take(weights: &mut Weights, name: &str, edge: usize) -> Result<Self, WeightsError> {
+        let first = Convolution::take(weights, &format!("{name}.a"), 1, edge)?;
+        Ok(Self { first, second: Convolution::take(weights, &format!("{name}.b"), 1, edge)? })
     }
 
-    fn apply(&self, map: &mut Map, memory: &mut [Map; 2], columns: &mut Vec<f32>) {
+    fn apply(&self, map: &mut Map, memory: &mut [Map; 2], working: &mut Working) {
         let [between, out] = memory;
-        self.first.apply(map, between, columns, true);
-        self.second.apply(between, out, columns, false);
+        self.first.apply(map, between, working, true);
+        self.second.apply(between, out, working, false);
         map.values.iter_mut().zip(&out.values).for_each(|(value, more)| *value = (*value + more).max(0.0));
     }
 }
@@ -110,11 +40,12 @@ struct Stage {
 }
 
 impl Stage {
-    fn take(weights: &mut Weights, name: &str, stride: usize) -> Result<Self, WeightsError> {
-        let reduce = Convolution::take(weights, &format!("{name}.conv"), stride)?;
+    /// One that looks at maps of this `edge`.
+    fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
+        let reduce = Convolution::take(weights, &format!("{name}.conv"), stride, edge)?;
         let mut blocks = Vec::new();
         while weights.has(&format!("{name}.res{}.a.weight", blocks.len())) {
-            blocks.push(Residual::take(weights, &format!("{name}.res{}", blocks.len()))?);
+            blocks.push(Residual::take(weights, &format!("{name}.res{}", blocks.len()), edge / stride)?);
         }
         Ok(Self { reduce, blocks })
     }
@@ -126,13 +57,13 @@ struct Linear(Panels);
 
 impl Linear {
     fn take(weights: &mut Weights, name: &str) -> Result<Self, WeightsError> {
-        Ok(Self(weights.layer(name, 2)?.0))
+        let layer = weights.layer(name, 2)?;
+        Ok(Self(Panels::of(&layer.weights, &layer.bias)))
     }
 
     fn apply(&self, values: &[f32]) -> Vec<f32> {
-        let (mut row, mut out) = (values.to_vec(), Vec::new());
-        row.resize(ROWS * values.len(), 0.0);
-        self.0.apply(&row, 1, &mut out);
+        let mut out = vec![0.0; self.0.outputs];
+        self.0.apply(values, &mut out);
         out
     }
 }
@@ -176,7 +107,7 @@ pub struct Memory {
     maps: [Map; 4],
     between: [Map; 2],
     top: Map,
-    columns: Vec<f32>,
+    working: Working,
 }
 
 impl Network {
@@ -185,12 +116,13 @@ impl Network {
         let mut weights = Weights::read(bytes)?;
         let weights = &mut weights;
         let stages = [
-            Stage::take(weights, "s2", 4)?,
-            Stage::take(weights, "s3", 2)?,
-            Stage::take(weights, "s4", 2)?,
-            Stage::take(weights, "s5", 2)?,
+            Stage::take(weights, "s2", 4, SIZE)?,
+            Stage::take(weights, "s3", 2, SIZE / 4)?,
+            Stage::take(weights, "s4", 2, SIZE / 8)?,
+            Stage::take(weights, "s5", 2, SIZE / 16)?,
         ];
-        let top = [Convolution::take(weights, "top5", 1)?, Convolution::take(weights, "top4", 1)?];
+        let top =
+            [Convolution::take(weights, "top5", 1, SIZE / 32)?, Convolution::take(weights, "top4", 1, SIZE / 16)?];
         let hidden = if weights.has("hidden.weight") { Some(Linear::take(weights, "hidden")?) } else { None };
         let sizes = ["scale", "length", "length_scale"];
         let sizes = if weights.has("scale.weight") {
@@ -200,8 +132,8 @@ impl Network {
             None
         };
         let network = Self {
-            middle: Residual::take(weights, "mid")?,
-            head: Convolution::take(weights, "head", 1)?,
+            middle: Residual::take(weights, "mid", SIZE / 8)?,
+            head: Convolution::take(weights, "head", 1, SIZE / 8)?,
             visible: Linear::take(weights, "visible")?,
             facing: Linear::take(weights, "facing")?,
             person: Linear::take(weights, "person")?,
@@ -265,26 +197,26 @@ impl Network {
 
     /// Looks at a picture, `SIZE * SIZE` pixels.
     pub fn look(&self, picture: &[[f32; 2]], memory: &mut Memory) -> Answer {
-        let Memory { maps, between, top, columns } = memory;
+        let Memory { maps, between, top, working } = memory;
         top.edge = SIZE;
         top.channels = 2;
         top.values.clear();
         top.values.extend_from_slice(picture.as_flattened());
         for (number, stage) in self.stages.iter().enumerate() {
             let (before, rest) = maps.split_at_mut(number);
-            stage.reduce.apply(before.last().unwrap_or(top), &mut rest[0], columns, true);
+            stage.reduce.apply(before.last().unwrap_or(top), &mut rest[0], working, true);
             for block in &stage.blocks {
-                block.apply(&mut rest[0], between, columns);
+                block.apply(&mut rest[0], between, working);
             }
         }
         let mut answer = self.overall(&mean(&maps[3]));
         top.clone_from(&maps[3]);
         for (layer, skip) in self.top.iter().zip([&maps[2], &maps[1]]) {
-            layer.apply(top, &mut between[0], columns, true);
+            layer.apply(top, &mut between[0], working, true);
             enlarge(&between[0], skip, top);
         }
-        self.middle.apply(top, between, columns);
-        self.head.apply(top, &mut between[0], columns, false);
+        self.middle.apply(top, between, working);
+        self.head.apply(top, &mut between[0], working, false);
         answer.joints = (0..self.joints()).map(|joint| place(&between[0], joint)).collect();
         answer
     }
@@ -358,45 +290,6 @@ fn place(map: &Map, joint: usize) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers that look random.
-    fn noise(count: usize, seed: f32) -> Vec<f32> {
-        (0..count).map(|index| ((index as f32 + seed) * 12.9898).sin()).collect()
-    }
-
-    #[test]
-    fn a_convolution_is_the_sum_over_its_kernel() {
-        for (edge, channels, outputs, kernel, stride, padding) in
-            [(8, 3, 5, 3, 2, 1), (12, 2, 4, 6, 4, 1), (5, 6, 2, 1, 1, 0)]
-        {
-            let map = Map { edge, channels, values: noise(edge * edge * channels, 0.3) };
-            let weights = noise(outputs * kernel * kernel * channels, 7.1);
-            let panels = Panels::of(&weights, &noise(outputs, 1.7));
-            let layer = Convolution { panels, kernel, stride, padding };
-            let (mut out, mut columns) = (Map::default(), vec![5.0; 3]);
-            layer.apply(&map, &mut out, &mut columns, false);
-            assert_eq!(out.edge, (edge + 2 * padding - kernel) / stride + 1);
-            for row in 0..out.edge {
-                for column in 0..out.edge {
-                    for output in 0..outputs {
-                        let mut sum = noise(outputs, 1.7)[output];
-                        for (ky, kx) in (0..kernel).flat_map(|ky| (0..kernel).map(move |kx| (ky, kx))) {
-                            let (y, x) = (row * stride + ky, column * stride + kx);
-                            if y < padding || x < padding || y - padding >= edge || x - padding >= edge {
-                                continue;
-                            }
-                            for channel in 0..channels {
-                                let seen = map.values[((y - padding) * edge + x - padding) * channels + channel];
-                                sum += seen * weights[((output * kernel + ky) * kernel + kx) * channels + channel];
-                            }
-                        }
-                        let found = out.values[(row * out.edge + column) * outputs + output];
-                        assert!((found - sum).abs() < 1e-4, "{found} for {sum}");
-                    }
-                }
-            }
-        }
-    }
 
     #[test]
     fn a_joint_is_where_the_cells_that_count_put_it() {

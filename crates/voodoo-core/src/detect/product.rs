@@ -4,9 +4,9 @@
 
 use crate::math::widest;
 
-/// Rows and columns that are worked on together: their sums fit the registers of AVX-512, and those of half of the columns the
-/// registers of AVX2.
-pub(super) const ROWS: usize = 12;
+/// Rows that are worked on together: the network's maps have multiples of nine pixels, and the sums of nine rows and `TOGETHER`
+/// columns fit the registers of AVX-512, those of `NARROW` columns the registers of AVX2.
+const ROWS: usize = 9;
 const TOGETHER: usize = 16;
 const NARROW: usize = TOGETHER / 2;
 
@@ -30,19 +30,17 @@ impl Panels {
         for (output, bias) in bias.iter().enumerate() {
             let (group, lane) = (output / TOGETHER, output % TOGETHER);
             sorted_bias[group][lane] = *bias;
-            for input in 0..inputs {
-                sorted[group * inputs + input][lane] = weights[output * inputs + input];
+            let own = &weights[output * inputs..][..inputs];
+            for (sorted, weight) in sorted[group * inputs..][..inputs].iter_mut().zip(own) {
+                sorted[lane] = *weight;
             }
         }
         Self { inputs, outputs, weights: sorted, bias: sorted_bias }
     }
 
-    /// For each of the first `count` rows of `seen` its products with the weights, and the biases. `seen` holds rows of `inputs`
-    /// values, up to a whole number of `ROWS`.
-    pub(super) fn apply(&self, seen: &[f32], count: usize, out: &mut Vec<f32>) {
-        out.clear();
-        out.resize(count * self.outputs, 0.0);
-        if self.inputs == 0 {
+    /// For each row of `seen`, `inputs` values, its products with the weights, and the biases: a row of `out`, `outputs` values.
+    pub(super) fn apply(&self, seen: &[f32], out: &mut [f32]) {
+        if self.inputs == 0 || self.outputs == 0 {
             return;
         }
         let whole = wide_registers();
@@ -53,8 +51,9 @@ impl Panels {
                     if whole {
                         self.columns::<TOGETHER>(group, 0, seen, out);
                     } else {
-                        self.columns::<NARROW>(group, 0, seen, out);
-                        self.columns::<NARROW>(group, NARROW, seen, out);
+                        for first in (0..TOGETHER).step_by(NARROW) {
+                            self.columns::<NARROW>(group, first, seen, out);
+                        }
                     }
                 }
             },
@@ -64,19 +63,35 @@ impl Panels {
     /// The products with `WIDTH` columns of a group, from its `first` on.
     #[inline(always)]
     fn columns<const WIDTH: usize>(&self, group: usize, first: usize, seen: &[f32], out: &mut [f32]) {
-        let panel = &self.weights[group * self.inputs..][..self.inputs];
-        let Some(bias) = self.bias[group][first..].first_chunk::<WIDTH>() else { return };
         let column = group * TOGETHER + first;
         let width = WIDTH.min(self.outputs.saturating_sub(column));
-        for (tile, rows) in seen.chunks_exact(ROWS * self.inputs).enumerate() {
-            let sums = product(rows, panel, first, bias);
-            let here = out[tile * ROWS * self.outputs..].chunks_exact_mut(self.outputs);
-            here.zip(&sums).for_each(|(row, sums)| row[column..][..width].copy_from_slice(&sums[..width]));
+        let Some(bias) = self.bias[group][first..].first_chunk::<WIDTH>().filter(|_| width > 0) else { return };
+        let panel = &self.weights[group * self.inputs..][..self.inputs];
+        let whole = seen.len() / (ROWS * self.inputs);
+        let (seen, seen_last) = seen.split_at(whole * ROWS * self.inputs);
+        let (out, out_last) = out.split_at_mut(whole * ROWS * self.outputs);
+        for (rows, here) in seen.chunks_exact(ROWS * self.inputs).zip(out.chunks_exact_mut(ROWS * self.outputs)) {
+            let sums = product::<WIDTH, ROWS>(rows, panel, first, bias);
+            let here = here.chunks_exact_mut(self.outputs);
+            here.zip(&sums).for_each(|(row, sums)| store(&mut row[column..][..width], sums));
+        }
+        for (row, here) in seen_last.chunks_exact(self.inputs).zip(out_last.chunks_exact_mut(self.outputs)) {
+            let [sums] = product::<WIDTH, 1>(row, panel, first, bias);
+            store(&mut here[column..][..width], &sums);
         }
     }
 }
 
-/// Whether a register holds a whole group of columns.
+/// Copies the sums of the columns that there are, mostly all: their number is then known to the compiler.
+#[inline(always)]
+fn store<const WIDTH: usize>(to: &mut [f32], from: &[f32; WIDTH]) {
+    match to.first_chunk_mut() {
+        Some(to) => *to = *from,
+        None => to.copy_from_slice(&from[..to.len()]),
+    }
+}
+
+/// Whether registers hold the sums of a whole group of columns.
 fn wide_registers() -> bool {
     #[cfg(target_arch = "x86_64")]
     return crate::math::has_avx512();
@@ -84,20 +99,24 @@ fn wide_registers() -> bool {
     return false;
 }
 
-/// `ROWS` rows times some columns of a group, from `first` on.
+/// So many rows times some columns of a group, from `first` on.
 #[inline(always)]
-fn product<const WIDTH: usize>(
+fn product<const WIDTH: usize, const COUNT: usize>(
     rows: &[f32],
     panel: &[[f32; TOGETHER]],
     first: usize,
     bias: &[f32; WIDTH],
-) -> [[f32; WIDTH]; ROWS] {
+) -> [[f32; WIDTH]; COUNT] {
     let inputs = panel.len();
-    let rows: [&[f32]; ROWS] = std::array::from_fn(|row| &rows[row * inputs..][..inputs]);
-    let mut sums = [*bias; ROWS];
+    // Sliced one by one, their length is known to the compiler.
+    let (mut own, mut rest): ([&[f32]; COUNT], _) = ([&[]; COUNT], rows);
+    for row in &mut own {
+        (*row, rest) = rest.split_at(inputs);
+    }
+    let mut sums = [*bias; COUNT];
     for (input, weights) in panel.iter().enumerate() {
         let weights = &weights[first..][..WIDTH];
-        for (row, sums) in rows.iter().zip(&mut sums) {
+        for (row, sums) in own.iter().zip(&mut sums) {
             let value = row[input];
             for (sum, weight) in sums.iter_mut().zip(weights) {
                 *sum += value * weight;
@@ -114,14 +133,12 @@ mod tests {
     #[test]
     fn products_are_sums_of_products() {
         let number = |index: usize| (index as f32 * 12.9898).sin();
-        for (count, inputs, outputs) in [(1_usize, 5, 1), (6, 3, 16), (13, 7, 37)] {
+        for (count, inputs, outputs) in [(1_usize, 5, 1), (9, 3, 32), (20, 7, 75)] {
             let weights: Vec<f32> = (0..inputs * outputs).map(number).collect();
             let bias: Vec<f32> = (0..outputs).map(|index| number(index + 100)).collect();
-            let rows = count.div_ceil(ROWS) * ROWS;
-            let seen: Vec<f32> = (0..rows * inputs).map(|index| number(index + 1000)).collect();
-            let mut out = Vec::new();
-            Panels::of(&weights, &bias).apply(&seen, count, &mut out);
-            assert_eq!(out.len(), count * outputs);
+            let seen: Vec<f32> = (0..count * inputs).map(|index| number(index + 1000)).collect();
+            let mut out = vec![f32::NAN; count * outputs];
+            Panels::of(&weights, &bias).apply(&seen, &mut out);
             for (index, found) in out.iter().enumerate() {
                 let (row, output) = (index / outputs, index % outputs);
                 let terms = (0..inputs).map(|input| seen[row * inputs + input] * weights[output * inputs + input]);

@@ -47,6 +47,8 @@ pub(super) struct View {
     pub(super) depth: Vec<f32>,
     /// `(x/z, y/z)` of every pixel.
     pub(super) slopes: Vec<[f32; 2]>,
+    /// `x/z` of every column where the lens has no distortion.
+    across: Vec<f32>,
     /// The image's width, for its pixels' indices.
     columns: usize,
     intrinsics: [f64; 4],
@@ -64,13 +66,13 @@ impl View {
         self.depth.clear();
         self.slopes.clear();
         let [fx, fy, cx, cy] = image.intrinsics;
+        self.across.clear();
+        self.across.extend((0..image.width).step_by(step).map(|column| ((column as f64 - cx) / fx) as f32));
         for row in (0..image.height).step_by(step) {
-            for column in (0..image.width).step_by(step) {
+            let down = ((row as f64 - cy) / fy) as f32;
+            for (column, across) in (0..image.width).step_by(step).zip(&self.across) {
                 let index = row * image.width + column;
-                let slope = match image.rays {
-                    Some(rays) => rays[index],
-                    None => [((column as f64 - cx) / fx) as f32, ((row as f64 - cy) / fy) as f32],
-                };
+                let slope = image.rays.map_or([*across, down], |rays| rays[index]);
                 let z = image.pixels.get(index) * image.metres_per_unit as f32;
                 let background = around.background.get(index).is_some_and(|depth| Background::holds(*depth, z));
                 let kept = z > RANGE[0] && z < RANGE[1] && !background && !around.is_others(index);

@@ -4,7 +4,6 @@
 //! `s2.conv.weight 32 6 6 2`, then an empty line. The values follow in that order, row by row, as little-endian half floats
 //! (IEEE 754 binary16). Weights of convolutions have the shape (out, ky, kx, in), those of linear layers (out, in).
 
-use super::product::Panels;
 use std::collections::BTreeMap;
 
 /// First line of a file.
@@ -24,6 +23,14 @@ impl WeightsError {
     pub(super) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
         Self { expected: expected.into(), found: found.into() }
     }
+}
+
+/// A matrix, a row for every output and a column for every input, with its biases and the edge of its kernel.
+#[derive(Debug)]
+pub(super) struct Layer {
+    pub(super) weights: Vec<f32>,
+    pub(super) bias: Vec<f32>,
+    pub(super) kernel: usize,
 }
 
 /// Named tensors.
@@ -86,9 +93,9 @@ impl Weights {
         Ok((shape, values))
     }
 
-    /// A layer's matrix, a column for every input and a row for every output, its bias, and the edge of its kernel.
-    pub(super) fn layer(&mut self, name: &str, edges: usize) -> Result<(Panels, usize), WeightsError> {
-        let (shape, values) = self.take(&format!("{name}.weight"), edges)?;
+    /// A layer whose weights have so many edges.
+    pub(super) fn layer(&mut self, name: &str, edges: usize) -> Result<Layer, WeightsError> {
+        let (shape, weights) = self.take(&format!("{name}.weight"), edges)?;
         let (_, bias) = self.take(&format!("{name}.bias"), 1)?;
         let square = edges == 2 || shape[1] == shape[2];
         if !square || bias.len() != shape[0] {
@@ -98,7 +105,7 @@ impl Weights {
             ));
         }
         let kernel = if edges == 4 { shape[1] } else { 1 };
-        Ok((Panels::of(&values, &bias), kernel))
+        Ok(Layer { weights, bias, kernel })
     }
 }
 
@@ -127,7 +134,6 @@ fn from_half(bytes: [u8; 2]) -> f32 {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::detect::product::ROWS;
 
     #[test]
     fn half_floats_are_exact() {
@@ -151,10 +157,8 @@ mod tests {
     fn damaged_files_are_refused() {
         let good = b"voodoo person 1\nhead.weight 2 1\nhead.bias 2\n\n\x00\x3c\x00\x40\x00\x00\x00\x3c".to_vec();
         let mut weights = Weights::read(&good).unwrap();
-        let (panels, _) = weights.layer("head", 2).unwrap();
-        let mut out = Vec::new();
-        panels.apply(&[3.0; ROWS], 1, &mut out);
-        assert_eq!(out, [3.0, 7.0]);
+        let layer = weights.layer("head", 2).unwrap();
+        assert_eq!((layer.weights, layer.bias, layer.kernel), (vec![1.0, 2.0], vec![0.0, 1.0], 1));
         assert!(weights.layer("head", 2).is_err(), "taken already");
         let mut wrong =
             vec![good[..good.len() - 1].to_vec(), [&good[..], b"x"].concat(), b"voodoo person 2\n\n".to_vec()];

@@ -129,6 +129,17 @@ impl DepthImage<'_> {
         };
         f64::from(z) * Vec3::new(x, y, 1.0)
     }
+
+    /// The depth that was measured where a place of the world is seen, 0 for none, and that of the place, metres; none outside the
+    /// image. A lens's distortion is left out.
+    pub fn measured(&self, place: Vec3) -> Option<[f64; 2]> {
+        let point = self.world_from_sensor.inverse_transform_point(place);
+        let [fx, fy, cx, cy] = self.intrinsics;
+        let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
+        let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
+        let z = || f64::from(self.pixels.get(v as usize * self.width + u as usize)) * self.metres_per_unit;
+        inside.then(|| [z(), point.z])
+    }
 }
 
 /// A named site was seen at a position (K06 IV-A: 3-D point-to-point relation).

@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::{body_box, image_window};
-use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 use crate::observation::share::NOBODY;
 
 /// A surface explains what lies within this of where it is expected, metres: as far as candidates are looked for.
@@ -29,6 +29,11 @@ pub(super) struct Claimant<'a> {
 pub(super) struct Claims {
     owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
+    /// Of every pixel of an image its depth, metres, and whether something returned that is no scene.
+    depth: Vec<f32>,
+    open: Vec<bool>,
+    /// `x/z` of every column where the lens has no distortion.
+    across: Vec<f64>,
     queries: Points,
     /// The first pixel that each query stands for, and how many.
     pixels: Vec<(u32, u32)>,
@@ -56,17 +61,18 @@ impl Claims {
             self.distances.clear();
             self.distances.resize(image.pixels.len(), REACH);
             let background = scene.of(image).map_or(&[][..], Background::depth);
+            self.measure(image, background);
             for claimant in bodies.clone() {
-                self.claim(number, image, background, claimant);
+                self.claim(number, image, claimant);
             }
         }
     }
 
-    fn claim(&mut self, number: usize, image: &DepthImage, background: &[f32], claimant: Claimant) {
+    fn claim(&mut self, number: usize, image: &DepthImage, claimant: Claimant) {
         let Claimant { body, poses, .. } = claimant;
         let Some(origin) = poses.first().map(|root| root.translation) else { return };
-        self.gather(image, background, origin, &body_box(body, poses, f64::from(REACH)));
-        let Self { owners, distances, queries, pixels, nearest, limb } = self;
+        self.gather(image, origin, &body_box(body, poses, f64::from(REACH)));
+        let Self { owners, distances, queries, pixels, nearest, limb, .. } = self;
         nearest.clear();
         nearest.resize(queries.len(), REACH);
         for (own, pose) in body.limbs().iter().zip(poses) {
@@ -83,32 +89,56 @@ impl Claims {
         }
     }
 
+    /// Of all pixels of an image the depth, metres, and of those that are no scene whether something returned; what all bodies ask.
+    fn measure(&mut self, image: &DepthImage, background: &[f32]) {
+        let Self { depth, open, across, .. } = self;
+        let scale = image.metres_per_unit as f32;
+        depth.clear();
+        match image.pixels {
+            DepthPixels::U16(pixels) => depth.extend(pixels.iter().map(|pixel| f32::from(*pixel) * scale)),
+            DepthPixels::F32(pixels) => depth.extend(pixels.iter().map(|pixel| pixel * scale)),
+        }
+        open.clear();
+        open.extend(depth.iter().map(|z| *z > 0.0 && z.is_finite()));
+        for ((open, z), background) in open.iter_mut().zip(depth.iter()).zip(background) {
+            *open &= !Background::holds(*background, *z);
+        }
+        let [fx, _, cx, _] = image.intrinsics;
+        across.clear();
+        across.extend((0..image.width).map(|column| (column as f64 - cx) / fx));
+    }
+
     /// The returns within a box of the world that are no scene, about `origin`: of neighbours on one surface the first stands for
     /// all.
-    fn gather(&mut self, image: &DepthImage, background: &[f32], origin: Vec3, bounds: &Aabb) {
+    fn gather(&mut self, image: &DepthImage, origin: Vec3, bounds: &Aabb) {
         let (columns, rows) = image_window(image, &image.world_from_sensor, bounds);
         let together = (image.width / COLUMNS).max(1);
-        let scale = image.metres_per_unit as f32;
-        self.queries.clear();
-        self.pixels.clear();
+        let [_, fy, _, cy] = image.intrinsics;
+        let Self { queries, pixels, depth, open, across, .. } = self;
+        queries.clear();
+        pixels.clear();
         for row in rows {
-            let (mut index, end) = (row * image.width + columns.start, row * image.width + columns.end);
-            while index < end {
-                let z = image.pixels.get(index) * scale;
-                let mut run = 1;
-                if z > 0.0 && z.is_finite() && !background.get(index).is_some_and(|depth| Background::holds(*depth, z))
-                {
-                    let last = end.min(index + together);
-                    while index + run < last && (image.pixels.get(index + run) * scale - z).abs() < LIKE_DEPTH {
-                        run += 1;
-                    }
-                    let point = image.world_from_sensor * image.back_project(index, z);
-                    if bounds.contains_local_point(point) {
-                        self.queries.push((point - origin).to_array().map(|value| value as f32));
-                        self.pixels.push((index as u32, run as u32));
-                    }
+            let (start, down) = (row * image.width, (row as f64 - cy) / fy);
+            let (depth, open) = (&depth[start..start + image.width], &open[start..start + image.width]);
+            let mut column = columns.start;
+            while column < columns.end {
+                if !open[column] {
+                    column += 1;
+                    continue;
                 }
-                index += run;
+                let z = depth[column];
+                let last = columns.end.min(column + together);
+                let mut run = 1;
+                while column + run < last && (depth[column + run] - z).abs() < LIKE_DEPTH {
+                    run += 1;
+                }
+                let [x, y] = image.rays.map_or([across[column], down], |rays| rays[start + column].map(f64::from));
+                let point = image.world_from_sensor * (f64::from(z) * Vec3::new(x, y, 1.0));
+                if bounds.contains_local_point(point) {
+                    queries.push((point - origin).to_array().map(|value| value as f32));
+                    pixels.push(((start + column) as u32, run as u32));
+                }
+                column += run;
             }
         }
     }

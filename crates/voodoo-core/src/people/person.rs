@@ -5,7 +5,7 @@ use crate::config::Config;
 use crate::detect::{Detection, LENGTHS};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
-use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::frame::Frame;
 use crate::observation::share::Share;
 use crate::tracker::estimate::Status;
 use crate::{Body, Tracker};
@@ -121,7 +121,7 @@ impl Person {
         let sites = &self.tracker.estimate().sites;
         let (mut hidden, mut outside) = (0, 0);
         for site in sites {
-            let depths = || frame.images.iter().filter_map(|image| measured(image, *site));
+            let depths = || frame.images.iter().filter_map(|image| image.measured(*site));
             outside += usize::from(depths().next().is_none());
             hidden += usize::from(depths().any(|[z, place]| z > 0.0 && z < place - HIDES));
         }
@@ -139,14 +139,4 @@ enum Whereabouts {
     Hidden,
     Outside,
     Gone,
-}
-
-/// The depth that an image measured where a place is seen, 0 for none, and that of the place; none outside the image.
-fn measured(image: &DepthImage, place: Vec3) -> Option<[f64; 2]> {
-    let point = image.world_from_sensor.inverse_transform_point(place);
-    let [fx, fy, cx, cy] = image.intrinsics;
-    let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
-    let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < image.width as f64 && v < image.height as f64;
-    let z = || f64::from(image.pixels.get(v as usize * image.width + u as usize)) * image.metres_per_unit;
-    inside.then(|| [z(), point.z])
 }

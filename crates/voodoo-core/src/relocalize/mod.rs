@@ -6,6 +6,7 @@
 mod belief;
 mod doubt;
 mod facing;
+mod hidden;
 mod people;
 mod posture;
 mod seeds;
@@ -22,7 +23,7 @@ use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
-use crate::observation::segments::Segments;
+use crate::observation::segments::{Segment, Segments};
 use crate::observation::share::Share;
 use belief::Belief;
 pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
@@ -140,6 +141,12 @@ impl Relocalizer {
         self.people.forget();
     }
 
+    /// Whether what a detector saw stands before the body, which is hidden.
+    pub fn hides(&self, frame: &Frame) -> bool {
+        let place = self.people.seen().and_then(|seen| seen.joint("humanoid_root"));
+        place.is_some_and(|root| self.watch.hidden.by(frame, root.position))
+    }
+
     /// What a detector saw in this frame, if it looked.
     pub fn detection(&self) -> Option<&Detection> {
         self.people.seen()
@@ -148,6 +155,11 @@ impl Relocalizer {
     /// The pixels in which it saw it.
     pub fn own(&self) -> Own<'_> {
         self.people.own()
+    }
+
+    /// Notes what a frame shows where the body's joints are, the root's first, world frame: what hides the body is somebody else.
+    pub fn look_out(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
+        self.watch.hidden.observe(frame, joints, tracked, !lost);
     }
 
     /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; of a `young` track
@@ -225,7 +237,8 @@ impl Relocalizer {
         self.watch.explained = None;
         fit.exchange(&mut self.matched);
         let mut found: Option<f64> = None;
-        let fitting = self.segments.found().iter().filter(|segment| self.postures.fits(segment));
+        let apart = |segment: &&Segment| !self.watch.hidden.by(frame, segment.centre + origin);
+        let fitting = self.segments.found().iter().filter(|segment| self.postures.fits(segment)).filter(apart);
         for segment in fitting.take(MOST_SEGMENTS) {
             let bounds = Aabb::new(segment.low - Vec3::splat(MARGIN), segment.high + Vec3::splat(MARGIN));
             self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);

@@ -1,5 +1,6 @@
 //! When a body is searched: after some frames in which it was lost, and for a while after it was found.
 
+use super::hidden::Hidden;
 use super::turns::Turns;
 
 /// The body is searched from this many frames on in which it was lost: a blurred frame is no loss.
@@ -32,12 +33,15 @@ pub(super) struct Watch {
     turns: Turns,
     /// Whether the present pose explains what may be the body, if anything may.
     pub(super) explained: Option<bool>,
+    /// What stands before it.
+    pub(super) hidden: Hidden,
 }
 
 impl Watch {
     /// The body was set anew: nothing is lost.
     pub(super) fn restart(&mut self) {
         (self.lost, self.until) = (0, None);
+        self.hidden.restart();
     }
 
     /// In how many of the last frames the body was lost, from the one on in which the search began; `None` otherwise.

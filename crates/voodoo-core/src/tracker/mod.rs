@@ -251,7 +251,11 @@ impl Tracker {
     /// that is not `known` for long starts anew instead, in this frame: whether it does.
     fn relocalize(&mut self, frame: &Frame, known: bool, among: bool) -> bool {
         let lost = self.assessor.status() == Status::Lost;
-        if known && self.relocalizer.detection().is_some() {
+        if !among {
+            let joints = self.motion.world_from_limb().map(|limb| limb.translation);
+            self.relocalizer.look_out(frame, joints, self.assessor.status() == Status::Tracking, lost);
+        }
+        if known && self.relocalizer.detection().is_some() && !self.relocalizer.hides(frame) {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             let young = self.relocalizer.young(frame.stamp);
             if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, young, among)

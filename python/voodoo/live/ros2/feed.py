@@ -139,8 +139,10 @@ class RosFeed:
                     self._take_transforms(message, static=topic.endswith("tf_static"))
             elif kind == CAMERA_INFO:
                 self._take_calibration(topic, message)
-            elif topic in self._topics and kind in MEASURED and self._knows_root(topic, message, now):
-                return [self._arrival(topic, kind, message)]
+            elif topic in self._topics and kind in MEASURED:
+                if self._knows_root(topic, message, now):
+                    return [self._arrival(topic, kind, message)]
+                self.unusable += topic == self._topics[0]
         except RecordingError as error:
             self._refuse(topic, error, kind_of(error, "unreadable message"))
         return []

@@ -18,8 +18,8 @@ from voodoo.recordings.calibration import read_calibration
 
 _DISCOVERY_S = 3.0
 _LOOK_S = 0.05
-_DEPTH = 5
-_TF_DEPTH = 100
+_DEPTH, _TF_DEPTH = 30, 100
+"""Messages that wait for a busy machine, which are counted then; what comes on top nobody counts."""
 
 
 class Ros2Source(Source):

@@ -1,0 +1,99 @@
+//! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
+
+use crate::math::Vec3;
+use crate::observation::frame::Frame;
+
+/// What is measured so much nearer than a joint hides it, metres: more than half of a body is thick.
+const COVERS: f64 = 0.3;
+/// A body is hidden when this share of its joints is: its own arms hide less of it, and who stands before it may be slimmer.
+const HIDDEN_SHARE: f64 = 0.33;
+/// What stands before a hidden body is at least so much nearer to a camera, metres.
+const IN_FRONT: f64 = 0.4;
+/// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
+const SEEN_FRAMES: usize = 10;
+/// Who was hidden is waited for so long, seconds.
+const WAITS: f64 = 2.0;
+
+/// A body that is hidden, or was a moment ago.
+#[derive(Debug, Default)]
+pub(super) struct Hidden {
+    /// Frames in which it was seen where it was thought to be.
+    seen: usize,
+    /// When it was hidden the last time, seconds, and where it stood before or was tracked since, world frame.
+    last: Option<(f64, Vec3)>,
+}
+
+impl Hidden {
+    /// A new track.
+    pub(super) fn restart(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Notes what a frame shows where a body's joints are, the root's first, world frame; whether it is `tracked`, or at least seen.
+    pub(super) fn observe(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, seen: bool) {
+        let (mut hidden, mut all, mut root) = (0, 0, None);
+        for joint in joints {
+            let mut measured = frame.images.iter().filter_map(|image| image.measured(joint));
+            hidden += i32::from(measured.any(|[z, own]| z > 0.0 && z < own - COVERS));
+            all += 1;
+            root = root.or(Some(joint));
+        }
+        let Some(root) = root else { return };
+        if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
+            let place = self.last.map_or(root, |(_, place)| place);
+            self.last = (self.seen >= SEEN_FRAMES).then_some((frame.stamp, place));
+            return;
+        }
+        self.seen += usize::from(seen);
+        let last = self.last.filter(|(last, _)| frame.stamp - last < WAITS);
+        self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
+    }
+
+    /// Whether what is seen at a place of the world stands before the hidden body.
+    pub(super) fn by(&self, frame: &Frame, place: Vec3) -> bool {
+        let Some((_, own)) = self.last else { return false };
+        frame.images.iter().any(|image| {
+            let sensor_from_world = image.world_from_sensor.inverse();
+            (sensor_from_world * place).z < (sensor_from_world * own).z - IN_FRONT
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{before_wall, moved, put_board, standing, with_frame};
+
+    #[test]
+    fn what_stands_before_a_body_that_was_tracked_hides_it_and_for_a_while_after_that() {
+        let (model, poses) = standing();
+        let root = poses[0].translation;
+        let open = before_wall(&model.body, &poses);
+        let mut covered = open.clone();
+        put_board(&mut covered, root - 0.8 * Vec3::Z, [0.3, 0.9]);
+        let mut hidden = Hidden::default();
+        // At which places somebody hides the body after a frame: beside it, behind it, before it.
+        let mut after = |pixels: &[u16], stamp: f64, tracked: bool| {
+            with_frame(pixels, stamp, |frame| {
+                hidden.observe(frame, poses.iter().map(|pose| pose.translation), tracked, tracked);
+                [0.6 * Vec3::X, 0.6 * Vec3::Z, -0.6 * Vec3::Z].map(|off| hidden.by(frame, root + off))
+            })
+        };
+        assert_eq!(after(&covered, -2.0, false), [false; 3], "it was never seen");
+        for frame in 0..SEEN_FRAMES {
+            assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing stands before it");
+        }
+        assert_eq!(after(&covered, 0.2, true), [false, false, true]);
+        for tracked in [false, true] {
+            assert_eq!(
+                after(&open, if tracked { 0.4 } else { 0.3 }, tracked),
+                [false, false, true],
+                "it may come back"
+            );
+        }
+        assert_eq!(after(&open, 0.3 + WAITS, true), [false; 3], "long ago");
+        // Its own depth hides no body.
+        let near = before_wall(&model.body, &moved(&poses, -0.15 * Vec3::Z));
+        assert_eq!(after(&near, 3.0, true), [false; 3]);
+    }
+}
