@@ -37,8 +37,6 @@ pub struct LimbSupport {
     pub own: [f64; 2],
     /// A camera sees past them: the space where they would be is free.
     pub free_space: [f64; 2],
-    /// Nothing of the posed body stands before them: the share of the whole limb that should show.
-    pub front: f64,
     /// Some image says something about the limb.
     pub known: bool,
 }
@@ -47,11 +45,6 @@ impl LimbSupport {
     /// What speaks for the limb less what speaks against it.
     pub fn net(&self) -> [f64; 2] {
         [self.own[0] - self.free_space[0], self.own[1] - self.free_space[1]]
-    }
-
-    /// The same of the whole limb, of what should show of it alone.
-    pub fn share_seen(&self) -> f64 {
-        if self.front > 0.0 { (self.own[0] - self.free_space[0]) / self.front } else { 0.0 }
     }
 }
 
@@ -79,7 +72,6 @@ pub fn measure_support(
                     support.own[part] = support.own[part].max(seen.own[part]);
                     support.free_space[part] = support.free_space[part].max(seen.free_space[part]);
                 }
-                support.front = support.front.max(seen.front);
                 support.known |= seen.known;
             }
         }
@@ -115,7 +107,6 @@ fn support_seen_by(
             if others().any(|(_, other)| depth(other) < point.z - BEFORE) {
                 continue;
             }
-            support.front += lever;
             match pixel {
                 Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => count(&mut support.free_space),
                 Pixel::Foreground(z) | Pixel::Other(z) if z > point.z + SEEN_PAST => count(&mut support.free_space),

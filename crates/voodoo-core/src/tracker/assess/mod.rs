@@ -6,8 +6,7 @@
 //! good as what it hangs on.
 //!
 //! All of an arm or leg has to be right for its lower limb to be: a forearm on an arm that nothing proves may be anything that is
-//! seen there. An upper limb ends where its outer part shows or its lower limb begins. And where the whole body fits badly, so
-//! may each limb.
+//! seen there. An upper limb ends where its outer part shows or its lower limb begins.
 //!
 //! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
 //! body is called tracked of which more than a quarter of the limbs is not measured.
@@ -213,13 +212,6 @@ impl Assessor {
     fn weigh_images(&mut self, context: Context, poses: &[Pose]) {
         let Self { limbs, supports, .. } = self;
         let (model, previous) = (context.model, context.previous);
-        let (mut shares, mut count) = (0.0, 0.0_f64);
-        for support in supports.iter().filter(|support| support.known) {
-            shares += support.share_seen();
-            count += 1.0;
-        }
-        // How well the whole body fits.
-        let body = 0.5 * shares / count.max(1.0);
         let far_end =
             |poses: &[Pose], limb: usize| poses[limb] * Vec3::new(0.0, 0.0, model.body.limbs()[limb].shape.length());
         for chain in &model.extremities {
@@ -238,7 +230,7 @@ impl Assessor {
                 }
                 let known = previous.len() == poses.len();
                 let moved = if known { far_end(poses, limb).distance(far_end(previous, limb)) } else { 0.0 };
-                limbs[limb].show(evidence.map(|evidence| evidence + body), moved);
+                limbs[limb].show(evidence, moved);
             }
         }
     }

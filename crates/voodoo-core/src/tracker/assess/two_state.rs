@@ -6,13 +6,12 @@
 
 /// What speaks for a limb less what speaks against it, as a share, is weighed by this: here the odds are even, and every time as
 /// much again makes them e times greater.
-const EVEN: f64 = 0.08;
-/// One frame says no more than this, log odds: it may be disturbed.
-const MOST_SAID: f64 = 4.0;
-/// A limb goes wrong, or comes right, in so many frames of a hundred that say nothing.
-const CHANGES: f64 = 0.03;
-/// A limb that moved by a tenth of this between two frames, metres, goes wrong once in a hundred times, and with the square of
-/// the way: what was predicted wrongly is as likely drawn to something else as it is far off.
+const EVEN: f64 = 0.075;
+/// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
+/// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
+const CHANGES: f64 = 0.05;
+/// A limb whose far end moved by so much between two frames, metres, is wrong before it is seen there, and with the square of
+/// a shorter way the likelier: what was predicted is off by a share of it.
 const FAR: f64 = 0.33;
 
 /// Log odds that something is right.
@@ -25,9 +24,9 @@ impl TwoState {
     /// Takes a frame's `evidence`, log odds, after a motion of so many metres.
     pub(super) fn observe(&mut self, evidence: f64, moved: f64) {
         let before = probability(self.log_odds);
-        let goes_wrong = (CHANGES + (moved / FAR).powi(2)).min(1.0 - CHANGES);
+        let goes_wrong = (CHANGES + (moved / FAR).powi(2)).min(1.0);
         let now = before * (1.0 - goes_wrong) + (1.0 - before) * CHANGES;
-        self.log_odds = (now / (1.0 - now)).ln() + evidence;
+        self.log_odds = (now / (1.0 - now)).ln() + evidence.clamp(-most_said(), most_said());
     }
 
     /// It is likelier right than wrong.
@@ -45,7 +44,7 @@ pub(super) fn said_by(share: f64) -> f64 {
 pub(super) fn all(log_odds: &[f64]) -> f64 {
     // log(1 + exp(-z)), of each, without overflow.
     let against: f64 = log_odds.iter().map(|z| (-z.abs()).exp().ln_1p() + (-z).max(0.0)).sum();
-    bounded(-against.exp_m1().ln())
+    -against.exp_m1().ln()
 }
 
 /// Log odds that one of two things is right at least.
@@ -53,8 +52,9 @@ pub(super) fn either(one: f64, other: f64) -> f64 {
     -all(&[-one, -other])
 }
 
-fn bounded(log_odds: f64) -> f64 {
-    log_odds.clamp(-MOST_SAID, MOST_SAID)
+/// The log odds that what stood still did not change.
+fn most_said() -> f64 {
+    ((1.0 - CHANGES) / CHANGES).ln()
 }
 
 fn probability(log_odds: f64) -> f64 {
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn one_weak_frame_against_what_was_sure_does_not_turn_it_and_several_do() {
-        let (good, bad) = ((MOST_SAID, 0.0), (-1.0, 0.0));
+        let (good, bad) = ((most_said(), 0.0), (-1.0, 0.0));
         assert!(after(&[good, good, bad, bad]).holds());
         assert!(!after(&[good, good, bad, bad, bad, bad, bad]).holds());
         assert!(!after(&[bad]).holds() && after(&[good]).holds(), "nothing is taken for granted");
@@ -81,10 +81,10 @@ mod tests {
 
     #[test]
     fn what_moved_far_needs_evidence_anew() {
-        let weak = |moved| after(&[(MOST_SAID, 0.0), (-1.0, moved)]).holds();
+        let weak = |moved| after(&[(most_said(), 0.0), (-1.0, moved)]).holds();
         assert!(weak(0.05) && !weak(0.3));
         // And so it comes back.
-        assert!(after(&[(-MOST_SAID, 0.0), (MOST_SAID, 0.0), (1.0, 0.0)]).holds());
+        assert!(after(&[(-most_said(), 0.0), (most_said(), 0.0), (1.0, 0.0)]).holds());
     }
 
     #[test]
@@ -95,7 +95,8 @@ mod tests {
             let any = 1.0 - (1.0 - probability(one)) * (1.0 - probability(other));
             assert!((probability(either(one, other)) - any).abs() < 1e-12);
         }
-        assert_eq!([all(&[900.0, 900.0]), all(&[-900.0, 900.0])], [MOST_SAID, -MOST_SAID]);
+        assert_eq!([all(&[-90.0, 90.0]), either(-90.0, 5.0)], [-90.0, 5.0]);
+        assert_eq!([all(&[f64::INFINITY]), all(&[1.0, f64::NEG_INFINITY])], [f64::INFINITY, f64::NEG_INFINITY]);
     }
 
     #[test]
