@@ -1,5 +1,6 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
+use super::belief::ENOUGH_ODDS;
 use crate::body::Body;
 use crate::detect::Detection;
 use crate::math::{Pose, Vec3};
@@ -9,15 +10,10 @@ const YOUNG: f64 = 1.0;
 /// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
 const EVERY: [usize; 2] = [3, 15];
 /// A detection is elsewhere when its shoulders and hips are this far from the tracked ones in the mean, metres: three times as far
-/// as a detector errs.
+/// as a detector errs. The same of elbows and wrists, where it errs twice as much.
 const ELSEWHERE: f64 = 0.15;
-/// The same of knees and ankles, which cross unseen, and of elbows and wrists: twice as far as a detector errs.
+/// The same of knees and ankles, which cross unseen: twice as far as a detector errs.
 const LEGS_ELSEWHERE: f64 = 0.12;
-const ARMS_ELSEWHERE: f64 = 0.15;
-/// One detection counts for at most this, in log odds.
-const MOST_ODDS: f64 = 4.0;
-/// From this sum of log odds on it is tried.
-const SURE_ELSEWHERE: f64 = 4.0;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
 /// A body that has been lost for so long is gone, seconds.
@@ -95,13 +91,13 @@ impl Doubt {
     /// is to be tried.
     pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose], limbs: bool) -> bool {
         let apart = |names: &[&str]| apart(detection, body, world_from_limb, names);
-        let limbs_are = limbs && (apart(&LEGS) > LEGS_ELSEWHERE || apart(&ARMS) > ARMS_ELSEWHERE);
+        let limbs_are = limbs && (apart(&LEGS) > LEGS_ELSEWHERE || apart(&ARMS) > ELSEWHERE);
         if apart(&TRUNK) > ELSEWHERE || limbs_are {
-            self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST_ODDS);
+            self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
         } else {
             self.elsewhere = 0.0;
         }
-        self.elsewhere >= SURE_ELSEWHERE
+        self.elsewhere >= ENOUGH_ODDS
     }
 
     /// Notes what a frame said: whether the body was lost, and what a detector says of what stands where it is tracked. Whether
@@ -109,7 +105,7 @@ impl Doubt {
     pub(super) fn nobody(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
         self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
         if let Some(person) = verdict {
-            self.nobody = (self.nobody - person.clamp(-MOST_ODDS, MOST_ODDS)).max(0.0);
+            self.nobody = (self.nobody - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
         self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= GONE)
     }

@@ -21,6 +21,7 @@ use crate::association::correspondence::SitePair;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::fit::{Context, Matched};
+use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 use crate::uncertainty::Uncertainty;
 use crate::visibility::evidence::limb_visibility;
@@ -43,8 +44,6 @@ const ROUNDNESS_MEMORY: f64 = 0.9;
 const TRACKED: f64 = 0.75;
 const HALF: f64 = 0.5;
 const SOME: f64 = 0.25;
-/// A site this far from its measurement does not support its limb, metres.
-const SITE_REACH: f64 = 0.10;
 /// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
 const AT_JOINT: f64 = 0.03;
 
@@ -187,7 +186,7 @@ impl Assessor {
             } else {
                 [SUPPORT * exclusive / FEW, 0.0, 0.0]
             };
-            let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < SITE_REACH;
+            let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
             // The hips tell where the pelvis is, the shoulders the clavicles: where no depth image looks, that is measured.
             let unseen = seen.front_facing == 0.0;
