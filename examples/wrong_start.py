@@ -115,9 +115,7 @@ def seconds_until_right(wrong: np.ndarray, right: np.ndarray, stamps: np.ndarray
     return float(stamps[bad[-1] + 1] - stamps[0]) if len(bad) else 0.0
 
 
-def run(
-    path: Path, at: Sequence[float], seed: int
-) -> tuple[list[list[float]], list[list[tuple[bool, int, int]]], int]:
+def run(path: Path, at: Sequence[float], seed: int) -> tuple[list[list[float]], list[list[tuple[bool, int, int]]], int]:
     """Seconds until the body is right again and what was told of it, for each of CASES lists over the starts; and how many starts
     were left out."""
     recording = voodoo.open_recording(path)
@@ -166,7 +164,15 @@ def row(what: str, times: Sequence[float], said: Sequence[tuple[bool, int, int]]
     soon = f"{100.0 * np.mean([one[0] for one in said]):.0f} %" if said else ""
     called, wrong = sum(one[1] for one in said), sum(one[2] for one in said)
     late = f"{100.0 * called / wrong:.0f} % of {wrong}" if wrong else "none"
-    cells = [what, f"{median:.2f}" if np.isfinite(median) else "never", *shares, f"{never}", f"{len(seconds)}", soon, late]
+    cells = [
+        what,
+        f"{median:.2f}" if np.isfinite(median) else "never",
+        *shares,
+        f"{never}",
+        f"{len(seconds)}",
+        soon,
+        late,
+    ]
     return "| " + " | ".join(cells) + " |"
 
 
