@@ -48,13 +48,26 @@ def test_the_table_has_a_row_for_every_disturbance(wrong, monkeypatch, capsys):
     wrong.main()
     lines = capsys.readouterr().out.strip().splitlines()
     same, about, together = ([cell.strip() for cell in line.split("|")[1:-1]] for line in lines[2:5])
-    assert same == ["moved by 0 m", "0.00", "100 %", "100 %", "0", "1"]
-    assert about[0] == "turned by 180 degrees" and about[-1] == "1"
-    assert together[-1] == "2"
+    assert same == ["moved by 0 m", "0.00", "100 %", "100 %", "0", "1", "100 %", "none"]
+    assert about[0] == "turned by 180 degrees" and about[5] == "1"
+    assert together[5] == "2"
     assert lines[-1].endswith(": 0")
 
 
 def test_shares_count_runs_that_are_never_right(wrong):
-    cells = [cell.strip() for cell in wrong.row("all", [0.1, 0.3, 0.9, np.inf]).split("|")[1:-1]]
-    assert cells == ["all", "0.60", "50 %", "75 %", "1", "4"]
-    assert wrong.row("all", []).count("|") == 7
+    said = [(True, 0, 0), (True, 0, 0), (True, 3, 10), (False, 1, 10)]
+    cells = [cell.strip() for cell in wrong.row("all", [0.1, 0.3, 0.9, np.inf], said).split("|")[1:-1]]
+    assert cells == ["all", "0.60", "50 %", "75 %", "1", "4", "75 %", "20 % of 20"]
+    assert wrong.row("all", [], []).count("|") == 9
+
+
+def test_a_wrong_start_is_told_by_being_right_or_by_the_status(wrong):
+    stamps = np.arange(6) / 10.0
+    bad, good = np.zeros(6, dtype=bool), np.ones(6, dtype=bool)
+    tracking = np.ones(6, dtype=bool)
+    assert wrong.told(bad, tracking, stamps) == (False, 2, 2)
+    assert wrong.told(good, tracking, stamps) == (True, 0, 0)
+    late = np.array([1, 1, 1, 1, 0, 1], dtype=bool)
+    assert wrong.told(bad, late, stamps) == (False, 1, 2), "too late"
+    soon = np.array([1, 1, 1, 0, 1, 1], dtype=bool)
+    assert wrong.told(bad, soon, stamps) == (True, 2, 2)

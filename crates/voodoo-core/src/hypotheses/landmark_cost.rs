@@ -6,7 +6,7 @@ use crate::fit::Matched;
 use crate::math::{Pose, Vec3};
 
 /// A site this far from its measurement contradicts it wholly, metres: about a hand's length.
-const APART: f64 = 0.10;
+pub const APART: f64 = 0.10;
 
 /// Cost of the sites on an arm or leg that are not where they were seen, in unexplained patches: one for each unit of weight.
 /// The sites were matched at `matched.poses`, and are looked at where `poses` would put them.

@@ -10,7 +10,7 @@ mod score;
 mod suspicion;
 mod unexplained;
 
-pub use landmark_cost::body_landmark_cost;
+pub use landmark_cost::{APART, body_landmark_cost};
 pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
 use crate::association::correspondence::Correspondences;
@@ -23,8 +23,7 @@ use proposals::{
     CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean, UnexplainedCluster,
 };
 use rough::{Extremity, RoughSearch};
-use score::strain;
-use suspicion::{SUSPICIOUS, Suspicion};
+use suspicion::Suspicion;
 use unexplained::Unexplained;
 
 /// So many unexplained patches near an arm make it suspect whatever else speaks for it: nothing else than the arm is expected
@@ -32,16 +31,13 @@ use unexplained::Unexplained;
 const STRIKING: f64 = 40.0;
 /// Unexplained points are near an arm or leg within this many times its length.
 const NEARBY: f64 = 1.15;
-/// Frames in a row that have to speak against an arm or leg, and against an arm by nothing but unexplained points: a single
-/// frame may be disturbed.
+/// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
+/// a single frame may be disturbed.
 const PATIENCE: usize = 2;
-const LONG_PATIENCE: usize = 4;
 /// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
 const SEEN_GAIN: f64 = 10.0;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 const REFINE: usize = 8;
-/// A new configuration that costs more strain than this, in patches, and more than the old one, is no pose of a body.
-const STRAINED: f64 = 60.0;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]
@@ -144,9 +140,8 @@ impl Hypotheses {
         let unexplained = near.total();
         // Furniture stays open beside legs.
         let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= STRIKING;
-        let suspect =
-            unexplained >= SUSPICIOUS && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
-        let patience = if suspect { Some(PATIENCE) } else { striking.then_some(LONG_PATIENCE) };
+        let suspect = unexplained >= GAIN && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
+        let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
         self.history[at.index].persistence.observe(patience)
     }
 
@@ -215,7 +210,6 @@ impl Refined {
     ) -> bool {
         let chain = &context.model.extremities[index];
         let before = overall_cost(context, fit.matched(current));
-        let strained = strain(context, fit.matched(current), chain, current).max(STRAINED);
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.exchange(&mut self.matched);
@@ -229,8 +223,7 @@ impl Refined {
         let better = cost.total < before.total - GAIN && cost.evidence < before.evidence - SEEN_GAIN;
         // What is as suspect as before is not worth a jump.
         let mut sure = |matched: Matched| !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-        if better && strain(context, matched, chain, &self.poses) <= strained && (basis == Basis::Lean || sure(matched))
-        {
+        if better && (basis == Basis::Lean || sure(matched)) {
             return true;
         }
         fit.exchange(&mut self.matched);

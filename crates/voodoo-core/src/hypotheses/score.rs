@@ -18,7 +18,8 @@ const MOTION_STRAIN: f64 = 0.6;
 const INSIDE: f64 = 0.01;
 /// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
 const ROUGHLY: f64 = 0.08;
-/// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres.
+/// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
+/// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub const GAIN: f64 = 25.0;
 /// Points looked at when rough poses are compared, at most: costs time in proportion.
 pub const ROUGH_SAMPLE: usize = 400;

@@ -1,14 +1,11 @@
 //! Whether the frame speaks against an arm or leg where it is.
 
-use super::score::explain;
+use super::score::{GAIN, explain};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
 use crate::visibility::evidence::{EXPLAINED, Visibility, limb_visibility};
 
-/// So many unexplained patches near an arm or leg make it suspect: an area of six by six centimetres. As many it has to show of
-/// itself where unexplained points have drawn it.
-pub(super) const SUSPICIOUS: f64 = 25.0;
 /// It is idle when the patches that it alone explains are a smaller share of those it shows.
 const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
@@ -65,7 +62,7 @@ impl Suspicion {
         let upper = against(chain.upper, exclusive(0));
         let shown = seen.image.front_facing - seen.image.occluded - seen.image.free_space;
         let past = seen.side.free_space > (REFUTED * seen.side.front_facing).max(LEAST_SHOWN);
-        let drawn = drawn && (past || shown < SUSPICIOUS);
+        let drawn = drawn && (past || shown < GAIN);
         [upper || drawn, lower || drawn]
     }
 

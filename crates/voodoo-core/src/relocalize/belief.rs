@@ -3,7 +3,7 @@
 use crate::detect::Detection;
 use crate::math::Vec3;
 
-/// From this sum of log odds on it is a person.
+/// From this sum of log odds on it is a person, or one is elsewhere; no detection of a tracked one counts for more.
 pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 /// What a look counts less than its log odds: looks at a thing that stands still err alike.
 pub(crate) const LOOK_COSTS: f64 = 1.0;

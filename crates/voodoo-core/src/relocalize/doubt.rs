@@ -1,5 +1,6 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
+use super::belief::ENOUGH_ODDS;
 use super::turns::Turns;
 use crate::body::Body;
 use crate::detect::Detection;
@@ -14,10 +15,6 @@ const EVERY: [f64; 2] = [0.1, 0.5];
 const ELSEWHERE: f64 = 0.10;
 /// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
 const SIGMAS: f64 = 3.5;
-/// One detection counts for at most this, in log odds.
-const MOST_ODDS: f64 = 4.0;
-/// From this sum of log odds on it is tried.
-const SURE_ELSEWHERE: f64 = 4.0;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
 /// A body that has been lost for so long is gone, seconds.
@@ -98,11 +95,11 @@ impl Doubt {
         let sigmas = if among { 0.0 } else { SIGMAS };
         let elsewhere = |names: &[&str]| is_elsewhere(detection, body, world_from_limb, names, sigmas);
         if elsewhere(&TRUNK) || (young || among) && (elsewhere(&LEGS) || elsewhere(&ARMS)) {
-            self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST_ODDS);
+            self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
         } else {
             self.elsewhere = 0.0;
         }
-        self.elsewhere >= SURE_ELSEWHERE
+        self.elsewhere >= ENOUGH_ODDS
     }
 
     /// Notes what a frame said: whether the body was lost, and what a detector says of what stands where it is tracked. Whether
@@ -110,7 +107,7 @@ impl Doubt {
     pub(super) fn nobody(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
         self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
         if let Some(person) = verdict {
-            self.nobody = (self.nobody - person.clamp(-MOST_ODDS, MOST_ODDS)).max(0.0);
+            self.nobody = (self.nobody - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
         self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= GONE)
     }

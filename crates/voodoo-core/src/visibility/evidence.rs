@@ -8,13 +8,13 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ALONG_LIMB, SEEN_PAST, SEEN_PAST_TO_SCENE};
+use crate::visibility::{ALONG_LIMB, SEEN_PAST};
 
 /// A point this far from the model's surface is not explained by it, metres.
 pub const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
-/// Where across a limb patches are looked at, in shares of its radius from the middle.
+/// Where across a limb patches are looked at, in shares of its radius from the middle; nearer to the rim it was worse.
 const PATCHES_ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
 /// A camera nearer to a limb's axis than this, metres, looks along it and sees no patch of its side.
 const END_ON: f64 = 1e-6;
@@ -109,7 +109,7 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
 fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
     Some(match view.at(point) {
         Pixel::Unknown => return None,
-        Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => Sight::FreeSpaceViolation,
+        Pixel::Background(z) if z > point.z + 0.5 * SEEN_PAST => Sight::FreeSpaceViolation,
         Pixel::Foreground(z) | Pixel::Other(z) if z > point.z + SEEN_PAST => Sight::FreeSpaceViolation,
         Pixel::Background(z) | Pixel::Foreground(z) | Pixel::Other(z) if z > point.z - SEEN_PAST => Sight::Consistent,
         _ => Sight::Occluded,

@@ -10,18 +10,12 @@ use crate::body::two_bone::TwoBone;
 use crate::math::Pose;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
+use crate::visibility::evidence::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::{ALONG_LIMB, SEEN_PAST, SEEN_PAST_TO_SCENE};
+use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, SEEN_PAST};
 
-/// Where across a limb places are looked at, in shares of its radius from the middle; nearer to the rim, a pixel shows what
-/// lies beside it.
-const PLACES_ACROSS: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
 /// The outer part of a limb begins at this share of its length.
 const OUTER: f64 = 0.6;
-/// So many places lie in the outer part: two along, five across.
-const OUTER_PLACES: f64 = 10.0;
-/// What a camera sees at a place this near is explained by it, and by any other surface this near, metres along the ray.
-const SAME_DEPTH: f64 = 0.04;
 /// A limb stands before a place when it is nearer to the camera by this, metres: limbs overlap at their joints.
 const BEFORE: f64 = 0.01;
 
@@ -89,13 +83,14 @@ fn support_seen_by(
 ) -> LimbSupport {
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
+    let outer_sections = ALONG_LIMB.iter().filter(|t| **t > OUTER).count();
     for t in ALONG_LIMB {
         let Some(facing) = shape.section(t).facing(&camera_from_limb) else { continue };
         // The weights of all places add up to one, in the whole and in the outer part.
-        let lever = t / (ALONG_LIMB.iter().sum::<f64>() * PLACES_ACROSS.len() as f64);
-        let outer = if t > OUTER { 1.0 / OUTER_PLACES } else { 0.0 };
+        let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);
+        let outer = if t > OUTER { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
         let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
-        for s in PLACES_ACROSS {
+        for s in ACROSS_LIMB {
             let point = camera_from_limb * facing.point(s);
             let pixel = view.at(point);
             if pixel == Pixel::Unknown {
@@ -108,11 +103,11 @@ fn support_seen_by(
                 continue;
             }
             match pixel {
-                Pixel::Background(z) if z > point.z + SEEN_PAST_TO_SCENE => count(&mut support.free_space),
+                Pixel::Background(z) if z > point.z + 0.5 * SEEN_PAST => count(&mut support.free_space),
                 Pixel::Foreground(z) | Pixel::Other(z) if z > point.z + SEEN_PAST => count(&mut support.free_space),
-                Pixel::Foreground(z) if (z - point.z).abs() < SAME_DEPTH => {
+                Pixel::Foreground(z) if (z - point.z).abs() < EXPLAINED => {
                     let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
-                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < SAME_DEPTH) {
+                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {
                         count(&mut support.own);
                     }
                 }

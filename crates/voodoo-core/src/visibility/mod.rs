@@ -11,7 +11,8 @@ pub mod roundness;
 /// Where along a limb its surface is compared with images, in shares of its length: evenly, and not at the ends, which belong
 /// to the neighbours as well.
 pub(crate) const ALONG_LIMB: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-/// A camera sees past the model's surface when what may be the body lies this much behind it, metres.
+/// Where across a limb, in shares of its radius from the middle; nearer to the rim, a pixel shows what lies beside it.
+pub(crate) const ACROSS_LIMB: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+/// A camera sees past the model's surface when what may be the body lies this much behind it, metres; half as much of what is
+/// known to be the background, since that is not the body.
 pub(crate) const SEEN_PAST: f64 = 0.08;
-/// The same when what lies behind is known to be the background, metres: half, since that is not the body.
-pub(crate) const SEEN_PAST_TO_SCENE: f64 = 0.04;

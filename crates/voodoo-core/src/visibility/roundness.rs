@@ -6,10 +6,8 @@
 use crate::body::Body;
 use crate::math::Pose;
 use crate::observation::depth_view::{DepthViews, Pixel};
-use crate::visibility::ALONG_LIMB;
+use crate::visibility::{ACROSS_LIMB, ALONG_LIMB};
 
-/// How far across a limb, in shares of its radius, its rims are looked at: nearer to them, a pixel shows what lies beside.
-const RIM_ACROSS: f64 = 0.7;
 /// What is seen farther than this from the model's surface, metres along the ray, is something else.
 const SAME_THING: f64 = 0.08;
 /// Fewer places along limbs than this, of all cameras, say nothing.
@@ -35,7 +33,8 @@ pub fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> 
                         _ => None,
                     }
                 };
-                if let (Some(middle), Some(left), Some(right)) = (depths(0.0), depths(-RIM_ACROSS), depths(RIM_ACROSS))
+                if let (Some(middle), Some(left), Some(right)) =
+                    (depths(0.0), depths(ACROSS_LIMB[0]), depths(ACROSS_LIMB[4]))
                 {
                     let [expected, seen] = [0, 1].map(|kind| 0.5 * (left[kind] + right[kind]) - middle[kind]);
                     product += expected * seen;

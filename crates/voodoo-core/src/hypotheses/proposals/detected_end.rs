@@ -1,13 +1,10 @@
 //! The arm or leg ends where a detector sees its wrist or ankle.
 
-use super::{Pool, Propose};
+use super::{Pool, Propose, SWIVELS};
 use crate::detect::Detection;
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Vec3;
-
-/// Bends that are tried, as where the end was when all was well: the detector's elbow is no better than its wrist.
-const SWIVELS_DETECTED: usize = 12;
 
 /// What a detector says of this frame, if it looked.
 #[derive(Debug)]
@@ -33,7 +30,8 @@ impl Propose for DetectedEnd<'_> {
     fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
         let Some(end) = self.end(at) else { return };
         let place = end - at.context.seen.origin();
-        let cost = rough.end_at(at, place, SWIVELS_DETECTED, f64::INFINITY, &mut pool.detected.poses);
+        // The detector's elbow is no better than its wrist.
+        let cost = rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.detected.poses);
         if cost < f64::INFINITY {
             pool.detected.set(Basis::Rest);
         }

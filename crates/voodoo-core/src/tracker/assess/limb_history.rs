@@ -1,7 +1,7 @@
 //! What is known about one limb, over a few frames: evidence flickers.
 
+use super::two_state::TwoState;
 use crate::tracker::estimate::LimbStatus;
-use crate::visibility::limb_support::LimbSupport;
 
 /// Share of the visible patches that a measured limb alone explains at least.
 pub(super) const SUPPORT: f64 = 0.15;
@@ -9,17 +9,8 @@ pub(super) const SUPPORT: f64 = 0.15;
 const CONTRADICTED: f64 = 0.3;
 /// A limb of which a smaller share shows is hidden.
 const SHOWN: f64 = 0.35;
-/// The tracker relies on a limb of an arm or leg when what speaks for it less what speaks against it is this at least, of the
-/// whole limb and of its outer part.
-const INTERNAL: [f64; 2] = [0.14, 0.05];
-/// It is reported as measured when it is this for the whole limb, and for the upper one as well: one in twenty good ones is
-/// doubted so on the rendered recordings.
-const REPORTED: f64 = 0.1;
-/// The outer part of a limb shows when what speaks for it is this at least.
-const OUTER_SHOWS: f64 = 0.01;
-/// Share of the past frames in what the tracker relies on, and in what is reported: a limb is lost within few frames.
-const SLOW_MEMORY: f64 = 0.6;
-const FAST_MEMORY: f64 = 0.4;
+/// Share of the past frames in what is known of a limb's support.
+const MEMORY: f64 = 0.6;
 
 /// Running means of what frames said about a limb.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,17 +21,16 @@ pub(super) struct LimbHistory {
     contradicted: f64,
     /// Share of the facing patches not hidden.
     shown: f64,
-    /// What speaks for this limb and no other, less what speaks against it (the whole, the outer part), with a long memory and
-    /// with a short one; of limbs that images show.
-    slow: Option<[f64; 2]>,
-    fast: Option<[f64; 2]>,
+    /// That images show this limb, and no other, where it is, and so that of its far end; of limbs of which an image says
+    /// something.
+    shows: Option<[TwoState; 2]>,
     frames: usize,
 }
 
 impl LimbHistory {
     /// Takes a frame's shares: explained by it alone, seen past, not hidden.
     pub(super) fn update(&mut self, now: [f64; 3]) {
-        let keep = if self.frames == 0 { 0.0 } else { SLOW_MEMORY };
+        let keep = if self.frames == 0 { 0.0 } else { MEMORY };
         let shares = [&mut self.exclusive, &mut self.contradicted, &mut self.shown];
         for (value, now) in shares.into_iter().zip(now) {
             *value = keep * *value + (1.0 - keep) * now;
@@ -48,13 +38,16 @@ impl LimbHistory {
         self.frames += 1;
     }
 
-    /// Takes what a frame's images say of the limb.
-    pub(super) fn support(&mut self, support: &LimbSupport) {
-        let now = support.net();
-        for (value, keep) in [(&mut self.slow, SLOW_MEMORY), (&mut self.fast, FAST_MEMORY)] {
-            let mixed = |before: [f64; 2]| [0, 1].map(|part| keep * before[part] + (1.0 - keep) * now[part]);
-            *value = support.known.then(|| value.map_or(now, mixed));
-        }
+    /// Takes what a frame's images say of the limb and of its far end, log odds, after it moved by so many metres.
+    pub(super) fn show(&mut self, evidence: [f64; 2], moved: f64) {
+        let mut states = self.shows.unwrap_or_default();
+        states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, moved));
+        self.shows = Some(states);
+    }
+
+    /// No image says anything of the limb.
+    pub(super) fn hide(&mut self) {
+        self.shows = None;
     }
 
     /// The status by what the limb alone explains.
@@ -68,42 +61,19 @@ impl LimbHistory {
         }
     }
 
-    /// The status the tracker goes by: the one by support, corrected by what images prove of the limb.
-    pub(super) fn internal(&self, supported: LimbStatus) -> LimbStatus {
-        let proven = self.slow.map(|parts| parts[0] >= INTERNAL[0] && parts[1] >= INTERNAL[1]);
-        proven.map_or(supported, |proven| self.image_status(proven))
-    }
-
-    /// The status that is reported of the upper limb of an arm or leg, which ends where its outer part shows or its lower limb
-    /// begins.
-    pub(super) fn reported_upper(&self, lower: &Self, internal: LimbStatus) -> LimbStatus {
-        self.fast.map_or(internal, |_| self.image_status(self.shows() && (self.outer_shows() || lower.shows())))
-    }
-
-    /// The same of the lower limb: on an upper limb that nothing proves, it may be anything as long that is seen there.
-    pub(super) fn reported_lower(&self, upper: &Self, internal: LimbStatus) -> LimbStatus {
-        self.fast.map_or(internal, |_| self.image_status(self.shows() && upper.shows()))
+    /// The status of a limb of an arm or leg: the one by support, or what images show of it.
+    pub(super) fn status(&self, supported: LimbStatus) -> LimbStatus {
+        match self.shows {
+            None => supported,
+            Some([whole, _]) if whole.holds() => LimbStatus::Measured,
+            Some(_) if self.contradicted > CONTRADICTED => LimbStatus::Lost,
+            Some(_) => LimbStatus::Inferred,
+        }
     }
 
     /// The far end of the limb shows: what hangs on it is where it is.
-    pub(super) fn outer_shows(&self) -> bool {
-        self.fast.is_none_or(|[_, outer]| outer >= OUTER_SHOWS)
-    }
-
-    /// What the images show of the limb is enough to report that it is measured; so it is where no image says anything.
-    fn shows(&self) -> bool {
-        self.fast.is_none_or(|[whole, _]| whole >= REPORTED)
-    }
-
-    /// The status of a limb that images show.
-    fn image_status(&self, proven: bool) -> LimbStatus {
-        if proven {
-            LimbStatus::Measured
-        } else if self.contradicted > CONTRADICTED {
-            LimbStatus::Lost
-        } else {
-            LimbStatus::Inferred
-        }
+    pub(super) fn end_shows(&self) -> bool {
+        self.shows.is_none_or(|[_, end]| end.holds())
     }
 }
 
@@ -111,15 +81,14 @@ impl LimbHistory {
 mod tests {
     use super::*;
 
-    fn after(frames: &[[f64; 3]], support: Option<[f64; 2]>) -> LimbHistory {
+    fn after(frames: &[[f64; 3]], evidence: Option<[f64; 2]>) -> LimbHistory {
         let mut limb = LimbHistory::default();
         for now in frames {
             limb.update(*now);
-            limb.support(&support.map_or_else(LimbSupport::default, |own| LimbSupport {
-                own,
-                free_space: [0.0; 2],
-                known: true,
-            }));
+            match evidence {
+                Some(evidence) => limb.show(evidence, 0.0),
+                None => limb.hide(),
+            }
         }
         limb
     }
@@ -140,19 +109,15 @@ mod tests {
 
     #[test]
     fn images_correct_what_support_says() {
-        let weak = after(&[[0.5, 0.0, 1.0]], Some([0.05, 0.0]));
-        assert_eq!(weak.internal(weak.supported()), LimbStatus::Inferred);
-        let strong = after(&[[0.0, 0.0, 1.0]], Some([0.4, 0.2]));
-        assert_eq!(strong.internal(strong.supported()), LimbStatus::Measured);
+        let weak = after(&[[0.5, 0.0, 1.0]], Some([-1.0, -1.0]));
+        assert_eq!(weak.status(weak.supported()), LimbStatus::Inferred);
+        let past = after(&[[0.5, 0.5, 1.0]], Some([-1.0, -1.0]));
+        assert_eq!(past.status(LimbStatus::Measured), LimbStatus::Lost, "cameras see past it");
+        let strong = after(&[[0.0, 0.0, 1.0]], Some([2.0, -1.0]));
+        assert_eq!(strong.status(strong.supported()), LimbStatus::Measured);
+        assert!(!strong.end_shows());
         let unseen = after(&[[0.5, 0.0, 1.0]], None);
-        assert_eq!(unseen.internal(LimbStatus::Lost), LimbStatus::Lost);
-    }
-
-    #[test]
-    fn a_forearm_is_reported_only_on_an_upper_arm_that_shows() {
-        let (shows, hides) = (after(&[[0.5, 0.0, 1.0]], Some([0.4, 0.2])), after(&[[0.5, 0.0, 1.0]], Some([0.0, 0.0])));
-        assert_eq!(shows.reported_lower(&shows, LimbStatus::Lost), LimbStatus::Measured);
-        assert_eq!(shows.reported_lower(&hides, LimbStatus::Measured), LimbStatus::Inferred);
-        assert_eq!(hides.reported_upper(&shows, LimbStatus::Measured), LimbStatus::Inferred);
+        assert_eq!(unseen.status(LimbStatus::Lost), LimbStatus::Lost);
+        assert!(unseen.end_shows());
     }
 }

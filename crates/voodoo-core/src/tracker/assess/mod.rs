@@ -5,10 +5,8 @@
 //! it wrong. For arms and legs, `limb_support` looks closer at what the depth images show; without any, an arm or leg is as
 //! good as what it hangs on.
 //!
-//! That is said twice. What the tracker goes by itself (the internal status: where a limb ended when all was well, whose girth a
-//! contour shows) has to be proven along the whole limb and over several frames. What is reported of this frame has to be
-//! reported before the limb is far off, and it asks for both limbs of an arm or leg: a forearm on an arm that nothing proves may
-//! be anything that is seen there.
+//! All of an arm or leg has to be right for its lower limb to be: a forearm on an arm that nothing proves may be anything that is
+//! seen there. An upper limb ends where its outer part shows or its lower limb begins.
 //!
 //! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
 //! body is called tracked of which more than a quarter of the limbs is not measured.
@@ -16,13 +14,15 @@
 mod exclusive;
 mod limb_history;
 mod spread;
+mod two_state;
 
 use super::estimate::{Estimate, LimbStatus, Status};
 use crate::association::correspondence::SitePair;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::fit::{Context, Matched};
-use crate::math::Pose;
+use crate::hypotheses::APART;
+use crate::math::{Pose, Vec3};
 use crate::uncertainty::Uncertainty;
 use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
@@ -30,6 +30,7 @@ use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
 use exclusive::Exclusive;
 use limb_history::{LimbHistory, SUPPORT};
+use two_state::{all, either, said_by};
 
 /// Shares are of this many visible patches at least.
 const LEAST_VISIBLE: f64 = 8.0;
@@ -43,8 +44,6 @@ const ROUNDNESS_MEMORY: f64 = 0.9;
 const TRACKED: f64 = 0.75;
 const HALF: f64 = 0.5;
 const SOME: f64 = 0.25;
-/// A site this far from its measurement does not support its limb, metres.
-const SITE_REACH: f64 = 0.10;
 /// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
 const AT_JOINT: f64 = 0.03;
 
@@ -130,7 +129,7 @@ impl Assessor {
         // By support alone: a lost body is searched, and arms on the trunk must not start that.
         self.status = overall(internal);
         for limb in extremities.iter().flat_map(|chain| [chain.upper, chain.lower]) {
-            internal[limb] = limbs[limb].internal(internal[limb]);
+            internal[limb] = limbs[limb].status(internal[limb]);
         }
         inherit_status(extremities, internal);
         if let Some(now) = roundness(context.seen.views, &context.model.body, matched.poses) {
@@ -157,14 +156,8 @@ impl Assessor {
         // A body that is lost altogether has no limb that is not.
         if statuses.iter().any(|status| *status != LimbStatus::Lost) {
             for chain in &model.extremities {
-                let [upper, lower] = [chain.upper, chain.lower].map(|limb| &self.limbs[limb]);
-                statuses[chain.upper] = upper.reported_upper(lower, statuses[chain.upper]);
-                statuses[chain.lower] = lower.reported_lower(upper, statuses[chain.lower]);
-            }
-            inherit_status(&model.extremities, statuses);
-            for chain in &model.extremities {
                 // A forearm may be known by its inner part, but not the hand.
-                let hidden = statuses[chain.lower] == LimbStatus::Measured && !self.limbs[chain.lower].outer_shows();
+                let hidden = statuses[chain.lower] == LimbStatus::Measured && !self.limbs[chain.lower].end_shows();
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
             }
         }
@@ -193,12 +186,12 @@ impl Assessor {
             } else {
                 [SUPPORT * exclusive / FEW, 0.0, 0.0]
             };
-            let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < SITE_REACH;
+            let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
             // The hips tell where the pelvis is, the shoulders the clavicles: where no depth image looks, that is measured.
             let unseen = seen.front_facing == 0.0;
             let joined = |pair: &SitePair| unseen && near(pair) && limb_joined_at(body, poses, pair) == Some(limb);
-            let mut support = self.supports[limb];
+            let support = &mut self.supports[limb];
             if matched.correspondences.sites.iter().any(|pair| site(pair) || joined(pair)) {
                 now = [1.0, 0.0, 1.0];
                 support.known = false;
@@ -209,8 +202,35 @@ impl Assessor {
             }
             // What other sensors than depth cameras see of a limb no depth image disproves.
             support.known &= self.exclusive.clouds[limb] < FEW;
-            history.support(&support);
             history.update(now.map(|value| value.min(1.0)));
+        }
+        self.weigh_images(context, poses);
+    }
+
+    /// What this frame's images say about arms and legs.
+    fn weigh_images(&mut self, context: Context, poses: &[Pose]) {
+        let Self { limbs, supports, .. } = self;
+        let (model, previous) = (context.model, context.previous);
+        let far_end =
+            |poses: &[Pose], limb: usize| poses[limb] * Vec3::new(0.0, 0.0, model.body.limbs()[limb].shape.length());
+        for chain in &model.extremities {
+            let said = |limb: usize, part: usize| {
+                let support = &supports[limb];
+                if support.known { said_by(support.net()[part]) } else { f64::INFINITY }
+            };
+            let [upper, lower] = [chain.upper, chain.lower].map(|limb| said(limb, 0));
+            let [upper_end, lower_end] = [chain.upper, chain.lower].map(|limb| said(limb, 1));
+            let of_upper = all(&[upper, either(upper_end, lower)]);
+            let of_lower = [all(&[upper, lower]), all(&[upper, lower, lower_end])];
+            for (limb, evidence) in [(chain.upper, [of_upper; 2]), (chain.lower, of_lower)] {
+                if !supports[limb].known {
+                    limbs[limb].hide();
+                    continue;
+                }
+                let known = previous.len() == poses.len();
+                let moved = if known { far_end(poses, limb).distance(far_end(previous, limb)) } else { 0.0 };
+                limbs[limb].show(evidence, moved);
+            }
         }
     }
 }
@@ -251,7 +271,6 @@ mod tests {
     use super::*;
     use crate::association::correspondence::Correspondences;
     use crate::fit::Fit;
-    use crate::math::Vec3;
     use crate::observation::candidates::Candidates;
     use crate::observation::frame::Frame;
     use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};

@@ -1,0 +1,106 @@
+//! Whether a limb is where the pose has it, as log odds that frames add to: a filter of two states, right and wrong.
+//!
+//! From one frame to the next what was right may have gone wrong, the likelier the farther it moved, and what was wrong may have
+//! come right; then the frame's evidence is added. So a frame counts for little where those before it were sure, and for much
+//! after a fast motion.
+
+/// What speaks for a limb less what speaks against it, as a share, is weighed by this: here the odds are even, and every time as
+/// much again makes them e times greater.
+const EVEN: f64 = 0.075;
+/// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
+/// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
+const CHANGES: f64 = 0.05;
+/// A limb whose far end moved by so much between two frames, metres, is wrong before it is seen there, and with the square of
+/// a shorter way the likelier: what was predicted is off by a share of it.
+const FAR: f64 = 0.33;
+
+/// Log odds that something is right.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct TwoState {
+    log_odds: f64,
+}
+
+impl TwoState {
+    /// Takes a frame's `evidence`, log odds, after a motion of so many metres.
+    pub(super) fn observe(&mut self, evidence: f64, moved: f64) {
+        let before = probability(self.log_odds);
+        let goes_wrong = (CHANGES + (moved / FAR).powi(2)).min(1.0);
+        let now = before * (1.0 - goes_wrong) + (1.0 - before) * CHANGES;
+        self.log_odds = (now / (1.0 - now)).ln() + evidence.clamp(-most_said(), most_said());
+    }
+
+    /// It is likelier right than wrong.
+    pub(super) fn holds(&self) -> bool {
+        self.log_odds >= 0.0
+    }
+}
+
+/// Log odds that what shows so much, as a share less what contradicts it, is right.
+pub(super) fn said_by(share: f64) -> f64 {
+    share / EVEN - 1.0
+}
+
+/// Log odds that all of several things are right, given those of each.
+pub(super) fn all(log_odds: &[f64]) -> f64 {
+    // log(1 + exp(-z)), of each, without overflow.
+    let against: f64 = log_odds.iter().map(|z| (-z.abs()).exp().ln_1p() + (-z).max(0.0)).sum();
+    -against.exp_m1().ln()
+}
+
+/// Log odds that one of two things is right at least.
+pub(super) fn either(one: f64, other: f64) -> f64 {
+    -all(&[-one, -other])
+}
+
+/// The log odds that what stood still did not change.
+fn most_said() -> f64 {
+    ((1.0 - CHANGES) / CHANGES).ln()
+}
+
+fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(frames: &[(f64, f64)]) -> TwoState {
+        let mut state = TwoState::default();
+        frames.iter().for_each(|(evidence, moved)| state.observe(*evidence, *moved));
+        state
+    }
+
+    #[test]
+    fn one_weak_frame_against_what_was_sure_does_not_turn_it_and_several_do() {
+        let (good, bad) = ((most_said(), 0.0), (-1.0, 0.0));
+        assert!(after(&[good, good, bad, bad]).holds());
+        assert!(!after(&[good, good, bad, bad, bad, bad, bad]).holds());
+        assert!(!after(&[bad]).holds() && after(&[good]).holds(), "nothing is taken for granted");
+    }
+
+    #[test]
+    fn what_moved_far_needs_evidence_anew() {
+        let weak = |moved| after(&[(most_said(), 0.0), (-1.0, moved)]).holds();
+        assert!(weak(0.05) && !weak(0.3));
+        // And so it comes back.
+        assert!(after(&[(-most_said(), 0.0), (most_said(), 0.0), (1.0, 0.0)]).holds());
+    }
+
+    #[test]
+    fn probabilities_of_independent_things_multiply() {
+        for (one, other) in [(0.3, -1.2), (2.0, 1.0), (-2.0, 0.5)] {
+            let both = probability(one) * probability(other);
+            assert!((probability(all(&[one, other])) - both).abs() < 1e-12);
+            let any = 1.0 - (1.0 - probability(one)) * (1.0 - probability(other));
+            assert!((probability(either(one, other)) - any).abs() < 1e-12);
+        }
+        assert_eq!([all(&[-90.0, 90.0]), either(-90.0, 5.0)], [-90.0, 5.0]);
+        assert_eq!([all(&[f64::INFINITY]), all(&[1.0, f64::NEG_INFINITY])], [f64::INFINITY, f64::NEG_INFINITY]);
+    }
+
+    #[test]
+    fn odds_are_even_at_a_share_and_grow_from_there() {
+        assert_eq!([said_by(0.0), said_by(EVEN), said_by(2.0 * EVEN)], [-1.0, 0.0, 1.0]);
+    }
+}
