@@ -21,6 +21,14 @@ pub struct Context<'a> {
     pub time_scale: f64,
 }
 
+impl Context<'_> {
+    /// Whether colours are all that shows the body.
+    pub fn pictures_alone(&self) -> bool {
+        let frame = self.seen.frame();
+        self.config.regions && !frame.colors.is_empty() && frame.images.is_empty() && frame.clouds.is_empty()
+    }
+}
+
 /// A frame before it is said what is tracked: for those who change the model meanwhile.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting<'a> {

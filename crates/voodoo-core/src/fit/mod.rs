@@ -17,7 +17,7 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::Pose;
-use crate::regions::{Posed, Regions};
+use crate::regions::{Posed, Regions, STEPS};
 use crate::solver::{Gate, Problem, Schedule, Solver, WarmStartInput, solver};
 
 /// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
@@ -101,7 +101,8 @@ impl Fit {
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
             self.solve(context, predicted, poses, steps);
             steps += 1;
-            if (before - distance).abs() < context.config.min_change && self.correspondences.regions.is_empty() {
+            let settled = (before - distance).abs() < context.config.min_change;
+            if settled && self.correspondences.regions.is_empty() || steps >= STEPS && context.pictures_alone() {
                 break;
             }
             before = distance;

@@ -39,7 +39,7 @@ mod tests {
         with_context(&pixels, &config, &model, &wrong, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &wrong);
-            let at = Extremity { context, matched: fit.matched(&wrong), index };
+            let at = Extremity { context, matched: fit.matched(&wrong), regions: None, index };
             let mut history = vec![History::default(); model.extremities.len()];
             let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
             LastGoodEnd.propose(at, &history, &mut rough, &mut pool);
