@@ -3,7 +3,8 @@
     python benches/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] [--rounds 9] ...
 
 Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, joints that are more than 10 cm off in the
-last third of a second, and user time of a step. Pictures are decoded before the clock runs.
+last third of a second, what share of the ends of limbs that are more than 10 cm off is told by the limb's status, and what share of the
+others is doubted, and user time of a step. Pictures are decoded before the clock runs.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import re
 import time
 from pathlib import Path
 
@@ -19,8 +21,10 @@ import numpy.typing as npt
 
 import voodoo
 from voodoo.measurements import ColorImage
+from voodoo.pipeline.inputs import pictures_alone
 from voodoo.recordings import open_recording
 
+LIMBS = {"elbow": "upperarm", "wrist": "forearm", "knee": "thigh", "ankle": "calf"}
 JOINTS = [f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in "lr"]
 Picture = npt.NDArray[np.uint8]
 
@@ -66,17 +70,29 @@ def shown(picture: Picture, grey: bool) -> Picture:
     return (picture @ np.array([0.114, 0.587, 0.299])).astype(np.uint8) if grey else picture
 
 
+def number_of(sensor: str) -> int:
+    """Number of a camera by its name."""
+    return int(re.findall(r"\d+", sensor)[0])
+
+
 def empty_scene(folder: Path, camera: int, grey: bool) -> list[Picture]:
     """Pictures of the scene without anybody."""
     import cv2
 
-    files = sorted((folder / "background").glob(f"cam_{camera}_*.jpg"))
+    files = sorted((folder / "background").glob(f"cam_{camera}_*.*"))
     return [shown(cv2.imread(str(file)), grey) for file in files]
 
 
-def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float64], list[float]]:
-    """Errors (frames, 12) in metres and seconds of user time of every step."""
-    frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in open_recording(folder)]
+def called_measured(estimate: voodoo.Estimate) -> list[bool]:
+    """Of every joint whether it ends a limb that is called measured."""
+    carriers = [f"{joint[0]}_{LIMBS.get(joint[2:], '')}" for joint in JOINTS]
+    return [estimate.limb_status.get(carrier) == "measured" for carrier in carriers]
+
+
+def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_], list[float]]:
+    """Errors (frames, 12) in metres, which of them are said to be measured, and seconds of user time of every step."""
+    recording = open_recording(folder, **{"loader": None} | pictures_alone(folder, None, ("color",)))
+    frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in recording]
     truth = truth_of(folder)
     stature, joints = start_of(folder, options.start)
     tracker = voodoo.Tracker(voodoo.Body.human(stature), config=voodoo.Config(**json.loads(options.config)))
@@ -84,18 +100,18 @@ def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float
     if options.default_lengths:
         tracker.reset(joints=dict(estimate.joints))
     chosen = [int(camera) for camera in options.cameras.split(",")]
-    for camera in chosen if options.background else []:
-        tracker.set_background(f"/cam_{camera}/image_raw/compressed", empty_scene(folder, camera, options.grey))
+    for item in frames[0] if options.background else []:
+        tracker.set_background(item.sensor, empty_scene(folder, number_of(item.sensor), options.grey))
     rng = np.random.default_rng(7)
     order = list(range(len(frames)))
     if options.rounds:
         order = (order + order[-2:0:-1]) * options.rounds
-    errors, seconds = [], []
+    errors, measured, seconds = [], [], []
     for step, index in enumerate(order):
         frame = voodoo.Frame(step / 30.0)
         first = frames[index][-1].stamp
         for item in frames[index]:
-            if int(item.sensor.split("/")[1].removeprefix("cam_")) not in chosen:
+            if number_of(item.sensor) not in chosen:
                 continue
             picture = shown(disturbed(item.image, rng, options, step), options.grey)
             frame.add_color(
@@ -110,7 +126,8 @@ def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float
         seconds.append(time.process_time() - before)
         places = np.array([estimate.joints[joint] for joint in JOINTS])
         errors.append(np.linalg.norm(places - truth[index], axis=1))
-    return np.array(errors), seconds
+        measured.append(called_measured(estimate))
+    return np.array(errors), np.array(measured), seconds
 
 
 def main() -> None:
@@ -125,11 +142,14 @@ def main() -> None:
         parser.add_argument(f"--{switch}", action="store_true")
     options = parser.parse_args()
     for folder in options.recordings:
-        errors, seconds = run(folder, options)
+        errors, measured, seconds = run(folder, options)
+        ends = np.array([joint[2:] in LIMBS for joint in JOINTS])
+        far, near = ends & (errors > 0.1), ends & (errors <= 0.1)
+        told, doubted = (100 * (~measured[which]).mean() if which.any() else np.nan for which in (far, near))
         lost = [joint for joint, error in zip(JOINTS, errors[-10:].mean(axis=0), strict=True) if error > 0.1]
         print(
             f"{folder.name}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
-            f" lost {lost}, first and last tenth {100 * errors[: len(errors) // 10].mean():.2f}"
+            f" lost {lost}, told {told:.0f} % of {far.sum()}, doubted {doubted:.1f} %, first and last tenth {100 * errors[: len(errors) // 10].mean():.2f}"
             f" {100 * errors[-len(errors) // 10 :].mean():.2f} cm, {1e3 * float(np.median(seconds)):.1f} ms",
             flush=True,
         )

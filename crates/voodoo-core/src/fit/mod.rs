@@ -138,6 +138,11 @@ impl Fit {
         self.contours.clear();
         self.match_assigned(context, poses, &gate, true);
         self.find_regions(context, poses, context.config.max_steps);
+        if context.pictures_alone() {
+            let Self { regions, correspondences, .. } = self;
+            let chains = &context.model.extremities;
+            regions.claim_all(context.seen.frame(), posed(context, poses), chains, &mut correspondences.region_support);
+        }
     }
 
     /// Points alone, within `gate`, wherever on a limb they are closest: for poses that somebody set.

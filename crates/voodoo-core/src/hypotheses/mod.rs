@@ -13,7 +13,7 @@ mod unexplained;
 pub use landmark_cost::body_landmark_cost;
 pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
-use crate::association::correspondence::Correspondences;
+use crate::association::correspondence::{Correspondences, RegionSupport};
 use crate::body::Model;
 use crate::detect::Detection;
 use crate::fit::{Context, Fit, Matched, Motion};
@@ -147,16 +147,28 @@ impl Hypotheses {
         self.rough.score.make_room(most);
         self.clusters.make_room(most);
         self.lean.make_room(most);
+        if context.pictures_alone() {
+            let (frame, limbs) = (context.seen.frame(), context.model.body.limbs().len());
+            for backdrop in [&mut self.rough.score.backdrop, &mut self.refined.backdrop] {
+                backdrop.make_room(frame, limbs);
+            }
+            self.shown.make_room(limbs);
+        }
         self.refined.matched.reserve_as(fit.correspondences());
     }
 
     /// Whether the frame, and those before it, speak against an arm or leg for long enough to try others.
     fn doubts(&mut self, at: Extremity) -> bool {
+        let chain = at.chain();
         if at.regions.is_some() {
-            let suspect = self.rough.score.draw(at).share() < CLAIMED;
+            let supports = &at.matched.correspondences.region_support;
+            let sum =
+                |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
+            let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
+            let suspect = gained < CLAIMED * area;
             return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE));
         }
-        let (chain, near) = (at.chain(), &mut self.rough.score.unexplained);
+        let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), NEARBY * chain.stretched_length(), near);
         let unexplained = near.total();
         // Furniture stays open beside legs.

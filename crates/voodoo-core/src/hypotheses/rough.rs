@@ -45,7 +45,7 @@ pub(super) struct RoughScore {
     nearest: Vec<f32>,
     distances: Vec<f32>,
     /// What pictures show of everything else.
-    backdrop: Backdrop,
+    pub(super) backdrop: Backdrop,
 }
 
 /// Rough looks at places where an arm or leg may end.
@@ -68,14 +68,13 @@ impl RoughScore {
         }
     }
 
-    /// Draws everything else before what pictures show; what they say of the arm or leg where it is.
-    pub(super) fn draw(&mut self, at: Extremity) -> Claim {
-        let Some(regions) = at.regions else { return Claim::default() };
+    /// Draws everything else before what pictures show.
+    fn draw(&mut self, at: Extremity) {
+        let Some(regions) = at.regions else { return };
         let (chain, frame, poses) = (at.chain(), at.context.seen.frame(), at.matched.poses);
         let Context { model, previous, .. } = at.context;
         let posed = Posed { body: &model.body, poses, previous, origin: at.context.seen.origin() };
         regions.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut self.backdrop);
-        self.claimed(at, poses, chain.limbs())
     }
 
     /// What pictures say of some of its limbs at `poses`.
@@ -90,6 +89,7 @@ impl RoughScore {
 
     /// Takes the points that count: what is unexplained near by, and what it explains itself.
     pub(super) fn begin(&mut self, at: Extremity, own: &WeightedPoints) {
+        self.draw(at);
         let Self { unexplained, sample, others, distances, .. } = self;
         sample.clear();
         sample.extend(unexplained);

@@ -7,6 +7,8 @@ use super::labels::{Labels, NOTHING};
 use super::lens::Lens;
 use super::lines::NEARER_BY;
 use super::{Posed, Regions, scan};
+use crate::association::correspondence::RegionSupport;
+use crate::body::two_bone::TwoBone;
 use crate::math::{Pose, Vec3, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
@@ -28,13 +30,6 @@ pub struct Claim {
     pub area: f64,
 }
 
-impl Claim {
-    /// What it explains, as a share of its area.
-    pub fn share(&self) -> f64 {
-        if self.area > 0.0 { self.gained / self.area } else { 0.0 }
-    }
-}
-
 impl std::ops::AddAssign for Claim {
     fn add_assign(&mut self, other: Self) {
         self.gained += other.gained;
@@ -47,6 +42,18 @@ impl std::ops::AddAssign for Claim {
 pub struct Backdrop {
     planes: Vec<Labels>,
     camera_from_limb: Vec<Pose>,
+}
+
+impl Backdrop {
+    /// Makes room for the pictures of a frame and so many limbs.
+    pub fn make_room(&mut self, frame: &Frame, limbs: usize) {
+        self.planes.resize_with(frame.colors.len(), Labels::default);
+        for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
+            labels.make_room(CELL_BITS, picture.width, picture.height);
+        }
+        self.camera_from_limb.clear();
+        self.camera_from_limb.reserve(limbs);
+    }
 }
 
 impl Regions {
@@ -67,6 +74,21 @@ impl Regions {
         self.look_at(frame, posed, limb, backdrop, |(label, behind), depth| {
             (label == NOTHING || behind > depth - f64::from(NEARER_BY)).then_some(label)
         })
+    }
+
+    /// What every limb of the arms and legs explains that nothing else does, into `supports`.
+    pub fn claim_all(&mut self, frame: &Frame, posed: Posed, chains: &[TwoBone], supports: &mut [RegionSupport]) {
+        let mut backdrop = std::mem::take(&mut self.backdrop);
+        for chain in chains {
+            self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut backdrop);
+            for limb in chain.limbs() {
+                let claim = self.claim(frame, posed, limb, &backdrop);
+                if let Some(support) = supports.get_mut(limb) {
+                    (support.gained, support.area) = (claim.gained, claim.area);
+                }
+            }
+        }
+        self.backdrop = backdrop;
     }
 
     /// How well a body explains what is seen, every pixel by the limb that shows there; all of it is drawn.

@@ -82,6 +82,15 @@ impl Labels {
         }
     }
 
+    /// Makes room for pictures of a size.
+    pub(super) fn make_room(&mut self, bits: u32, width: usize, height: usize) {
+        let size = [width, height].map(|size| size.div_ceil(1 << bits));
+        self.clear(bits, size);
+        self.sides.reserve(size[1]);
+        self.corners.reserve(2 * CORNERS.len());
+        self.hull.reserve(2 * CORNERS.len() + 1);
+    }
+
     /// Wipes what was drawn.
     fn clear(&mut self, bits: u32, [columns, rows]: [usize; 2]) {
         if (self.bits, self.columns, self.rows) == (bits, columns, rows) {

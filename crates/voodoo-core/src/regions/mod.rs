@@ -83,6 +83,7 @@ pub struct Regions {
     turn: usize,
     scanner: Scanner,
     evidence: Vec<Evidence>,
+    backdrop: Backdrop,
 }
 
 /// The body at the time of a frame, in the working frame.

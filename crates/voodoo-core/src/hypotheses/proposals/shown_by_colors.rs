@@ -67,6 +67,14 @@ impl Propose for ShownByColors {
 }
 
 impl ShownByColors {
+    /// Room for a body of so many limbs.
+    pub(in crate::hypotheses) fn make_room(&mut self, limbs: usize) {
+        self.trial.clear();
+        self.trial.reserve(limbs);
+        self.kept.clear();
+        self.kept.reserve(KEPT);
+    }
+
     /// The turns of the upper limb that pictures speak for most.
     fn find_directions(&mut self, at: Extremity, rough: &mut RoughSearch) {
         let Self { trial, kept } = self;
