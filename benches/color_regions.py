@@ -3,8 +3,8 @@
     python benches/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] [--rounds 9] ...
 
 Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, joints that are more than 10 cm off in the
-last third of a second, what share of the ends of limbs that are more than 10 cm off is told by the limb's status, and what share of the
-others is doubted, and user time of a step. Pictures are decoded before the clock runs.
+last third of a second, how many of the ends of limbs that are more than 10 cm off their status tells, and how many of the others
+it doubts, and user time of a step. Pictures are decoded before the clock runs.
 """
 
 from __future__ import annotations
@@ -89,7 +89,9 @@ def called_measured(estimate: voodoo.Estimate) -> list[bool]:
     return [estimate.limb_status.get(carrier) == "measured" for carrier in carriers]
 
 
-def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_], list[float]]:
+def run(
+    folder: Path, options: argparse.Namespace
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_], list[float]]:
     """Errors (frames, 12) in metres, which of them are said to be measured, and seconds of user time of every step."""
     recording = open_recording(folder, **{"loader": None} | pictures_alone(folder, None, ("color",)))
     frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in recording]
@@ -147,10 +149,12 @@ def main() -> None:
         far, near = ends & (errors > 0.1), ends & (errors <= 0.1)
         told, doubted = (100 * (~measured[which]).mean() if which.any() else np.nan for which in (far, near))
         lost = [joint for joint, error in zip(JOINTS, errors[-10:].mean(axis=0), strict=True) if error > 0.1]
+        tenth = len(errors) // 10
         print(
             f"{folder.name}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
-            f" lost {lost}, told {told:.0f} % of {far.sum()}, doubted {doubted:.1f} %, first and last tenth {100 * errors[: len(errors) // 10].mean():.2f}"
-            f" {100 * errors[-len(errors) // 10 :].mean():.2f} cm, {1e3 * float(np.median(seconds)):.1f} ms",
+            f" lost {lost}, told {told:.0f} % of {far.sum()}, doubted {doubted:.1f} %, first and last tenth"
+            f" {100 * errors[:tenth].mean():.2f} {100 * errors[-tenth:].mean():.2f} cm,"
+            f" {1e3 * float(np.median(seconds)):.1f} ms",
             flush=True,
         )
 

@@ -117,7 +117,9 @@ def _look(rng: np.random.Generator, body: Body, middle: Array) -> Look:
     grey = rng.uniform(70, 200, (len(room), 1))
     colors = np.vstack([clothes, np.clip(grey + rng.normal(0, 30, (len(room), 3)), 20, 230)])
     light = np.array([rng.normal(), rng.normal(), 2.0])
-    return Look(room, groups, colors, rng.normal(0, 1, (12, 3)) * rng.uniform(2, 25, (12, 1)), light / np.linalg.norm(light))
+    return Look(
+        room, groups, colors, rng.normal(0, 1, (12, 3)) * rng.uniform(2, 25, (12, 1)), light / np.linalg.norm(light)
+    )
 
 
 def _shoot(camera: Camera, look: Look, points: Array | None, time: float, rng: np.random.Generator) -> Picture:

@@ -15,6 +15,7 @@ mod models;
 mod posterior;
 mod scan;
 mod scene;
+mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::{Body, Limb};

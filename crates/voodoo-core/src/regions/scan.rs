@@ -200,7 +200,7 @@ impl View<'_> {
 
     /// Log ratio of a pixel, whose bin is given, between a group's colours and those of what else would be there.
     #[inline(always)]
-    fn ratio(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
+    pub(super) fn ratio(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
         let own = self.model.limbs[group].log[bin];
         if other == NOTHING {
             let around = self.model.around[group].log[bin];
