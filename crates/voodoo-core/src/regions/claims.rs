@@ -16,9 +16,9 @@ use crate::shape::TaperedEllipticCylinder;
 
 /// Where a limb is looked at: in shares of its length, and of its radius as it is seen.
 const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const ACROSS: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+const OVER: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
 /// One cell of what is drawn is two to this power pixels wide.
-const CELL_BITS: u32 = 2;
+const BACKDROP_BITS: u32 = 2;
 
 /// What pictures say of a limb, in patches, the mean of all cameras.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -49,7 +49,7 @@ impl Backdrop {
     pub fn make_room(&mut self, frame: &Frame, limbs: usize) {
         self.planes.resize_with(frame.colors.len(), Labels::default);
         for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
-            labels.make_room(CELL_BITS, picture.width, picture.height);
+            labels.make_room(BACKDROP_BITS, picture.width, picture.height);
         }
         self.camera_from_limb.clear();
         self.camera_from_limb.reserve(limbs);
@@ -65,7 +65,7 @@ impl Regions {
             let view = self.viewpoint(frame, picture, posed);
             camera_from_limb.clear();
             camera_from_limb.extend((0..posed.poses.len()).map(|limb| view.of(limb)));
-            labels.draw(posed.body, camera_from_limb, &Lens::of(picture), CELL_BITS, &shown);
+            labels.draw(posed.body, camera_from_limb, &Lens::of(picture), BACKDROP_BITS, &shown);
         }
     }
 
@@ -161,8 +161,8 @@ fn places(
         let radius = radii[0] + (radii[1] - radii[0]) * along;
         let metre = focal / centre.z;
         let [u, v] = lens.project(centre).map(|value| value + 0.5);
-        let patch = length / metre * 2.0 * radius / (ALONG.len() * ACROSS.len()) as f64 / REFERENCE_PATCH;
-        for across in ACROSS {
+        let patch = length / metre * 2.0 * radius / (ALONG.len() * OVER.len()) as f64 / REFERENCE_PATCH;
+        for across in OVER {
             let off = across * radius * metre;
             each([u + off * aside[0], v + off * aside[1]], centre.z - radius, patch);
         }

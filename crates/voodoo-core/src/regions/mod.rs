@@ -159,29 +159,38 @@ impl Regions {
         }
     }
 
-    /// The edges of all limbs in all pictures, in the given step of a frame.
-    pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
+    /// The edges of the limbs that are `wanted` in all pictures, in the given step of a frame.
+    pub fn find(
+        &mut self,
+        frame: &Frame,
+        posed: Posed,
+        step: usize,
+        wanted: impl Fn(usize) -> bool,
+        found: &mut Correspondences,
+    ) {
         let search = SEARCHES[step.min(STEPS - 1)];
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
-        self.find_within(frame, posed, search, true, &mut found.regions);
+        self.find_within(frame, posed, search, Some(&wanted), &mut found.regions);
         found.region_support.clear();
         found.region_support.extend(self.evidence.iter().map(Evidence::support));
     }
 
     /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
     pub fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
-        self.find_within(frame, posed, OUTLINE, false, pairs);
+        self.find_within(frame, posed, OUTLINE, None, pairs);
     }
 
+    /// Edges of limbs that are wanted as a whole, or of all limbs one by one.
     fn find_within(
         &mut self,
         frame: &Frame,
         posed: Posed,
         search: Search,
-        together: bool,
+        wanted: Option<&dyn Fn(usize) -> bool>,
         pairs: &mut Vec<RegionPair>,
     ) {
+        let together = wanted.is_some();
         pairs.clear();
         for picture in frame.colors {
             self.look(frame, picture, posed);
@@ -195,7 +204,8 @@ impl Regions {
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
             for line in &*lines {
-                let found = scanner.edge(&view, line, search, together);
+                let looked = wanted.is_none_or(|wanted| wanted(usize::from(line.limb)));
+                let found = if looked { scanner.edge(&view, line, search, together) } else { None };
                 edges.push(found);
                 if together {
                     let length = posed.body.limbs()[usize::from(line.limb)].shape.length();

@@ -15,9 +15,9 @@ const FALL: f32 = 3.0;
 /// Farther outside than this, units, nothing is the body.
 const FARTHEST: f32 = 20.0;
 /// Colours of so many pixels on every side count as well: noise is no region.
-const BESIDE: usize = 2;
+const NEIGHBOURS: usize = 2;
 /// Steps to a neighbour of a side and of a corner in the distance transform (Borgefors 1986), cells.
-const STEPS: [f32; 2] = [1.0, 1.414];
+const CHAMFER: [f32; 2] = [1.0, 1.414];
 
 /// A grid of cells about the body: the nearest limb, and how far outside of the contour it lies, units; negative inside.
 struct Near {
@@ -37,7 +37,7 @@ impl Regions {
     /// Learns the body's colours and those about it where it is.
     pub fn learn_at(&mut self, frame: &Frame, posed: Posed) {
         self.begin(frame, posed);
-        self.find(frame, posed, super::STEPS, &mut Correspondences::default());
+        self.find(frame, posed, super::STEPS, |_| true, &mut Correspondences::default());
         self.learn(frame);
     }
 
@@ -79,10 +79,10 @@ impl Regions {
 
 /// Means of so many values on both sides, at a stride; beyond a row's end there are none.
 fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
-    let reach = BESIDE * stride;
+    let reach = NEIGHBOURS * stride;
     let mean = |index: usize| {
         let (mut sum, mut count) = (0.0, 0.0);
-        for step in 0..=2 * BESIDE {
+        for step in 0..=2 * NEIGHBOURS {
             let Some(other) = (index + step * stride).checked_sub(reach) else { continue };
             if other < values.len() && (stride > 1 || other / width == index / width) {
                 sum += values[other];
@@ -112,7 +112,7 @@ fn distances(labels: &super::Labels, size: [usize; 2], side: f32) -> Near {
 /// Distances to the nearest cell that is at none, in two passes; each cell takes the limb of the one it is nearest to.
 fn spread(distance: &mut [f32], mut limb: Option<&mut Vec<u16>>, columns: usize) {
     let rows = distance.len() / columns.max(1);
-    let [side, corner] = STEPS;
+    let [side, corner] = CHAMFER;
     let mut take = |to: usize, from: usize, step: f32| {
         if distance[from] + step < distance[to] {
             distance[to] = distance[from] + step;

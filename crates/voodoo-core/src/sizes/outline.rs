@@ -13,7 +13,7 @@ use crate::shape::TaperedEllipticCylinder;
 const LINES_ALIKE: f64 = 3.0;
 const FRAMES_ALIKE: f64 = 10.0;
 /// Girths follow in every so many frames.
-const EVERY: u32 = 4;
+const GIRTHS_EVERY: u32 = 4;
 /// How far the axis of a tracked limb is off across itself, metres.
 const AXIS_SIGMA: f64 = 0.02;
 
@@ -112,14 +112,14 @@ impl Outline {
         if h.trace() <= 0.0 {
             return None;
         }
-        let alike = FRAMES_ALIKE / f64::from(EVERY);
+        let alike = FRAMES_ALIKE / f64::from(GIRTHS_EVERY);
         let (h, g) = (h / alike, g / alike);
         let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * alike);
         let mixed = h.fixed_view::<3, 2>(2, 0);
         let inverse = aside.try_inverse()?;
         let own = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
         let pull = g.fixed_rows::<3>(2) - mixed * inverse * g.fixed_rows::<2>(0);
-        let mut information = self.information.fixed_view::<3, 3>(2, 2) * (1.0 - f64::from(EVERY) / REMEMBERED);
+        let mut information = self.information.fixed_view::<3, 3>(2, 2) * (1.0 - f64::from(GIRTHS_EVERY) / REMEMBERED);
         information += own;
         let step = information.cholesky()?.solve(&pull);
         self.information.fixed_view_mut::<3, 3>(2, 2).copy_from(&information);
@@ -178,7 +178,7 @@ impl Outlines {
 
     /// Draws the girths to the edges of colours.
     pub(super) fn follow(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
-        self.frames = (self.frames + 1) % EVERY;
+        self.frames = (self.frames + 1) % GIRTHS_EVERY;
         if self.limbs.is_empty() || self.frames != 0 {
             return;
         }

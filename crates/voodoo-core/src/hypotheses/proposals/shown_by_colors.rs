@@ -11,7 +11,7 @@ use crate::math::{Pose, Quat, Vec3};
 
 /// Directions of the upper limb that are tried, and how many of them with a lower limb.
 const DIRECTIONS: usize = 128;
-const KEPT: usize = 12;
+const UPPER_LIMBS: usize = 12;
 /// Turns of the upper limb about its own axis that are tried, radians, and bends of the hinge between its limits.
 const TWISTS: [f64; 5] = [0.0, 0.5, -0.5, 1.0, -1.0];
 const BENDS: usize = 5;
@@ -72,7 +72,7 @@ impl ShownByColors {
         self.trial.clear();
         self.trial.reserve(limbs);
         self.kept.clear();
-        self.kept.reserve(KEPT);
+        self.kept.reserve(UPPER_LIMBS);
     }
 
     /// The turns of the upper limb that pictures speak for most.
@@ -97,8 +97,8 @@ impl ShownByColors {
             }
             let cost = broken - rough.score.claimed(at, trial, [chain.upper].into_iter()).gained;
             let place = kept.partition_point(|(other, _)| *other <= cost);
-            if place < KEPT {
-                kept.truncate(KEPT - 1);
+            if place < UPPER_LIMBS {
+                kept.truncate(UPPER_LIMBS - 1);
                 kept.insert(place, (cost, turn));
             }
         }
