@@ -34,6 +34,10 @@ def store(scenes, tmp_path_factory):
     return Store(folder, "train")
 
 
+def test_pictures_show_people_as_often_as_scenes_do(store):
+    assert 0.45 < len(store.people) / (len(store.people) + len(store.others)) < 0.85
+
+
 def test_a_mirrored_pose_has_mirrored_joints(scenes):
     pose, body = standing(np.random.default_rng(1)), scenes.bodies[0]
     a, b = (body.posed(p, np.random.default_rng(2), dressed=False)[1] for p in (pose, pose.mirrored()))
@@ -59,7 +63,7 @@ def test_people_stand_where_their_joints_are(scenes):
 
 
 def test_places_in_the_picture_come_back(store):
-    middle = store.files[0]["middle"].astype(float)
+    middle = store.columns["middle"].numpy().astype(float)
     points = np.random.default_rng(0).normal([0, 0, 3.0], 0.4, (len(middle), 17, 3))
     places = np.stack([crops.place(p, m, 0.0) for p, m in zip(points, middle, strict=True)])
     np.testing.assert_allclose(crops.lifted(places, middle), points, atol=1e-6)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from training.bodies import BONES, JOINTS
 from training.crops import lifted
@@ -26,7 +27,7 @@ LINKS = {
 }
 
 
-def answers(weights: Path, store: Store, which: list[tuple[int, int]]) -> dict[str, Array]:
+def answers(weights: Path, store: Store, which: Tensor) -> dict[str, Array]:
     """All outputs of the network for these pictures."""
     net = restored(read(weights))
     rows: list[Any] = []
@@ -36,7 +37,7 @@ def answers(weights: Path, store: Store, which: list[tuple[int, int]]) -> dict[s
     return {name: torch.cat([getattr(r, name) for r in rows]).numpy().astype(float) for name in rows[0]._fields}
 
 
-def yardstick(path: Path, store: Store, which: list[tuple[int, int]]) -> dict[str, Array]:
+def yardstick(path: Path, store: Store, which: Tensor) -> dict[str, Array]:
     """The same of an ONNX network with outputs p (joints) and vis (17 logits, facing, person)."""
     import onnxruntime
 
@@ -48,10 +49,10 @@ def yardstick(path: Path, store: Store, which: list[tuple[int, int]]) -> dict[st
     return {"joints": joints, "visible": overall[:, :17], "facing": overall[:, 17], "person": overall[:, 18]}
 
 
-def truth(store: Store, which: list[tuple[int, int]]) -> dict[str, Array]:
+def truth(store: Store, which: Tensor) -> dict[str, Array]:
     """The truths of these pictures."""
     keys = ("middle", "person", "joints", "weight", "facing", "lengths", "seen")
-    return {k: np.stack([store.files[f][k][i] for f, i in which]).astype(float) for k in keys}
+    return {k: store.columns[k][which].numpy().astype(float) for k in keys}
 
 
 def _bones(points: Array) -> dict[str, Array]:
@@ -123,7 +124,7 @@ def main() -> None:
     a = parser.parse_args()
     torch.set_num_threads(2)
     store = Store(a.data, "held")
-    which = store.people + store.others
+    which = torch.cat([store.people, store.others])
     true = truth(store, which)
     figures = {"weights": _rounded(measure(answers(a.weights, store, which), true))}
     if a.yardstick:

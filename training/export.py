@@ -94,7 +94,7 @@ def restored(values: dict[str, NDArray[np.float32]]) -> Net:
             assert conv.bias is not None
             conv.bias.data.copy_(bias)
             return
-        norm.eps = 0.0  # of the mean 0 and the variance 1 that a new norm holds
+        norm.eps = 1e-30  # beside the variance 1 and the mean 0 that a new norm holds; some versions refuse 0
         norm.bias.data.copy_(bias)
 
     def block(name: str, r: Residual) -> None:
@@ -119,7 +119,7 @@ def restored(values: dict[str, NDArray[np.float32]]) -> Net:
 @torch.no_grad()
 def check_vectors(net: Net, store: Store) -> Named:
     """A person and something else, `pictures` (2, 96, 96, 2), and every output of the network for them."""
-    x = store.batch([store.people[7], store.others[5]])["x"]
+    x = store.batch(torch.stack([store.people[7], store.others[5]]))["x"]
     out: Output = net(x)
     return [
         ("pictures", x.permute(0, 2, 3, 1).numpy()),

@@ -235,7 +235,7 @@ def _crouch(rng: np.random.Generator, kind: str) -> Pose:
 
 
 def sample(rng: np.random.Generator, poses: list[Pose]) -> Pose:
-    """One pose: at rest, from motion capture (arms kept, exchanged or random) or by rule; one in twenty upside down."""
+    """One pose: at rest, from motion capture (arms kept, exchanged or random) or by rule; one in ten tumbled about."""
     x = rng.random()
     if x < 0.22:
         pose = standing(rng)
@@ -254,9 +254,9 @@ def sample(rng: np.random.Generator, poses: list[Pose]) -> Pose:
         pose = replace(pose, head=pose.head @ _limited(head, 1.2))
     if rng.random() < 0.5:
         pose = pose.mirrored()
-    if rng.random() < 0.05 and not pose.seat:
+    if rng.random() < 0.1 and not pose.seat:
         pose = _tumbled(rng, pose)
-    elif rng.random() < 0.02:
+    elif rng.random() < 0.03:
         flat = about("y", rng.choice([-1.0, 1.0]) * np.pi / 2) @ about("z", rng.uniform(-np.pi, np.pi))
         pose = replace(pose.turned(flat), lying=True, seat=False)
     return pose

@@ -15,7 +15,7 @@ from training.rotations import about
 Array = NDArray[np.float64]
 Rng = np.random.Generator
 NOBODY = 0.2  # share of images without a person
-SECOND = 0.06  # share of images with another person
+SECOND = 0.12  # share of images with another person
 CUT = 0.35  # share of images whose border may cut the person
 
 

@@ -1,7 +1,8 @@
 """Trains the network: `python -m training.train --data DIR --state DIR`; writes a state to go on from, and figures.
 
-Several processes with a thread each share a batch and average their gradients: on a busy machine that is much faster than
-threads that wait for each other in every layer.
+On an accelerator (`--device cuda`) one process trains, and all pictures lie in its memory. On processors several processes
+with a thread each share a batch and average their gradients: on a busy machine that is much faster than threads that wait
+for each other in every layer.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from training.loader import Batch, Store, augment
 from training.net import Net, Output
 
 ARMS = [5, 6, 7, 8, 9, 10]  # elbows, wrists, hands: lost most easily, and matter most
-BETA = 0.04  # m; below it the loss is quadratic
+BETA = 0.02  # m; below it the loss is quadratic
 EMA = 0.999
 
 
@@ -36,19 +37,25 @@ class Plan:
 
     steps: int = 10_300
     minutes: float = 0.0
-    people: int = 52  # pictures of a step, of all processes together
-    others: int = 12
+    batch: int = 64  # pictures of a step, of all processes together
     processes: int = 1
     rate: float = 1.8e-3
     warm: int = 300
     save_s: float = 240.0
 
+    @property
+    def share(self) -> tuple[int, int]:
+        """Pictures with and without a person in the batch of one process."""
+        each = self.batch // self.processes
+        return each - each // 5, each // 5
 
-def loss_of(out: Output, batch: Batch) -> tuple[Tensor, dict[str, float]]:
+
+def loss_of(out: Output, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
     """The loss of a batch, and its parts for the log."""
     person = batch["person"].float()
     people = person > 0.5
-    weight = batch["weight"] * torch.ones(17).index_fill(0, torch.tensor(ARMS), 1.5)
+    weight = batch["weight"].clone()
+    weight[:, ARMS] *= 1.5
     weight = weight / weight.sum().clamp(min=1)
     target = batch["joints"]
     joints = (weight[..., None] * functional.smooth_l1_loss(out.joints, target, beta=BETA, reduction="none")).sum() / 3
@@ -74,14 +81,15 @@ def loss_of(out: Output, batch: Batch) -> tuple[Tensor, dict[str, float]]:
         whole = batch["weight"] > 0.9
         parts = {"loss": total, "cm": 100 * e[whole].mean(), "facing": facing}
         parts |= {"person": who, "size": sizes, "spread": spread}
-    return total, {k: float(v.detach()) for k, v in parts.items()}
+    return total, {k: v.detach() for k, v in parts.items()}
 
 
 @torch.no_grad()
 def check(net: Net, store: Store, most: int = 1000) -> dict[str, float]:
     """Figures of the held-out pictures: mean and median error of seen joints (cm), sides, facing, person, sizes."""
     net.eval()
-    which = (store.people + store.others)[:: max(1, (len(store.people) + len(store.others)) // most)]
+    which = torch.cat([store.people, store.others])
+    which = which[:: max(1, len(which) // most)]
     rows: dict[str, list[Tensor]] = {k: [] for k in ("error", "facing", "person", "size")}
     for i in range(0, len(which), 100):
         b = store.batch(which[i : i + 100])
@@ -113,10 +121,10 @@ class Training:
     views: int = 0
 
     @classmethod
-    def new(cls, seed: int, rate: float, small: bool = False) -> Training:
+    def new(cls, seed: int, rate: float, *, small: bool = False, device: str = "cpu") -> Training:
         """A network that knows nothing."""
         torch.manual_seed(seed)
-        net = Net(small).to(memory_format=torch.channels_last)
+        net = Net(small).to(device, memory_format=torch.channels_last)
         plain = [p for p in net.parameters() if p.ndim <= 1]
         groups = [{"params": [p for p in net.parameters() if p.ndim > 1], "weight_decay": 0.02}]
         optimiser = torch.optim.AdamW([*groups, {"params": plain, "weight_decay": 0.0}], lr=rate)
@@ -131,17 +139,17 @@ class Training:
 
     def load(self, path: Path) -> None:
         """Go on from a state."""
-        kept = torch.load(path, weights_only=True)
+        kept = torch.load(path, weights_only=True, map_location="cpu")
         for name in ("net", "mean", "optimiser"):
             getattr(self, name).load_state_dict(kept[name])
         self.step, self.views = kept["step"], kept["views"]
 
-    def update(self, batch: Batch, rate: float, done: float = 0.0) -> tuple[dict[str, float], float]:
+    def update(self, batch: Batch, rate: float, done: float = 0.0) -> tuple[dict[str, Tensor], float]:
         """One step; parts of the loss, and `done` of the first process."""
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         x = batch["x"].contiguous(memory_format=torch.channels_last)
-        with torch.autocast("cpu", torch.bfloat16):
+        with torch.autocast(x.device.type, torch.bfloat16):
             out = self.net(x)
         loss, parts = loss_of(out, batch)
         self.optimiser.zero_grad(set_to_none=True)
@@ -180,7 +188,7 @@ def run(training: Training, data: Store, held: Store | None, plan: Plan, state: 
     while done < 1:
         rate = plan.rate * (0.5 + 0.5 * math.cos(math.pi * done)) + 1e-6
         rate *= min(1.0, (training.step - first + 1) / plan.warm)
-        batch = augment(data.draw(rng, plan.people // plan.processes, plan.others // plan.processes))
+        batch = augment(data.draw(rng, *plan.share))
         now = time.monotonic()
         reached = (now - start) / (60 * plan.minutes) if plan.minutes else (training.step + 1 - first) / plan.steps
         parts, done = training.update(batch, rate, reached)
@@ -188,8 +196,8 @@ def run(training: Training, data: Store, held: Store | None, plan: Plan, state: 
         log.append(parts)
         if len(log) == 100:
             if rank == 0:
-                mean = {k: round(sum(p[k] for p in log) / len(log), 4) for k in log[0]}
-                speed = 100 * (plan.people + plan.others) / (time.monotonic() - looked)
+                mean = {k: round(float(sum(p[k] for p in log)) / len(log), 4) for k in log[0]}
+                speed = 100 * plan.batch / (time.monotonic() - looked)
                 print(f"step {training.step} {100 * done:.1f} % rate {rate:.1e} {speed:.0f} views/s {mean}", flush=True)
             log, looked = [], time.monotonic()
         if now - saved > plan.save_s:
@@ -211,17 +219,19 @@ def _keep(training: Training, held: Store | None, state: Path, done: float) -> N
     print("held out", figures, flush=True)
 
 
-def work(rank: int, place: Path, state: Path, plan: Plan, seed: int) -> None:
+def work(rank: int, place: Path, state: Path, plan: Plan, seed: int, device: str) -> None:
     """One process of a training."""
     torch.set_num_threads(1)
+    torch.backends.cudnn.benchmark = True  # pictures and batches are of one size
     os.nice(5)
     if plan.processes > 1:
         meet = f"file://{state.resolve()}/meeting"
         dist.init_process_group("gloo", init_method=meet, rank=rank, world_size=plan.processes)
-    training = Training.new(seed, plan.rate)
+    training = Training.new(seed, plan.rate, device=device)
     if (state / "state.pt").exists():
         training.load(state / "state.pt")
-    run(training, Store(place, "train"), Store(place, "held") if rank == 0 else None, plan, state, seed, rank)
+    held = Store(place, "held", device) if rank == 0 else None
+    run(training, Store(place, "train", device), held, plan, state, seed, rank)
 
 
 def main() -> None:
@@ -229,16 +239,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--state", type=Path, required=True, help="folder; a training that lies there goes on")
-    parser.add_argument("--steps", type=int, default=Plan.steps, help="of 64 pictures")
+    parser.add_argument("--steps", type=int, default=Plan.steps)
     parser.add_argument("--minutes", type=float, default=0.0, help="instead of steps")
+    parser.add_argument("--batch", type=int, default=Plan.batch, help="pictures of a step")
     parser.add_argument("--rate", type=float, default=Plan.rate)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--device", default="cpu", help="cpu, or cuda for an accelerator")
+    parser.add_argument("--processes", type=int, help="one on an accelerator, else one a core")
     a = parser.parse_args()
     a.state.mkdir(parents=True, exist_ok=True)
     (a.state / "meeting").unlink(missing_ok=True)
-    plan = Plan(a.steps, a.minutes, rate=a.rate, processes=a.processes)
-    torch.multiprocessing.spawn(work, (a.data, a.state, plan, a.seed), nprocs=a.processes)
+    processes = a.processes or (os.cpu_count() or 1 if a.device == "cpu" else 1)
+    plan = Plan(a.steps, a.minutes, a.batch, processes, a.rate)
+    torch.multiprocessing.spawn(work, (a.data, a.state, plan, a.seed, a.device), nprocs=processes)
 
 
 if __name__ == "__main__":

@@ -271,11 +271,12 @@ pub fn person_candidates<'py>(
     };
     let mut segmentation = Segmentation::default();
     segmentation.find(&image, &around);
-    let mut found = Vec::new();
+    let (mut found, mut pixels) = (Vec::new(), Vec::new());
     for candidate in segmentation.candidates().iter().take(most) {
         let Some(crop) = segmentation.crop(candidate) else { continue };
         let mut mask = vec![false; width * height];
-        segmentation.pixels(candidate).for_each(|(index, _)| mask[index] = true);
+        segmentation.mask(candidate, &mut pixels);
+        pixels.iter().for_each(|pixel| mask[*pixel] = true);
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
         found.push(PyCandidate {
             crop: PyArray1::from_vec(py, channels).reshape([2, SIZE, SIZE])?.unbind(),

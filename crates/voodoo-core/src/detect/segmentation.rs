@@ -61,7 +61,7 @@ impl Segmentation {
     }
 
     /// Indices in the image of all pixels of a candidate, those between thinned ones, too.
-    pub(super) fn mask(&self, candidate: &Candidate, into: &mut Vec<usize>) {
+    pub fn mask(&self, candidate: &Candidate, into: &mut Vec<usize>) {
         into.clear();
         for (index, _) in self.pixels(candidate) {
             self.view.block(index, into);
