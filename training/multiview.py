@@ -1,9 +1,10 @@
 """Recordings of a person before several colour cameras, with exact truth: other bodies, clothes, rooms and motions.
 
-    python -m training.multiview OUT --seed 1 --clip 05_18 --body 3 [--cameras 4] [--frames 120]
+    python -m training.multiview OUT --seed 1 --clip 05_18 --body 3 [--cameras 4] [--frames 120] [--silhouettes]
 
 Writes OUT/videos/camN.avi, OUT/Calib_scene.toml, init.json, truth.csv and background/, as `voodoo track OUT` and
-`benches/color_regions.py OUT` read them. Nothing was ever tuned on what comes out of it.
+`benches/color_regions.py OUT` read them. Nothing was ever tuned on what comes out of it. With `--silhouettes` the person is white
+before black: the most that contours can tell. It needs numba.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ class Look:
     colors: Array
     waves: Array
     light: Array
+    flat: bool
 
 
 def _cameras(rng: np.random.Generator, count: int, middle: Array) -> list[Camera]:
@@ -102,7 +104,7 @@ def _clothes(rng: np.random.Generator, body: Body) -> tuple[list[NDArray[np.int3
     return groups, np.array(colors)
 
 
-def _look(rng: np.random.Generator, body: Body, middle: Array) -> Look:
+def _look(rng: np.random.Generator, body: Body, middle: Array, flat: bool) -> Look:
     """A room with furniture about the person, and clothes."""
     wall = np.array([rng.uniform(4.5, 6.0), rng.uniform(4.5, 6.0)])
     low, high = np.array([*(middle[:2] - wall), 0.0]), np.array([*(middle[:2] + wall), 2.9])
@@ -117,9 +119,8 @@ def _look(rng: np.random.Generator, body: Body, middle: Array) -> Look:
     grey = rng.uniform(70, 200, (len(room), 1))
     colors = np.vstack([clothes, np.clip(grey + rng.normal(0, 30, (len(room), 3)), 20, 230)])
     light = np.array([rng.normal(), rng.normal(), 2.0])
-    return Look(
-        room, groups, colors, rng.normal(0, 1, (12, 3)) * rng.uniform(2, 25, (12, 1)), light / np.linalg.norm(light)
-    )
+    waves = rng.normal(0, 1, (12, 3)) * rng.uniform(2, 25, (12, 1))
+    return Look(room, groups, colors, waves, light / np.linalg.norm(light), flat)
 
 
 def _shoot(camera: Camera, look: Look, points: Array | None, time: float, rng: np.random.Generator) -> Picture:
@@ -137,6 +138,8 @@ def _shoot(camera: Camera, look: Look, points: Array | None, time: float, rng: n
         surface = seen(points)
         for number, faces in enumerate(look.body):
             raster.draw(surface, faces, number, camera.intrinsics, True, depth, labels)
+    if look.flat:
+        return np.repeat(np.where(labels < len(look.body), 235, 20).astype(np.uint8)[..., None], 3, axis=2)
     fx, fy, cx, cy = camera.intrinsics
     v, u = np.mgrid[: SIZE[0], : SIZE[1]]
     z = np.where(np.isfinite(depth), depth, 10.0)
@@ -197,7 +200,9 @@ def _headings(positions: Array, names: list[str]) -> Array:
     return np.arctan2(forward[:, 1], forward[:, 0])
 
 
-def make(out: Path, data: Path, *, seed: int, clip: str, body: int, cameras: int, first: int, frames: int) -> None:
+def make(
+    out: Path, data: Path, *, seed: int, clip: str, body: int, cameras: int, first: int, frames: int, silhouettes: bool
+) -> None:
     """Write a recording."""
     rng = np.random.default_rng(seed)
     person = Bodies(data / "bodies", held_out=False)[body]
@@ -212,7 +217,7 @@ def make(out: Path, data: Path, *, seed: int, clip: str, body: int, cameras: int
     middle = np.array([*np.mean([surface.mean(axis=0)[:2] for surface in surfaces], axis=0), 0.0])
     surfaces = [surface - [0, 0, floor] for surface in surfaces]
     joints = [{name: place - [0, 0, floor] for name, place in places.items()} for places in joints]
-    look, views = _look(rng, person, middle), _cameras(rng, cameras, middle)
+    look, views = _look(rng, person, middle, silhouettes), _cameras(rng, cameras, middle)
     (out / "videos").mkdir(parents=True, exist_ok=True)
     (out / "background").mkdir(exist_ok=True)
     (out / "Calib_scene.toml").write_text(_calibration(views))
@@ -248,6 +253,7 @@ def main() -> None:
     parser.add_argument("--cameras", type=int, default=4)
     parser.add_argument("--first", type=int, default=0, help="first frame of the clip")
     parser.add_argument("--frames", type=int, default=120)
+    parser.add_argument("--silhouettes", action="store_true", help="the person white before black")
     options = vars(parser.parse_args())
     make(options.pop("out"), options.pop("data"), **options)
 
