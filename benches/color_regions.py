@@ -2,9 +2,9 @@
 
     python benches/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] [--rounds 9] ...
 
-Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, joints that are more than 10 cm off in the
-last third of a second, how many of the ends of limbs that are more than 10 cm off their status tells, and how many of the others
-it doubts, and user time of a step. Pictures are decoded before the clock runs.
+Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, mean and spread of the errors of joint
+angles, joints that are more than 10 cm off in the last third of a second, how many of the ends of limbs that are more than 10 cm
+off their status tells, and how many of the others it doubts, and user time of a step. Pictures are decoded before the clock runs.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo
+from voodoo.evaluation.metrics import angle_error
 from voodoo.measurements import ColorImage
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.recordings import open_recording
@@ -91,8 +92,9 @@ def called_measured(estimate: voodoo.Estimate) -> list[bool]:
 
 def run(
     folder: Path, options: argparse.Namespace
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_], list[float]]:
-    """Errors (frames, 12) in metres, which of them are said to be measured, and seconds of user time of every step."""
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_], tuple[float, float], list[float]]:
+    """Errors (frames, 12) in metres, which of them are said to be measured, mean and spread of the errors of eight joint angles
+    in degrees, and seconds of user time of every step."""
     recording = open_recording(folder, **{"loader": None} | pictures_alone(folder, None, ("color",)))
     frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in recording]
     truth = truth_of(folder)
@@ -108,7 +110,7 @@ def run(
     order = list(range(len(frames)))
     if options.rounds:
         order = (order + order[-2:0:-1]) * options.rounds
-    errors, measured, seconds = [], [], []
+    found, errors, measured, seconds = [], [], [], []
     for step, index in enumerate(order):
         frame = voodoo.Frame(step / 30.0)
         first = frames[index][-1].stamp
@@ -127,9 +129,10 @@ def run(
         estimate = tracker.step(frame)
         seconds.append(time.process_time() - before)
         places = np.array([estimate.joints[joint] for joint in JOINTS])
+        found.append(places)
         errors.append(np.linalg.norm(places - truth[index], axis=1))
         measured.append(called_measured(estimate))
-    return np.array(errors), np.array(measured), seconds
+    return np.array(errors), np.array(measured), angle_error(np.array(found), truth[order]), seconds
 
 
 def main() -> None:
@@ -144,7 +147,7 @@ def main() -> None:
         parser.add_argument(f"--{switch}", action="store_true")
     options = parser.parse_args()
     for folder in options.recordings:
-        errors, measured, seconds = run(folder, options)
+        errors, measured, angles, seconds = run(folder, options)
         ends = np.array([joint[2:] in LIMBS for joint in JOINTS])
         far, near = ends & (errors > 0.1), ends & (errors <= 0.1)
         told, doubted = (100 * (~measured[which]).mean() if which.any() else np.nan for which in (far, near))
@@ -152,7 +155,8 @@ def main() -> None:
         tenth = len(errors) // 10
         print(
             f"{folder.name}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
-            f" lost {lost}, told {told:.0f} % of {far.sum()}, doubted {doubted:.1f} %, first and last tenth"
+            f" angles {angles[0]:.1f} deg, spread {angles[1]:.1f}, lost {lost},"
+            f" told {told:.0f} % of {far.sum()}, doubted {doubted:.1f} %, first and last tenth"
             f" {100 * errors[:tenth].mean():.2f} {100 * errors[-tenth:].mean():.2f} cm,"
             f" {1e3 * float(np.median(seconds)):.1f} ms",
             flush=True,
