@@ -1,6 +1,6 @@
 """Recordings of a person before several colour cameras, with exact truth: other bodies, clothes, rooms and motions.
 
-    python -m training.multiview OUT --seed 1 --clip 05_18 --body 3 [--cameras 4] [--frames 120] [--silhouettes]
+    python -m training.multiview OUT --seed 1 --clip 05_18 --body 3 [--cameras 4] [--frames 120] [--alike]
 
 Writes OUT/videos/camN.avi, OUT/Calib_scene.toml, init.json, truth.csv and background/, as `voodoo track OUT` and
 `benches/color_regions.py OUT` read them. Nothing was ever tuned on what comes out of it. With `--silhouettes` the person is white
@@ -104,7 +104,7 @@ def _clothes(rng: np.random.Generator, body: Body) -> tuple[list[NDArray[np.int3
     return groups, np.array(colors)
 
 
-def _look(rng: np.random.Generator, body: Body, middle: Array, flat: bool) -> Look:
+def _look(rng: np.random.Generator, body: Body, middle: Array, *, flat: bool, alike: bool) -> Look:
     """A room with furniture about the person, and clothes."""
     wall = np.array([rng.uniform(4.5, 6.0), rng.uniform(4.5, 6.0)])
     low, high = np.array([*(middle[:2] - wall), 0.0]), np.array([*(middle[:2] + wall), 2.9])
@@ -117,7 +117,12 @@ def _look(rng: np.random.Generator, body: Body, middle: Array, flat: bool) -> Lo
         room.append(_box(np.array([*(place - size), 0.0]), np.array([*(place + size), rng.uniform(0.3, 1.1)])))
     groups, clothes = _clothes(rng, body)
     grey = rng.uniform(70, 200, (len(room), 1))
-    colors = np.vstack([clothes, np.clip(grey + rng.normal(0, 30, (len(room), 3)), 20, 230)])
+    if alike:
+        dyed = clothes[rng.integers(SHADES, 3 * SHADES, len(room))]
+        room_colors = np.clip(dyed + rng.normal(0, 10, dyed.shape), 20, 230)
+    else:
+        room_colors = np.clip(grey + rng.normal(0, 30, (len(room), 3)), 20, 230)
+    colors = np.vstack([clothes, room_colors])
     light = np.array([rng.normal(), rng.normal(), 2.0])
     waves = rng.normal(0, 1, (12, 3)) * rng.uniform(2, 25, (12, 1))
     return Look(room, groups, colors, waves, light / np.linalg.norm(light), flat)
@@ -201,7 +206,17 @@ def _headings(positions: Array, names: list[str]) -> Array:
 
 
 def make(
-    out: Path, data: Path, *, seed: int, clip: str, body: int, cameras: int, first: int, frames: int, silhouettes: bool
+    out: Path,
+    data: Path,
+    *,
+    seed: int,
+    clip: str,
+    body: int,
+    cameras: int,
+    first: int,
+    frames: int,
+    silhouettes: bool,
+    alike: bool,
 ) -> None:
     """Write a recording."""
     rng = np.random.default_rng(seed)
@@ -217,7 +232,7 @@ def make(
     middle = np.array([*np.mean([surface.mean(axis=0)[:2] for surface in surfaces], axis=0), 0.0])
     surfaces = [surface - [0, 0, floor] for surface in surfaces]
     joints = [{name: place - [0, 0, floor] for name, place in places.items()} for places in joints]
-    look, views = _look(rng, person, middle, silhouettes), _cameras(rng, cameras, middle)
+    look, views = _look(rng, person, middle, flat=silhouettes, alike=alike), _cameras(rng, cameras, middle)
     (out / "videos").mkdir(parents=True, exist_ok=True)
     (out / "background").mkdir(exist_ok=True)
     (out / "Calib_scene.toml").write_text(_calibration(views))
@@ -254,6 +269,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="first frame of the clip")
     parser.add_argument("--frames", type=int, default=120)
     parser.add_argument("--silhouettes", action="store_true", help="the person white before black")
+    parser.add_argument("--alike", action="store_true", help="the room in the colours of the clothes")
     options = vars(parser.parse_args())
     make(options.pop("out"), options.pop("data"), **options)
 
