@@ -16,7 +16,9 @@ impl Propose for LastGoodEnd {
         let Some(end) = history[at.index].last_good_end else { return };
         let place = end - at.context.seen.origin();
         let cost = rough.end_at(at, place, SWIVELS_AT_REST, f64::INFINITY, &mut pool.rest.poses);
-        if cost < f64::INFINITY {
+        // Pictures judge it as it is: a refinement takes as long as the frame.
+        let most = if at.regions.is_some() { pool.least } else { f64::INFINITY };
+        if cost < most {
             pool.rest.set(Basis::Rest);
         }
     }
