@@ -191,6 +191,10 @@ def _motion(data: Path, clip: str, first: int, frames: int) -> tuple[list[poses.
     chosen = stored["positions_m"][stored["clip"] == clip] / 1000.0
     # Frames of the whole clip say what upright is.
     found = poses.from_positions(chosen, names)
+    if not all(np.isfinite(pose.pelvis).all() for pose in found):
+        raise SystemExit(
+            f"{clip}: expected a clip with frames in which somebody stands upright, found none: take another"
+        )
     heading = _headings(chosen, names)
     turned = []
     for pose, angle in zip(found, heading, strict=True):
