@@ -8,6 +8,7 @@ Format of ARCHITECTURE.md that is read here:
    in backquotes. A room uses rooms to its left only. Files beside the rooms are named like rooms.
 """
 
+import re
 from pathlib import Path
 from statistics import median
 
@@ -111,6 +112,14 @@ def lines_of(module):
     kept = rust_source.without_tests(code)
     tests = sum(1 for a, b in zip(code.splitlines(), kept.splitlines(), strict=True) if a.strip() and not b.strip())
     return text.count("\n") - tests
+
+
+def test_every_file_of_core_tests_runs():
+    """They are modules of one program."""
+    folder = CORE.parent / "tests"
+    listed = re.findall(r"^mod (\w+);", (folder / "all.rs").read_text(encoding="utf-8"), re.M)
+    shared = {path.parent.name for path in folder.glob("*/mod.rs")}
+    assert {path.stem for path in folder.glob("*.rs")} - {"all", "allocations"} == set(listed) - shared
 
 
 def test_structs_are_small(codes):

@@ -1,6 +1,7 @@
 """J10's tables on rendered recordings and real cameras, as examples/ik_tables.py makes them."""
 
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +16,38 @@ import ik_tables
 from voodoo.model.projection import CameraView
 
 
+@pytest.fixture(scope="module")
+def sequence(voodoo_data):
+    """A rendered recording with its silhouettes by name, made once."""
+    return cache(lambda name: ik_tables.rendered(voodoo_data / "rendered" / name))
+
+
+@pytest.fixture(scope="module")
+def solved(sequence):
+    """Mean errors of what was solved of it, once each."""
+
+    @cache
+    def solve(name, views, **options):
+        return means(sequence(name).solve(views, **options), sequence(name).truth)
+
+    return solve
+
+
 def means(found, truth):
     errors = ik_limbs.errors(found, truth)
     return np.array([np.mean([errors[f"{side}_{joint}"] for side in "lr"]) for joint in ("elbow", "knee")])
 
 
-@pytest.mark.parametrize("name", ["dev_03_punch", "dev_05_walk"])
-def test_images_halve_the_error_of_the_inner_joints(voodoo_data, name):
-    sequence = ik_tables.rendered(voodoo_data / "rendered" / name)
-    plain, one, two = (means(sequence.solve(views), sequence.truth) for views in (0, 1, 2))
+@pytest.mark.parametrize("name", ["dev_03_punch", pytest.param("dev_05_walk", marks=pytest.mark.long)])
+def test_images_halve_the_error_of_the_inner_joints(sequence, solved, name):
+    plain, one, two = (solved(name, views) for views in (0, 1, 2))
     for found in (one, two):
         assert (found < 0.5 * plain).all() and (found < 0.025).all()
     assert (two < one + 0.001).all()  # a second view does no harm
     # One view is nearly as good as two, but for the puncher's knees, which move along its line of sight.
     assert one[0] < two[0] + 0.006 and (name == "dev_03_punch" or one[1] < two[1] + 0.006)
     # The second view shows the limbs along the true joints: their axes lie in its silhouettes.
+    sequence = sequence(name)
     for frame in range(0, len(sequence.side), 20):
         view = CameraView(ik_tables.SIDE_CAMERA, sequence.side_pose(frame))
         for joint, (_, first, last) in ik_limbs.LIMBS.items():
@@ -41,30 +59,28 @@ def test_images_halve_the_error_of_the_inner_joints(voodoo_data, name):
             assert (sequence.side[frame].distance[v[seen], u[seen]] < -1.0).all(), (frame, joint)
 
 
-@pytest.mark.parametrize("name", ["dev_03_punch", "dev_07_sword_cmu"])
-def test_the_mean_posture_helps_where_one_view_does_not_tell(voodoo_data, name):
-    sequence = ik_tables.rendered(voodoo_data / "rendered" / name)
-    alone = means(sequence.solve(1), sequence.truth)
-    plain, one, two = (means(sequence.solve(views, rest="mean"), sequence.truth) for views in (0, 1, 2))
+@pytest.mark.parametrize("name", [pytest.param("dev_03_punch", marks=pytest.mark.long), "dev_07_sword_cmu"])
+def test_the_mean_posture_helps_where_one_view_does_not_tell(solved, name):
+    alone = solved(name, 1)
+    plain, one, two = (solved(name, views, rest="mean") for views in (0, 1, 2))
     assert one.mean() < 0.9 * alone.mean() and (one < alone + 0.001).all()
     assert (one < plain).all()
     if name == "dev_03_punch":
         # Half of what two views are better by, for the knees; and half of plain inverse kinematics that has the same rest.
-        without = means(sequence.solve(2), sequence.truth)
+        without = solved(name, 2)
         assert one[1] - two[1] < 0.55 * (alone[1] - without[1]) and (one < 0.5 * plain).all()
 
 
-def test_depths_tell_of_arms_before_the_trunk(voodoo_data):
-    sequence = ik_tables.rendered(voodoo_data / "rendered" / "dev_07_sword_cmu")
-    outline, deep = (means(sequence.solve(1, deep=deep), sequence.truth) for deep in (False, True))
+def test_depths_tell_of_arms_before_the_trunk(solved):
+    outline, deep = solved("dev_07_sword_cmu", 1), solved("dev_07_sword_cmu", 1, deep=True)
     assert deep[0] < 0.5 * outline[0] and deep[1] < outline[1] + 0.001
 
 
-def test_one_view_leaves_open_what_it_cannot_see(voodoo_data, monkeypatch):
+def test_one_view_leaves_open_what_it_cannot_see(sequence, monkeypatch):
     monkeypatch.setattr(ik_open, "EVERY", 8)
 
     def left(name: str, views: int) -> np.ndarray:
-        found = ik_open.left_open(ik_tables.rendered(voodoo_data / "rendered" / name), views)
+        found = ik_open.left_open(sequence(name), views)
         return np.mean([values.mean(axis=0) for values in found.values()], axis=0)
 
     # A boxer before the camera: his legs are one shape, and his arms lie before the trunk. A walk hides little.
@@ -80,6 +96,7 @@ def test_the_best_guess_among_turns():
     assert every == pytest.approx(9 / 4) and around == pytest.approx(1 / 3)
 
 
+@pytest.mark.long
 def test_four_real_cameras(voodoo_data):
     if not (voodoo_data / "pose2sim" / "videos").is_dir():
         pytest.skip("the videos of Pose2Sim are not there")

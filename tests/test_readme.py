@@ -38,6 +38,9 @@ def test_the_two_commands_are_there_and_call_what_they_say():
         run(["bash", "-n", name], ROOT)
     assert "voodoo demo" in (ROOT / first).read_text() and "pytest" in (ROOT / second).read_text()
     assert second in (ROOT / ".ci" / "run").read_text()
+    for name in (first, second):  # what it will do and how long that takes comes first
+        said = [line for line in (ROOT / name).read_text().splitlines() if line.strip().startswith("echo ")]
+        assert "minutes on two cores" in said[0] and "sets up .venv" in said[0], name
 
 
 def test_the_commands_on_a_recording_run(tmp_path):

@@ -255,7 +255,11 @@ def test_what_is_not_read_says_what_to_do(tmp_path):
     (tmp_path / "rgb").mkdir()
     done = run("info", tmp_path)
     assert done.exit_code == 1 and "found colour alone" in done.stderr
-    assert (Path(__file__).parents[1] / "docs" / "how-to" / "cameras.md").is_file()
+    page = (Path(__file__).parents[1] / "docs" / "how-to" / "cameras.md").read_text(encoding="utf-8")
+    titles = " ".join(line for line in page.splitlines() if line.startswith("#"))
+    for name in ("RealSense", "Orbbec", "OAK", "Azure Kinect", "OpenNI", "MediaPipe", "OpenPose"):
+        assert name in titles, name
+    assert page.count("voodoo track") > 3
 
 
 # A start beside a recording

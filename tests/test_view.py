@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import voodoo
 from made_up import two_people
@@ -21,6 +22,7 @@ from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization import rerun_viewer as view
 from voodoo.visualization.body_geometry import bands, limb_mesh, nearest_limb
+from voodoo.visualization.rerun_log import rounded_millimetres
 from voodoo.visualization.rerun_viewer import Viewer
 
 
@@ -58,17 +60,49 @@ def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
         assert entity in shown, entity
 
 
-def test_a_file_takes_less_than_a_hundred_kilobytes_a_frame(tmp_path):
-    """Depth and pictures are compressed, meshes are sent where they changed, and chunks are large."""
+def test_a_file_takes_less_than_fifty_kilobytes_a_frame(tmp_path):
+    """Depth is rounded below its noise, pictures are compressed, of meshes what changed is sent, and chunks are large."""
     pytest.importorskip("rerun", reason="Rerun is not installed")
     recording = open_recording(sample_path())
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
     front_end = FrontEnd(tracker)
     with Viewer(save=tmp_path / "track.rrd") as viewer:
-        for recorded, _ in zip(paired(recording), range(30), strict=False):
+        for recorded, _ in zip(paired(recording), range(45), strict=False):
             viewer.log(front_end.step(recorded), tracker.body, recorded=recorded, front_end=front_end)
-    assert (tmp_path / "track.rrd").stat().st_size < 30 * 100_000
+    assert (tmp_path / "track.rrd").stat().st_size < 45 * 50_000
+
+
+@pytest.mark.parametrize(("unit", "kind"), [(0.001, np.uint16), (0.00025, np.uint16), (1.0, np.float32)])
+def test_depth_is_rounded_by_a_quarter_of_a_percent_and_holes_stay(unit, kind):
+    metres = np.random.default_rng(3).uniform(0.1, 12.0, (40, 50))
+    metres[:4] = 0.0
+    image = (metres / unit).astype(kind)
+    if kind == np.float32:
+        image[1], image[2] = np.nan, -1.0
+    rounded = rounded_millimetres(image, unit)
+    assert (rounded[:4] == 0).all() and rounded.dtype == np.uint16
+    measured = 1000.0 * unit * image[4:].astype(np.float64)
+    assert (np.abs(rounded[4:] - measured) <= 0.0026 * measured + 0.5).all()
+
+
+def test_ellipsoids_are_the_covariances_that_are_known(tmp_path, steps):
+    pytest.importorskip("rerun", reason="Rerun is not installed")
+    tracker, front_end, frames = steps
+    estimate = front_end.step(frames[0])
+    drawn = {}
+    with Viewer(save=tmp_path / "x.rrd") as viewer:
+        log = viewer._stream.log
+        viewer._stream.log = lambda path, item, **how: (drawn.setdefault(path, item), log(path, item, **how))
+        viewer.log(estimate, tracker.body)
+    shown = drawn["world/body/uncertainty"]
+    sizes, turns, centers = (
+        np.array(part.as_arrow_array().to_pylist()) for part in (shown.half_sizes, shown.quaternions, shown.centers)
+    )
+    axes = Rotation.from_quat(turns).as_matrix()
+    found = np.einsum("nij,nj,nkj->nik", axes, sizes**2, axes)
+    np.testing.assert_allclose(found, estimate.joint_covariances, atol=1e-8)
+    np.testing.assert_allclose(centers, estimate.joint_positions, atol=1e-5)
 
 
 def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):

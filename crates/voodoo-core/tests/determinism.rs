@@ -1,8 +1,7 @@
 //! The same input gives the same output, bit by bit, for any number of threads.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod scene;
-
+use crate::scene;
 use voodoo_core::body::HumanModel;
 use voodoo_core::config::Overlap;
 use voodoo_core::observation::frame::Frame;

@@ -4,8 +4,7 @@
 //! `VOODOO_FUZZ_SEED` where they begin.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod scene;
-
+use crate::scene;
 use std::time::{Duration, Instant};
 
 use voodoo_core::body::{HumanModel, Joint, Limb, Site};

@@ -1,8 +1,7 @@
 //! Several persons: numbers that last, whoever is hidden, leaves and comes back; the same bits on any number of threads.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod scene;
-
+use crate::scene;
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
 use voodoo_core::observation::frame::Frame;

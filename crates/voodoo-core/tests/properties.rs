@@ -1,8 +1,7 @@
 //! What must hold for any pose, shift, weight: the step as K06 IV-B says, and the changes of the body.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod scene;
-
+use crate::scene;
 use proptest::prelude::*;
 use voodoo_core::body::kinematics::{hinge_axis, joint_turn, place};
 use voodoo_core::body::{HumanModel, Joint};
@@ -319,21 +318,25 @@ proptest! {
         let clouds = [scene::cloud(&points)];
         let mut tracker = tracker(Config { solver: SolverKind::Limbwise, ..Config::default() }, &before);
         let mut stamp = 0.0;
-        let mut follow = |tracker: &mut Tracker| {
+        let mut last = Status::Tracking;
+        // A limb of which nothing is seen, and two of the others by which few of the points lie, are a quarter of them.
+        let mut follow = |tracker: &mut Tracker, unseen: bool| {
             let gaps = &tracker.estimate().joint_gaps;
             assert!(gaps.iter().all(|gap| *gap < 1e-9), "a change opened a joint: {gaps:?}");
-            assert_eq!(tracker.estimate().status, Status::Tracking);
+            assert_eq!(tracker.estimate().status, last, "a change of the body tells nothing of the pose");
             stamp += 1.0;
             let estimate = tracker.step(&scene::with_cloud(stamp, &clouds)).unwrap();
-            assert_eq!((estimate.status, estimate.stamp), (Status::Tracking, stamp));
+            last = estimate.status;
+            assert!(last == Status::Tracking || (unseen && last == Status::Degraded), "{last:?}");
+            assert_eq!(estimate.stamp, stamp);
             largest_distance(&estimate.sites[..5], &sites(&human(), &before)[..5])
         };
         tracker.scale(factor).unwrap();
-        prop_assert!(follow(&mut tracker) < 0.1);
+        prop_assert!(follow(&mut tracker, false) < 0.1);
         tracker.scale(1.0 / factor).unwrap();
         let forearm = human().limbs()[3].shape;
         tracker.set_shape("l_forearm", forearm.scaled(factor).unwrap()).unwrap();
-        prop_assert!(follow(&mut tracker) < 0.05);
+        prop_assert!(follow(&mut tracker, false) < 0.05);
         let held = TaperedEllipticCylinder::new(0.2, 0.1, 0.1, 0.1, 0.1).unwrap();
         let joint = Joint {
             name: "grip".into(),
@@ -348,12 +351,12 @@ proptest! {
         let end = tracker.body().site_index("box_end").unwrap();
         let (hand, top) = (tracker.estimate().world_from_limb[3], tracker.estimate().sites[end]);
         prop_assert!((top - hand * Vec3::new(0.0, 0.0, forearm.length() + 0.2)).length() < 1e-9);
-        prop_assert!(follow(&mut tracker) < 0.05);
+        prop_assert!(follow(&mut tracker, true) < 0.05);
         tracker.remove_limb("box").unwrap();
         prop_assert!(tracker.body().site_index("box_end").is_err());
-        prop_assert!(follow(&mut tracker) < 0.05);
+        prop_assert!(follow(&mut tracker, false) < 0.05);
         tracker.remove_limb("r_thigh").unwrap();
         prop_assert_eq!(tracker.body().limbs().len(), 8);
-        prop_assert!(follow(&mut tracker) < 0.05);
+        prop_assert!(follow(&mut tracker, false) < 0.05);
     }
 }

@@ -1,8 +1,7 @@
 //! What is refused, and that a refusal leaves no trace.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod scene;
-
+use crate::scene;
 use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
 use voodoo_core::config::{RawValue, Value};
 use voodoo_core::math::{Pose, Quat, Vec3};

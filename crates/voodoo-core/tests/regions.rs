@@ -1,8 +1,7 @@
 //! Pose from colour regions alone: followed, told, refused and the same every time.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod color_scene;
-
+use crate::color_scene;
 use color_scene::{CAMERAS, picture, shoot, standing};
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Pose, Quat, Vec3};

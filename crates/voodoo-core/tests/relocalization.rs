@@ -1,8 +1,7 @@
 //! A body that is lost says so, and is found again somewhere else.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-mod scene;
-
+use crate::scene;
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::Frame;

@@ -1,9 +1,8 @@
 //! Rendered depth against dense marching, against the exact ray of every limb, and against itself on more threads.
 #![allow(clippy::expect_used, clippy::panic)]
 
-mod scene;
-mod shape_support;
-
+use crate::scene;
+use crate::shape_support;
 use shape_support::{Random, hostile, inside, limb_like, random_shape};
 use voodoo_core::Body;
 use voodoo_core::body::{HumanModel, Joint, Limb};

@@ -1,8 +1,7 @@
 //! The SIMD batch against the exact path and against the dense search.
 #![allow(clippy::expect_used)]
 
-mod shape_support;
-
+use crate::shape_support;
 use shape_support::{Random, brute_force, hostile, limb_like, random_shape, shape};
 use voodoo_core::math::{Points, Pose, Vec3};
 use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};

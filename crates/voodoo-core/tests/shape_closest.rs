@@ -1,8 +1,7 @@
 //! The exact closest point against a dense search, and the properties of its distance and normal.
 #![allow(clippy::expect_used)]
 
-mod shape_support;
-
+use crate::shape_support;
 use proptest::prelude::*;
 use shape_support::{Random, brute_force, hostile, inside, limb_like, random_shape, shape};
 use voodoo_core::math::Vec3;

@@ -1,8 +1,7 @@
 //! Rays and boxes against dense marching and sampling.
 #![allow(clippy::expect_used, clippy::panic)]
 
-mod shape_support;
-
+use crate::shape_support;
 use shape_support::{Random, brute_force, hostile, inside, limb_like, random_shape, shape, surface_point};
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::shape::{Region, TaperedEllipticCylinder};

@@ -11,6 +11,7 @@ from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
+    DepthRangeOption,
     ExcludeOption,
     FrameOption,
     HeightOption,
@@ -18,9 +19,11 @@ from voodoo.cli.options import (
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
+    OutOption,
     PeopleOption,
     TopicOption,
     UseOption,
+    ViewOption,
 )
 
 TERMINATED = 143
@@ -41,12 +44,7 @@ def live_command(
     model: ModelOption = None,
     config: ConfigOption = None,
     people: PeopleOption = "1",
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FILE", help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable."
-        ),
-    ] = None,
+    out: OutOption = None,
     record: Annotated[
         Path | None,
         typer.Option(
@@ -67,18 +65,13 @@ def live_command(
             help="Publish transforms, joint states and markers on ROS 2; by default where a source is ros2.",
         ),
     ] = None,
-    view: Annotated[
-        bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
-    ] = False,
+    view: ViewOption = False,
     serve: Annotated[
         str | None,
         typer.Option(metavar="[HOST:]PORT", help="Show it in a browser: Rerun's web viewer; on 127.0.0.1 unless told."),
     ] = None,
     use: UseOption = None,
-    depth_range: Annotated[
-        str | None,
-        typer.Option(metavar="NEAR,FAR", help="Leave out depth beyond these metres, and flying pixels at edges."),
-    ] = None,
+    depth_range: DepthRangeOption = None,
     calibration: Annotated[
         list[Path] | None,
         typer.Option(

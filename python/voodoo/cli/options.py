@@ -110,3 +110,17 @@ UseOption = Annotated[
         help=f"Inputs to use: {', '.join(INPUTS)}. By default all there are, color only where nothing else tells the pose.",
     ),
 ]
+DepthRangeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--depth-range", metavar="NEAR,FAR", help="Leave out depth beyond these metres, and flying pixels at edges."
+    ),
+]
+ViewOption = Annotated[
+    bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
+]
+_RESULTS = "Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable"
+OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{_RESULTS}.")]
+OutOrNameOption = Annotated[
+    list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{_RESULTS}; by default NAME.csv.")
+]

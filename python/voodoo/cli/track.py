@@ -12,6 +12,7 @@ from voodoo.cli.options import (
     BackgroundOption,
     BodyOption,
     ConfigOption,
+    DepthRangeOption,
     ExcludeOption,
     FrameOption,
     HeightOption,
@@ -19,11 +20,13 @@ from voodoo.cli.options import (
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
+    OutOrNameOption,
     PeopleOption,
     RecordingArgument,
     StrictOption,
     TopicOption,
     UseOption,
+    ViewOption,
 )
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 
@@ -41,13 +44,7 @@ def track_command(
     model: ModelOption = None,
     config: ConfigOption = None,
     people: PeopleOption = "1",
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FILE",
-            help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME.csv.",
-        ),
-    ] = None,
+    out: OutOrNameOption = None,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
     ] = None,
@@ -55,17 +52,12 @@ def track_command(
         bool,
         typer.Option("--draw-regions", help="In --overlay, also what is the body by its colours, and edges found."),
     ] = False,
-    view: Annotated[
-        bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
-    ] = False,
+    view: ViewOption = False,
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
     ] = None,
     use: UseOption = None,
-    depth_range: Annotated[
-        str | None,
-        typer.Option(metavar="NEAR,FAR", help="Leave out depth beyond these metres, and flying pixels at edges."),
-    ] = None,
+    depth_range: DepthRangeOption = None,
     with_: Annotated[
         list[Path] | None,
         typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,6 @@ from voodoo.recordings.ros_messages import (
     camera_of,
     cloud_points,
     color_image,
-    compressed_color_image,
     compressed_depth_image,
     depth_image,
     scan_fields,
@@ -270,7 +270,9 @@ class RosRecording(Recording):
             return self._own_root
         # Before a robot that moves people and rooms stand still in the frame it moves in.
         moving = [frame for frame in STILL_FRAMES if self._tree.moves(frame, self._own_root)]
-        return next((frame for frame in moving if all(self._reaches(frame, s.frame) for s in sources)), self._own_root)
+        return next(
+            (frame for frame in moving if all(self._tree.reaches(frame, s.frame) for s in sources)), self._own_root
+        )
 
     def _add_transforms(self, message: Message | None, *, static: bool) -> None:
         try:
@@ -292,13 +294,6 @@ class RosRecording(Recording):
                 with reading(where, "a readable transform"):
                     stream_from_reference = matrix(pose.translation, pose.rotation, where)
                 self._tree.add_edge(*frames, 0.0, stream_from_reference, static=True)
-
-    def _reaches(self, root: str, frame: str) -> bool:
-        try:
-            self._tree.path(root, frame)
-        except RecordingError:
-            return False
-        return True
 
     def _check_together(self, sources: Sequence[Source]) -> None:
         """Refuse pictures of several cameras of which nobody tells how they stand to each other; tell what is left out."""
@@ -330,7 +325,7 @@ class RosRecording(Recording):
 
     def _connected(self, source: Source, *, optional: bool) -> bool:
         optional = optional and source.kind == "color" and source is not self._driver
-        if optional and not self._reaches(self.root_frame, source.frame):
+        if optional and not self._tree.reaches(self.root_frame, source.frame):
             self._unused.append((source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
             return False
         self._tree.path(self.root_frame, source.frame)
@@ -380,8 +375,5 @@ class RosRecording(Recording):
             scale = self._units[source.topic] if image.dtype.kind == "u" else 1.0
             return DepthImage(source.topic, stamp, image, scale, camera, root_from_sensor)
 
-        def decode() -> npt.NDArray[np.uint8]:
-            with reading(where, "a readable picture"):
-                return (compressed_color_image if compressed else color_image)(message, camera, where)
-
+        decode = partial(color_image, message, camera, where, compressed=compressed)
         return ColorImage(source.topic, stamp, decode, camera, root_from_sensor)

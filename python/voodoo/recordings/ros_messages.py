@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import CameraError, RecordingError
+from voodoo.errors import CameraError, RecordingError, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.recordings.pictures import decode_color, decode_depth_png
@@ -124,7 +124,7 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
     return image
 
 
-def color_image(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image.
 
     Raises:
@@ -142,9 +142,16 @@ def color_image(message: Message, camera: Camera, source: str) -> npt.NDArray[np
     return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
 
 
-def compressed_color_image(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
-    """(H, W, 3) BGR uint8 of a JPEG or PNG sensor_msgs/CompressedImage."""
-    return decode_color(message.data.tobytes(), source, (camera.width, camera.height))
+def color_image(message: Message, camera: Camera, source: str, *, compressed: bool) -> npt.NDArray[np.uint8]:
+    """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image, or of a JPEG or PNG sensor_msgs/CompressedImage.
+
+    Raises:
+        RecordingError: it does not decode, or has another encoding or size.
+    """
+    with reading(source, "a readable picture"):
+        if compressed:
+            return decode_color(message.data.tobytes(), source, (camera.width, camera.height))
+        return _raw_color(message, camera, source)
 
 
 def cloud_points(message: Message, source: str) -> FloatArray:

@@ -149,6 +149,14 @@ class TransformTree:
             return False
         return all(edge.constant or (bool(edge.stamps) and edge.stamps[-1] >= stamp) for edge in edges)
 
+    def reaches(self, root: str, frame: str) -> bool:
+        """Whether transforms lead from `root` to `frame`."""
+        try:
+            self.path(root, frame)
+        except RecordingError:
+            return False
+        return True
+
     def path(self, root: str, frame: str) -> list[str]:
         """Frames from `root` to `frame`, both included.
 

@@ -14,12 +14,22 @@ from voodoo._core import Estimate
 from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView, limb_outline
-from voodoo.sensors.adapters.drawing import Pictured
+from voodoo.sensors.adapters.drawing import Pictured, every, grown
 from voodoo.visualization.body_geometry import limb_colours, nearest_limb
 
-_BODY_POINTS = 800
+_BODY_POINTS = 400
 """Points of a depth image that are shown on the body: enough to see on which limbs they lie."""
 _BACKGROUND = (90, 90, 90)
+_DEPTH_STEP = 0.005
+"""Depths are rounded to steps of this share of themselves, below the noise of the cameras there are: it halves the images."""
+_NEAREST_M = 0.05
+_POINT_FILL = 0.3
+"""In space a pixel of a depth image fills this share of its place: between them the model shows."""
+_OUTLINE_PX = 0.3
+"""Outlines are drawn with as few corners as keep them within this."""
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6]
+if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # of few different depths whole ones repeat, their differences do not
+    _PNG += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +42,7 @@ class StepLog:
         estimate: of the step.
         body: with its sizes in the step.
         most_points: of larger clouds and images only a part is shown.
+        whole: depth images are shown pixel by pixel all the same, as a viewer does; they would be most of a file.
     """
 
     rr: Any
@@ -39,6 +50,7 @@ class StepLog:
     estimate: Estimate
     body: Body
     most_points: int
+    whole: bool = False
 
     @property
     def limbs(self) -> int:
@@ -76,23 +88,22 @@ class StepLog:
             view = CameraView(item.camera, item.root_from_sensor)
             outline = limb_outline(limb.shape, self.estimate.world_from_limb[limb.name], view)
             if outline is not None:
-                outlines.append(np.vstack([outline, outline[:1]]) + 0.5)
+                corners = cv2.approxPolyDP(outline, _OUTLINE_PX, closed=True).reshape(-1, 2)
+                outlines.append(np.vstack([corners, corners[:1]]) + 0.5)
                 colours.append(limb_colours(self.body)[limb.name])
         self.send(f"{path}/picture/model", self.rr.LineStrips2D(outlines, radii=0.5, colors=colours))
 
     def depth(self, path: str, image: npt.NDArray[Any], metres_per_unit: float) -> None:
         """See Log."""
         rr = self.rr
-        if image.dtype != np.uint16:
-            seen = np.isfinite(image) & (image > 0.0)
-            metres = np.where(seen, image, 0.0).astype(np.float64) * metres_per_unit
-            image, metres_per_unit = np.minimum(np.round(metres * 1000.0), 65535.0).astype(np.uint16), 0.001
-        done, blob = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 6])
+        step = 1 if self.whole else every(image.size, self.most_points)
+        millimetres = grown(rounded_millimetres(image[::step, ::step], metres_per_unit), step, image.shape)
+        done, blob = cv2.imencode(".png", millimetres, _PNG)
         if not done or not hasattr(rr, "EncodedDepthImage"):  # Rerun before 0.29
-            self.send(path, rr.DepthImage(image, meter=1.0 / metres_per_unit))
+            self.send(path, rr.DepthImage(millimetres, meter=1000.0, point_fill_ratio=_POINT_FILL))
             return
-        units = 1.0 / metres_per_unit
-        self.send(path, rr.EncodedDepthImage(blob.tobytes(), media_type="image/png", meter=units))
+        about = {"media_type": "image/png", "meter": 1000.0, "point_fill_ratio": _POINT_FILL}
+        self.send(path, rr.EncodedDepthImage(blob.tobytes(), **about))
 
     def body_points(
         self, path: str, points: npt.NDArray[Any], pose: FloatArray, *, background: bool = True
@@ -104,9 +115,19 @@ class StepLog:
         shown = np.arange(len(limbs)) if background else np.flatnonzero(limbs < self.limbs)
         if not background:
             shown = shown[:: max(math.ceil(len(shown) / _BODY_POINTS), 1)]
+            shown = shown[np.argsort(limbs[shown], kind="stable")]  # equal colours in a row take no room
         positions = world[shown].astype(np.float32)
         self.send(path, self.rr.Points3D(positions, radii=0.006, colors=colours[limbs[shown]]))
         return limbs
+
+
+def rounded_millimetres(image: npt.NDArray[Any], metres_per_unit: float) -> npt.NDArray[np.uint16]:
+    """Depths [mm] in steps of their own size, up to 65 m; 0 where nothing was seen, or nearer than any camera sees."""
+    metres = image.astype(np.float64) * metres_per_unit
+    seen = np.isfinite(metres) & (metres >= _NEAREST_M)
+    steps = np.round(np.log(metres, where=seen, out=np.zeros_like(metres)) / _DEPTH_STEP)
+    rounded = np.minimum(np.round(1000.0 * np.exp(_DEPTH_STEP * steps)), 65535.0)
+    return np.where(seen, rounded, 0.0).astype(np.uint16)
 
 
 def entity(name: str) -> str:

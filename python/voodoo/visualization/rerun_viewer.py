@@ -45,7 +45,8 @@ class Viewer:
     silhouette, limb by limb), `plots/...`; the timeline is `time`.
 
     Args:
-        save: .rrd file to write; None opens the viewer.
+        save: .rrd file to write; None opens the viewer. In a file depth is rounded to a quarter of a percent, and of large
+            depth images a part of the pixels is kept.
         name: of the recording, shown in the viewer.
         serve: PORT, or HOST:PORT: show it to browsers there instead, see `voodoo.visualization.rerun_server`.
 
@@ -74,6 +75,7 @@ class Viewer:
         else:
             Path(save).parent.mkdir(parents=True, exist_ok=True)
             self._stream.save(str(save))
+        self._whole = save is None
         self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._shapes: dict[str, TaperedEllipticCylinder] = {}
@@ -136,7 +138,7 @@ class Viewer:
         self._log_classes(body, colours)
         self._log_body("world/body", estimate, body, colours)
         memory = Memory() if front_end is None else front_end.memory
-        log = StepLog(self._rr, self._stream, estimate, body, _MOST_POINTS)
+        log = StepLog(self._rr, self._stream, estimate, body, _MOST_POINTS, self._whole)
         for item in () if recorded is None else recorded.measurements:
             for adapter in adapters_of(item):
                 adapter.log(item, log, memory)
@@ -164,7 +166,7 @@ class Viewer:
         self._set_time(estimate.stamp)
         if recorded is not None:
             # Pictures and points belong to nobody in particular.
-            log = StepLog(rr, self._stream, nobody(estimate.stamp), Body.human(), _MOST_POINTS)
+            log = StepLog(rr, self._stream, nobody(estimate.stamp), Body.human(), _MOST_POINTS, self._whole)
             for item in recorded.measurements:
                 for adapter in adapters_of(item):
                     adapter.log(item, log, Memory())
@@ -211,41 +213,44 @@ class Viewer:
             return
         for limb in body.limbs:
             place = f"{path}/limbs/{limb.name}"
-            if not _alike(self._shapes.get(place), limb.shape):
+            shown = self._shapes.get(place)
+            if not _alike(shown, limb.shape):
                 self._shapes[place] = limb.shape
-                vertices, triangles, normals = limb_mesh(limb.shape)
-                self._stream.log(
-                    place,
-                    rr.Mesh3D(
-                        vertex_positions=vertices,
-                        triangle_indices=triangles,
-                        vertex_normals=normals,
-                        albedo_factor=(*colours[limb.name], 150),
-                    ),
-                )
+                self._stream.log(place, self._mesh(limb.shape, colours[limb.name], known=shown is not None))
             pose = estimate.world_from_limb[limb.name]
             self._stream.log(place, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
         self._stream.log(
             f"{path}/joints",
-            rr.Points3D(estimate.joint_positions, radii=0.012, labels=list(estimate.joint_names), show_labels=False),
+            rr.Points3D(estimate.joint_positions, radii=0.006, labels=list(estimate.joint_names), show_labels=False),
         )
         self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
 
+    def _mesh(self, shape: TaperedEllipticCylinder, colour: tuple[int, int, int], *, known: bool) -> object:
+        """A limb's surface; of one that is `known` only where its corners are now."""
+        vertices, triangles, normals = limb_mesh(shape)
+        if known and hasattr(self._rr.Mesh3D, "from_fields"):
+            return self._rr.Mesh3D.from_fields(vertex_positions=vertices)
+        return self._rr.Mesh3D(
+            vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=(*colour, 150)
+        )
+
     def _log_spread(self, path: str, estimate: Estimate) -> None:
         """Ellipsoids within which joints are to one standard deviation."""
         covariances = estimate.joint_covariances
-        if not hasattr(self._rr, "Ellipsoids3D") or not len(covariances) or not np.isfinite(covariances).all():
+        if not hasattr(self._rr, "Ellipsoids3D") or not len(covariances):
             return
-        variances, axes = np.linalg.eigh(covariances)
+        known = np.isfinite(covariances).all(axis=(1, 2))
+        variances, axes = np.linalg.eigh(covariances[known])
         axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
         self._stream.log(
             path,
             self._rr.Ellipsoids3D(
-                centers=estimate.joint_positions,
+                centers=estimate.joint_positions[known],
                 half_sizes=np.sqrt(np.maximum(variances, 0.0)),
-                quaternions=Rotation.from_matrix(axes).as_quat(),
-                colors=(255, 255, 255, 90),
+                quaternions=Rotation.from_matrix(axes).as_quat() if known.any() else None,
+                line_radii=0.001,
+                colors=(255, 255, 255),
             ),
         )
 

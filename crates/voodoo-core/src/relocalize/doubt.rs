@@ -1,19 +1,19 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
+use super::turns::Turns;
 use crate::body::Body;
 use crate::detect::Detection;
 use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 const YOUNG: f64 = 1.0;
-/// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
-const EVERY: [usize; 2] = [3, 15];
-/// A detection is elsewhere when its shoulders and hips are this far from the tracked ones in the mean, metres: three times as far
-/// as a detector errs.
-const ELSEWHERE: f64 = 0.15;
-/// The same of knees and ankles, which cross unseen, and of elbows and wrists: twice as far as a detector errs.
-const LEGS_ELSEWHERE: f64 = 0.12;
-const ARMS_ELSEWHERE: f64 = 0.15;
+/// Seconds from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
+const EVERY: [f64; 2] = [0.1, 0.5];
+/// A detection is elsewhere when its trunk, legs or arms are this far from the tracked ones in the mean, metres: a body's joints are
+/// not quite those that a detector tells.
+const ELSEWHERE: f64 = 0.10;
+/// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
+const SIGMAS: f64 = 3.5;
 /// One detection counts for at most this, in log odds.
 const MOST_ODDS: f64 = 4.0;
 /// From this sum of log odds on it is tried.
@@ -28,17 +28,18 @@ const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 const LEGS: [&str; 4] = ["l_knee", "r_knee", "l_ankle", "r_ankle"];
 const ARMS: [&str; 4] = ["l_elbow", "r_elbow", "l_wrist", "r_wrist"];
 
-/// Mean distance of detected joints from the tracked ones, metres.
-fn apart(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0_f64);
+/// Whether detected joints are elsewhere than the tracked ones, by that many standard deviations.
+fn is_elsewhere(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str], sigmas: f64) -> bool {
+    let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
     for name in names {
         if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
             let tracked: Vec3 = body.site_position(world_from_limb, site);
-            sum += seen.position.distance(tracked);
+            apart += seen.position.distance(tracked);
+            spread += seen.sigma;
             count += 1.0;
         }
     }
-    sum / count.max(1.0)
+    apart > ELSEWHERE * count && apart > sigmas * spread
 }
 
 /// What detections said of a track.
@@ -48,8 +49,7 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    /// Frames since the last look.
-    waited: Option<usize>,
+    looks: Turns,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
     elsewhere: f64,
     nobody: f64,
@@ -78,25 +78,26 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
-    /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
+    /// Whether a detector shall look at a frame. `doubtful`: a limb is not where it should be, or the body is `lost`.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;
         self.since = self.since.or(Some(stamp));
-        self.waited = self.waited.map(|frames| frames + 1);
-        let every = if young { EVERY[0] } else { EVERY[1] };
-        let due = (young || doubtful) && self.waited.is_none_or(|frames| frames >= every);
-        if due {
-            self.waited = Some(0);
-        }
-        due
+        (young || doubtful) && self.looks.take(stamp, if young { EVERY[0] } else { EVERY[1] })
     }
 
-    /// Weighs a detection against the pose, world frame, by the trunk, and with `limbs` by legs and arms; whether the detection's
-    /// is to be tried.
-    pub(super) fn weigh(&mut self, detection: &Detection, body: &Body, world_from_limb: &[Pose], limbs: bool) -> bool {
-        let apart = |names: &[&str]| apart(detection, body, world_from_limb, names);
-        let limbs_are = limbs && (apart(&LEGS) > LEGS_ELSEWHERE || apart(&ARMS) > ARMS_ELSEWHERE);
-        if apart(&TRUNK) > ELSEWHERE || limbs_are {
+    /// Weighs a detection against the pose, world frame: by the trunk, and by legs and arms where the track is `young` or one
+    /// `among` several; whether the detection's is to be tried.
+    pub(super) fn weigh(
+        &mut self,
+        detection: &Detection,
+        body: &Body,
+        world_from_limb: &[Pose],
+        young: bool,
+        among: bool,
+    ) -> bool {
+        let sigmas = if among { 0.0 } else { SIGMAS };
+        let elsewhere = |names: &[&str]| is_elsewhere(detection, body, world_from_limb, names, sigmas);
+        if elsewhere(&TRUNK) || (young || among) && (elsewhere(&LEGS) || elsewhere(&ARMS)) {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(MOST_ODDS);
         } else {
             self.elsewhere = 0.0;
@@ -132,9 +133,9 @@ mod tests {
         let count = |from: f64, doubtful, lost| {
             let mut doubt = Doubt::default();
             doubt.due(0.0, false, false);
-            (1..=30).filter(|frame| doubt.due(from + f64::from(*frame) / 60.0, doubtful, lost)).count()
+            (1..=57).filter(|frame| doubt.due(from + f64::from(*frame) / 60.0, doubtful, lost)).count()
         };
-        assert_eq!([count(0.0, false, false), count(2.0, false, true), count(2.0, true, false)], [10, 10, 2]);
+        assert_eq!([count(0.0, false, false), count(2.0, false, true), count(2.0, true, false)], [9, 11, 3]);
         assert_eq!(count(2.0, false, false), 0);
     }
 
@@ -150,9 +151,14 @@ mod tests {
         let tracked = body.rest_pose(Pose::identity());
         let about = Pose::from_parts(Vec3::ZERO, Quat::from_rotation_z(std::f64::consts::PI));
         let aside = Pose::from_parts(0.4 * Vec3::X, Quat::IDENTITY);
-        let near = Pose::from_parts(0.1 * Vec3::X, Quat::IDENTITY);
-        let tried = |root| Doubt::default().weigh(&seen_at(root), &body, &tracked, false);
-        assert_eq!([about, aside, near].map(tried), [true, true, false]);
+        let near = Pose::from_parts(0.09 * Vec3::X, Quat::IDENTITY);
+        let tried = |root, sigma| {
+            let mut seen = seen_at(root);
+            seen.joints.iter_mut().for_each(|joint| joint.sigma = sigma);
+            [false, true].map(|among| Doubt::default().weigh(&seen, &body, &tracked, false, among))
+        };
+        assert_eq!([about, aside, near].map(|root| tried(root, 0.05)), [[true; 2], [true; 2], [false; 2]]);
+        assert_eq!(tried(aside, 0.2), [false, true], "unsure of it");
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod posture;
 mod seeds;
 mod segment_motion;
 mod trials;
+mod turns;
 mod watch;
 
 use crate::association::correspondence::Correspondences;
@@ -149,15 +150,15 @@ impl Relocalizer {
         self.people.own()
     }
 
-    /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; `among` several
-    /// persons also that its arms and legs are.
-    pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool, among: bool) -> bool {
+    /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; of a `young` track
+    /// and of one `among` several persons also that its arms and legs are.
+    pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool, young: bool, among: bool) -> bool {
         let Some(detection) = self.people.seen() else { return false };
         // A lost body is where a person is seen for sure.
         if lost {
             self.belief.observe(Some(detection))
         } else {
-            self.doubt.weigh(detection, body, world_from_limb, among)
+            self.doubt.weigh(detection, body, world_from_limb, young, among)
         }
     }
 

@@ -2,16 +2,17 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-use super::girth::{GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel};
+use super::girth::{
+    ALIKE, GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel,
+};
 use crate::association::correspondence::RegionPair;
 use crate::body::Model;
 use crate::fit::{Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Edges of neighbouring lines, and of following frames, err alike: so many tell as much as one.
+/// Edges of neighbouring lines err alike: so many tell as much as one.
 const LINES_ALIKE: f64 = 3.0;
-const FRAMES_ALIKE: f64 = 10.0;
 /// Girths follow in every so many frames.
 const GIRTHS_EVERY: u32 = 4;
 /// How far the axis of a tracked limb is off across itself, metres.
@@ -37,6 +38,11 @@ impl Default for Outline {
     }
 }
 
+/// What an edge counts for.
+fn weight(pair: &RegionPair) -> f64 {
+    kernel(pair.distance) * pair.information / LINES_ALIKE
+}
+
 /// Normal equations of a limb's edges: for shift and girth.
 struct Asked {
     h: SMatrix<f64, 5, 5>,
@@ -54,7 +60,7 @@ fn asked<'a>(
         let n = working_from_limb.inverse_transform_vector(pair.normal);
         let girth = girth_row(shape, foot, n);
         let row = SVector::from([n.x, n.y, girth.x, girth.y, girth.z]);
-        let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
+        let weight = weight(pair);
         h += weight * row * row.transpose();
         g += weight * pair.distance * row;
     }
@@ -93,7 +99,7 @@ impl Outline {
             if foot.z < shape.length() * 0.999 {
                 continue;
             }
-            let weight = kernel(pair.distance) * pair.information / LINES_ALIKE;
+            let weight = weight(pair);
             h += weight * along * along;
             g += weight * along * pair.distance;
         }
@@ -112,7 +118,7 @@ impl Outline {
         if h.trace() <= 0.0 {
             return None;
         }
-        let alike = FRAMES_ALIKE / f64::from(GIRTHS_EVERY);
+        let alike = ALIKE / f64::from(GIRTHS_EVERY);
         let (h, g) = (h / alike, g / alike);
         let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * alike);
         let mixed = h.fixed_view::<3, 2>(2, 0);

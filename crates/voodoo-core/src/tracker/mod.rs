@@ -111,7 +111,7 @@ impl Tracker {
             return;
         }
         relocalizer.look(frame, motion.poses[0].translation, false, false);
-        if relocalizer.elsewhere(&model.body, &motion.poses, false, false) {
+        if relocalizer.elsewhere(&model.body, &motion.poses, false, false, false) {
             observer.face(frame);
             let seen = observer.seen(frame, motion.origin);
             let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
@@ -253,11 +253,12 @@ impl Tracker {
         let lost = self.assessor.status() == Status::Lost;
         if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
-            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, among)
+            let young = self.relocalizer.young(frame.stamp);
+            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, young, among)
                 && self.move_to_detection(frame)
             {
                 // What was learnt of sizes and scene was learnt in the wrong place.
-                return !among && self.relocalizer.young(frame.stamp) && self.restart_at_detection();
+                return !among && young && self.restart_at_detection();
             }
         }
         if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {

@@ -1,5 +1,5 @@
 //! Independent oracles for the shape: written from the definition of the surface alone, by dense search.
-#![allow(dead_code)]
+#![allow(clippy::expect_used, dead_code)]
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use voodoo_core::math::{Pose, Vec3};

@@ -9,9 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-import numpy.typing as npt
-
 from voodoo.errors import RecordingError, reading
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Fault, Faults, kind_of
@@ -27,7 +24,6 @@ from voodoo.recordings.ros_messages import (
     camera_of,
     cloud_points,
     color_image,
-    compressed_color_image,
     compressed_depth_image,
     depth_image,
     frame_of,
@@ -214,18 +210,11 @@ class RosFeed:
             return False
         frame = frame_of(message)
         self._since = now if self._since is None else self._since
-        reached = [root for root in STANDING if root in self._tree.frames and self._leads(root, frame)]
+        reached = [root for root in STANDING if root in self._tree.frames and self._tree.reaches(root, frame)]
         if not reached and self.expects_transforms and now - self._since < ROOT_PATIENCE_S:
             return False
         self._root = next(iter(reached), frame)
         self._faults.say(f"root frame {self._root!r}")
-        return True
-
-    def _leads(self, root: str, frame: str) -> bool:
-        try:
-            self._tree.path(root, frame)
-        except RecordingError:
-            return False
         return True
 
     def _root_from_sensor(self, topic: str, frame: str, stamp: float) -> FloatArray:
@@ -252,7 +241,8 @@ class RosFeed:
             )
         camera = known.camera
         if measured == "color":
-            return ColorImage(topic, stamp, partial(_color, kind, message, camera, where), camera, pose)
+            decode = partial(color_image, message, camera, where, compressed=kind == COMPRESSED)
+            return ColorImage(topic, stamp, decode, camera, pose)
         if kind == COMPRESSED:
             try:
                 image = compressed_depth_image(message, camera, where)
@@ -262,11 +252,6 @@ class RosFeed:
             with _whole(message):
                 image = depth_image(message, camera, where)
         return DepthImage(topic, stamp, image, self._scale if image.dtype.kind == "u" else 1.0, camera, pose)
-
-
-def _color(kind: str, message: Message, camera: Camera, where: str) -> npt.NDArray[np.uint8]:
-    with reading(where, "a readable picture"):
-        return (compressed_color_image if kind == COMPRESSED else color_image)(message, camera, where)
 
 
 def _measured_as(topic: str, kind: str, message: Message) -> str:

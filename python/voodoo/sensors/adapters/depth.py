@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy.typing as npt
 from voodoo._core import Frame
 from voodoo.measurements import DepthImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Log
+from voodoo.sensors.adapters.drawing import Log, every, grown
 
 
 class DepthAdapter(Adapter[DepthImage]):
@@ -50,7 +49,7 @@ class DepthAdapter(Adapter[DepthImage]):
         rr, path = log.rr, log.camera(item)
         log.depth(f"{path}/picture", item.image, item.metres_per_unit)
         # Of a large image every n-th row and column.
-        step = math.ceil(math.sqrt(item.image.size / log.most_points))
+        step = every(item.image.size, log.most_points)
         z = item.image[::step, ::step].astype(np.float32) * np.float32(item.metres_per_unit)
         valid = np.isfinite(z) & (z > 0.0)
         points = np.column_stack([item.camera.rays()[::step, ::step][valid] * z[valid, None], z[valid]])
@@ -60,6 +59,5 @@ class DepthAdapter(Adapter[DepthImage]):
         log.outlines(path, item)
         silhouette = np.zeros(z.shape, dtype=np.uint8)
         silhouette[valid] = np.where(limbs == log.limbs, 0, limbs + 1)
-        height, width = item.image.shape
-        silhouette = silhouette.repeat(step, axis=0).repeat(step, axis=1)[:height, :width]
-        log.send(f"{path}/picture/silhouette", rr.SegmentationImage(silhouette, opacity=0.5))
+        whole = grown(silhouette, step, item.image.shape)
+        log.send(f"{path}/picture/silhouette", rr.SegmentationImage(whole, opacity=0.5))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from voodoo.measurements import ColorImage, DepthImage, KeypointImage
 from voodoo.sensors.pixels import FloatArray
 
+Pixel = TypeVar("Pixel", bound=np.generic)
 Color: TypeAlias = tuple[int, int, int]
 Pictured: TypeAlias = DepthImage | ColorImage | KeypointImage
 """Measurements of a camera."""
@@ -65,10 +67,20 @@ class Log(Protocol):
         """Log the outlines of the limbs as the camera sees them, into the picture at a path."""
 
     def depth(self, path: str, image: npt.NDArray[Any], metres_per_unit: float) -> None:
-        """Log a depth image (H, W), compressed: uint16 as it is, float32 to a millimetre."""
+        """Log a depth image (H, W), compressed: to a quarter of a percent, and in a file not more pixels than `most_points`."""
 
     def body_points(
         self, path: str, points: npt.NDArray[Any], pose: FloatArray, *, background: bool = True
     ) -> npt.NDArray[np.intp]:
         """Log points (N, 3) of a sensor at `pose` (4, 4), coloured by limb, those on none only with `background`; the limb of
         each (N,), `limbs`: none."""
+
+
+def every(pixels: int, most: int) -> int:
+    """So manyth rows and columns of an image with so many pixels leave about `most`."""
+    return math.ceil(math.sqrt(pixels / most))
+
+
+def grown(image: npt.NDArray[Pixel], step: int, shape: tuple[int, ...]) -> npt.NDArray[Pixel]:
+    """An image of `shape` (H, W) of every `step`-th row and column of one: where it was, every pixel is larger."""
+    return image.repeat(step, axis=0).repeat(step, axis=1)[: shape[0], : shape[1]]
