@@ -2,8 +2,9 @@
 
     python benches/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] [--rounds 9] ...
 
-Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, joints that are more than 10 cm off in the
-last third of a second, and user time of a step. Pictures are decoded before the clock runs.
+Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, mean and spread of the errors of joint
+angles, joints that are more than 10 cm off in the last third of a second, how many of the ends of limbs that are more than 10 cm
+off their status tells, and how many of the others it doubts, and user time of a step. Pictures are decoded before the clock runs.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import re
 import time
 from pathlib import Path
 
@@ -18,9 +20,12 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo
+from voodoo.evaluation.metrics import angle_error
 from voodoo.measurements import ColorImage
+from voodoo.pipeline.inputs import pictures_alone
 from voodoo.recordings import open_recording
 
+LIMBS = {"elbow": "upperarm", "wrist": "forearm", "knee": "thigh", "ankle": "calf"}
 JOINTS = [f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in "lr"]
 Picture = npt.NDArray[np.uint8]
 
@@ -66,17 +71,32 @@ def shown(picture: Picture, grey: bool) -> Picture:
     return (picture @ np.array([0.114, 0.587, 0.299])).astype(np.uint8) if grey else picture
 
 
+def number_of(sensor: str) -> int:
+    """Number of a camera by its name."""
+    return int(re.findall(r"\d+", sensor)[0])
+
+
 def empty_scene(folder: Path, camera: int, grey: bool) -> list[Picture]:
     """Pictures of the scene without anybody."""
     import cv2
 
-    files = sorted((folder / "background").glob(f"cam_{camera}_*.jpg"))
+    files = sorted((folder / "background").glob(f"cam_{camera}_*.*"))
     return [shown(cv2.imread(str(file)), grey) for file in files]
 
 
-def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float64], list[float]]:
-    """Errors (frames, 12) in metres and seconds of user time of every step."""
-    frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in open_recording(folder)]
+def called_measured(estimate: voodoo.Estimate) -> list[bool]:
+    """Of every joint whether it ends a limb that is called measured."""
+    carriers = [f"{joint[0]}_{LIMBS.get(joint[2:], '')}" for joint in JOINTS]
+    return [estimate.limb_status.get(carrier) == "measured" for carrier in carriers]
+
+
+def run(
+    folder: Path, options: argparse.Namespace
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_], tuple[float, float], list[float]]:
+    """Errors (frames, 12) in metres, which of them are said to be measured, mean and spread of the errors of eight joint angles
+    in degrees, and seconds of user time of every step."""
+    recording = open_recording(folder, **{"loader": None} | pictures_alone(folder, None, ("color",)))
+    frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in recording]
     truth = truth_of(folder)
     stature, joints = start_of(folder, options.start)
     tracker = voodoo.Tracker(voodoo.Body.human(stature), config=voodoo.Config(**json.loads(options.config)))
@@ -84,18 +104,18 @@ def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float
     if options.default_lengths:
         tracker.reset(joints=dict(estimate.joints))
     chosen = [int(camera) for camera in options.cameras.split(",")]
-    for camera in chosen if options.background else []:
-        tracker.set_background(f"/cam_{camera}/image_raw/compressed", empty_scene(folder, camera, options.grey))
+    for item in frames[0] if options.background else []:
+        tracker.set_background(item.sensor, empty_scene(folder, number_of(item.sensor), options.grey))
     rng = np.random.default_rng(7)
     order = list(range(len(frames)))
     if options.rounds:
         order = (order + order[-2:0:-1]) * options.rounds
-    errors, seconds = [], []
+    found, errors, measured, seconds = [], [], [], []
     for step, index in enumerate(order):
         frame = voodoo.Frame(step / 30.0)
         first = frames[index][-1].stamp
         for item in frames[index]:
-            if int(item.sensor.split("/")[1].removeprefix("cam_")) not in chosen:
+            if number_of(item.sensor) not in chosen:
                 continue
             picture = shown(disturbed(item.image, rng, options, step), options.grey)
             frame.add_color(
@@ -109,8 +129,10 @@ def run(folder: Path, options: argparse.Namespace) -> tuple[npt.NDArray[np.float
         estimate = tracker.step(frame)
         seconds.append(time.process_time() - before)
         places = np.array([estimate.joints[joint] for joint in JOINTS])
+        found.append(places)
         errors.append(np.linalg.norm(places - truth[index], axis=1))
-    return np.array(errors), seconds
+        measured.append(called_measured(estimate))
+    return np.array(errors), np.array(measured), angle_error(np.array(found), truth[order]), seconds
 
 
 def main() -> None:
@@ -125,12 +147,18 @@ def main() -> None:
         parser.add_argument(f"--{switch}", action="store_true")
     options = parser.parse_args()
     for folder in options.recordings:
-        errors, seconds = run(folder, options)
+        errors, measured, angles, seconds = run(folder, options)
+        ends = np.array([joint[2:] in LIMBS for joint in JOINTS])
+        far, near = ends & (errors > 0.1), ends & (errors <= 0.1)
+        told, doubted = (100 * (~measured[which]).mean() if which.any() else np.nan for which in (far, near))
         lost = [joint for joint, error in zip(JOINTS, errors[-10:].mean(axis=0), strict=True) if error > 0.1]
+        tenth = len(errors) // 10
         print(
             f"{folder.name}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
-            f" lost {lost}, first and last tenth {100 * errors[: len(errors) // 10].mean():.2f}"
-            f" {100 * errors[-len(errors) // 10 :].mean():.2f} cm, {1e3 * float(np.median(seconds)):.1f} ms",
+            f" angles {angles[0]:.1f} deg, spread {angles[1]:.1f}, lost {lost},"
+            f" told {told:.0f} % of {far.sum()}, doubted {doubted:.1f} %, first and last tenth"
+            f" {100 * errors[:tenth].mean():.2f} {100 * errors[-tenth:].mean():.2f} cm,"
+            f" {1e3 * float(np.median(seconds)):.1f} ms",
             flush=True,
         )
 

@@ -146,6 +146,37 @@ class Tracker:
         rows = self._core._region_lines(source).reshape(-1, 7)
         return RegionLines(rows[:, 0].astype(np.int64), rows[:, 1:3], rows[:, 3:5], rows[:, 5], rows[:, 6])
 
+    def segment(
+        self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None
+    ) -> dict[str, npt.NDArray[np.float32]]:
+        """Which pixels of a frame's colour pictures are the body, with a pose as the shape prior (R07 section 3.1).
+
+        Colours are those that were learnt in steps, or by `learn_colors`; a camera that is new learns them at this pose first.
+        Nothing else changes.
+
+        Args:
+            frame: with pictures; measurements of other kinds are not looked at.
+            world_from_limb: limb name -> rigid (4, 4); None: the pose of now.
+
+        Returns:
+            Name of the camera -> (height, width), how likely each pixel shows the body, 0 to 1.
+
+        Raises:
+            MeasurementError: no pose, or a picture that cannot be used.
+            BodyError: a limb is missing or unknown.
+        """
+        return self._core._segment(frame, self._ordered(world_from_limb))
+
+    def learn_colors(self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None) -> None:
+        """Learn the colours of the body, and of what is around it, in a frame's pictures; steps do so by themselves.
+
+        Args, Raises: as of `segment`.
+        """
+        self._core._learn_colors(frame, self._ordered(world_from_limb))
+
+    def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.NDArray[np.float64]] | None:
+        return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
+
     def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside.
 

@@ -115,6 +115,47 @@ fn a_body_that_is_not_in_the_pictures_is_not_tracked() {
     assert_eq!(tracker.estimate().status, Status::Lost);
 }
 
+/// The standing body with a limb and what hangs on it turned about its joint.
+fn swung(body: &Body, limbs: [&str; 3], turn: Quat) -> Vec<Pose> {
+    let mut poses = standing(body);
+    let upper = body.limb_index(limbs[0]).unwrap();
+    let centre = poses[upper] * body.limbs()[upper].parent.as_ref().unwrap().1.limb_from_joint.translation;
+    for name in limbs {
+        let pose = &mut poses[body.limb_index(name).unwrap()];
+        *pose = Pose::from_parts(centre + turn * (pose.translation - centre), turn * pose.rotation);
+    }
+    poses
+}
+
+/// How far the end of a limb is off, metres, after it was swung away between two frames.
+fn after_a_swing(config: Config, limbs: [&str; 3], turn: Quat, frames: usize) -> f64 {
+    let body = human();
+    let mut tracker = Tracker::new(body.clone(), config).unwrap();
+    tracker.reset_pose(&standing(&body)).unwrap();
+    let (still, away) = (standing(&body), swung(&body, limbs, turn));
+    let shots = [&still, &away].map(|poses| (0..CAMERAS).map(|n| shoot(Some((&body, poses)), n)).collect::<Vec<_>>());
+    for frame in 0..4 + frames {
+        let stamp = frame as f64 / RATE;
+        let seen = &shots[usize::from(frame >= 4)];
+        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, stamp)).collect();
+        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+    }
+    let end = body.limb_index(limbs[1]).unwrap();
+    let place = Vec3::Z * body.limbs()[end].shape.length();
+    (tracker.estimate().world_from_limb[end] * place).distance(away[end] * place)
+}
+
+#[test]
+fn an_arm_or_leg_that_is_lost_in_colours_is_looked_for_and_found() {
+    let arm = (["l_upperarm", "l_forearm", "l_hand"], Quat::from_rotation_x(1.6));
+    let leg = (["r_thigh", "r_calf", "r_foot"], Quat::from_rotation_y(-0.9));
+    for (limbs, turn) in [arm, leg] {
+        let [with, without] =
+            [true, false].map(|hypotheses| after_a_swing(Config { hypotheses, ..Config::default() }, limbs, turn, 8));
+        assert!(with < 0.05 && without > 0.15, "{limbs:?}: {with} m, and {without} m where nothing is looked for");
+    }
+}
+
 #[test]
 fn the_same_pictures_give_the_same_bits() {
     let first = followed(Config::default(), [0.0; CAMERAS], true, false);

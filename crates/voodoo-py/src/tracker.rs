@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::Vec3;
+use voodoo_core::observation::picture::ColorImage;
 use voodoo_core::{Body, Frame, Tracker};
 
 use crate::arrays::{PointArray, limb_poses, vector};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::ColorArray;
+use crate::borrowed::{ColorArray, ColorView};
 use crate::config::config;
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
@@ -54,6 +55,25 @@ impl PyTracker {
             self.cameras.len() - 1
         });
         number as u16
+    }
+
+    /// The pictures of a frame, whose cameras are known by their names.
+    fn pictures<'a>(
+        &mut self,
+        py: Python<'_>,
+        frame: &PyFrame,
+        views: &'a [ColorView<'_, '_>],
+    ) -> PyResult<Vec<ColorImage<'a>>> {
+        let mut colors = Vec::with_capacity(views.len());
+        for view in views {
+            let name = &frame.sources[usize::from(view.data.source)];
+            if view.data.distorted {
+                let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
+                return Err(exception(py, "MeasurementError", text));
+            }
+            colors.push(view.image(self.camera(name))?);
+        }
+        Ok(colors)
     }
 
     fn body_changed(&mut self) {
@@ -101,15 +121,7 @@ impl PyTracker {
         let borrowed = frame.borrow_for(py, self.tracker.body())?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
-        let mut colors = Vec::with_capacity(views.len());
-        for view in &views {
-            let name = &frame.sources[usize::from(view.data.source)];
-            if view.data.distorted {
-                let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
-                return Err(exception(py, "MeasurementError", text));
-            }
-            colors.push(view.image(self.camera(name))?);
-        }
+        let colors = self.pictures(py, frame, &views)?;
         let input = Frame {
             stamp: frame.stamp,
             clouds: &clouds,
@@ -138,6 +150,44 @@ impl PyTracker {
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
         let camera = self.camera(source);
         self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
+    }
+
+    /// How likely each pixel of a frame's pictures shows the body at some poses: name of the camera -> (height, width).
+    #[pyo3(signature = (frame, poses=None))]
+    fn _segment<'py>(
+        &mut self,
+        py: Python<'py>,
+        frame: &PyFrame,
+        poses: Option<Vec<Bound<'py, PyAny>>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
+        let views = frame.color_views(py);
+        let colors = self.pictures(py, frame, &views)?;
+        let input = Frame { colors: &colors, ..Frame::empty(frame.stamp) };
+        let tracker = &mut self.tracker;
+        let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(|error| error.into_py(py))?;
+        let likely = PyDict::new(py);
+        for ((pixels, picture), view) in found.into_iter().zip(&colors).zip(&views) {
+            let name = &frame.sources[usize::from(view.data.source)];
+            likely.set_item(name, PyArray1::from_vec(py, pixels).reshape([picture.height, picture.width])?)?;
+        }
+        Ok(likely)
+    }
+
+    /// Learns the body's colours in a frame's pictures at some poses.
+    #[pyo3(signature = (frame, poses=None))]
+    fn _learn_colors<'py>(
+        &mut self,
+        py: Python<'py>,
+        frame: &PyFrame,
+        poses: Option<Vec<Bound<'py, PyAny>>>,
+    ) -> PyResult<()> {
+        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
+        let views = frame.color_views(py);
+        let colors = self.pictures(py, frame, &views)?;
+        let input = Frame { colors: &colors, ..Frame::empty(frame.stamp) };
+        let tracker = &mut self.tracker;
+        py.detach(|| tracker.learn_colors(&input, poses.as_deref())).map_err(|error| error.into_py(py))
     }
 
     /// The lines of the last step in the pictures of a camera: limb, place (2), outward normal (2), offset, sigma, row by row.

@@ -44,7 +44,7 @@ def ik_command(
         ),
     ] = None,
     pictures: Annotated[
-        str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), or none (plain).")
+        str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), regions, or none.")
     ] = "depth",
     alone: Annotated[
         bool, typer.Option("--alone", help="Solve every frame by itself, from the first pose, not from the one before.")

@@ -48,6 +48,10 @@ def track_command(
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
     ] = None,
+    draw_regions: Annotated[
+        bool,
+        typer.Option("--draw-regions", help="In --overlay, also what is the body by its colours, and edges found."),
+    ] = False,
     view: ViewOption = False,
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
@@ -184,7 +188,12 @@ def track_command(
             use=kinds,
         )
         with viewer_of(view, save, source.name) as viewer:
-            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
+            settings = replace(
+                FrontEndSettings.of(source, use=kinds),
+                depth_filter=depth_filter,
+                exclude=boxes,
+                draw_regions=draw_regions,
+            )
             how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
             result, _, _, interrupted = run(source, tracker, overlay, left_out=left_out, **how)
         for target in targets:

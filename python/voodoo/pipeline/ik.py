@@ -22,11 +22,12 @@ from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import LEVEL_FRAMES
 from voodoo.sensors.silhouettes.color import StillBackground
 from voodoo.sensors.silhouettes.depth import StillScene, from_depth
+from voodoo.sensors.silhouettes.regions import RegionSilhouettes
 from voodoo.sensors.silhouettes.surroundings import surroundings
 from voodoo.tracker import Tracker
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
-Pictures: TypeAlias = Literal["depth", "color", "none"]
+Pictures: TypeAlias = Literal["depth", "color", "regions", "none"]
 
 KNOWN = ("head_center", "l_shoulder", "r_shoulder", "l_hand", "r_hand", "l_hip", "r_hip", "l_ankle", "r_ankle")
 """What J10 takes for known, and the trunk that carries its chains."""
@@ -98,8 +99,9 @@ def follow(
         sites: which ones are taken for known. None: those of head, trunk, hands and ankles that `positions` has; wrists and
             skullbase where hands and head are lacking.
         pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known sites and the
-            last posture, or stands before the still scene; "color" by the difference from the still background; "none":
-            plain inverse kinematics.
+            last posture, or stands before the still scene; "color" by the difference from the still background; "regions" by
+            colours, learnt where the person was, near the posture that the known sites have alone; "none": plain inverse
+            kinematics.
         options: see voodoo.ik.Options.
         warm: start each frame from the posture before; else solve it by itself, from the first pose.
         watched: hands the frames on, and may show how far it is.
@@ -113,8 +115,8 @@ def follow(
     Raises:
         VoodooError: an unknown site, or one without positions, no known site at all, unknown words, damage in the recording.
     """
-    if pictures not in ("depth", "color", "none"):
-        raise VoodooError(f'pictures: expected "depth", "color" or "none", found {pictures!r}')
+    if pictures not in ("depth", "color", "regions", "none"):
+        raise VoodooError(f'pictures: expected "depth", "color", "regions" or "none", found {pictures!r}')
     chain = Chain(tracker.body)
     there = [name for name in positions.names if name in chain.site_names]
     if sites is None:
@@ -128,7 +130,10 @@ def follow(
     start = chain.project(tracker.estimate.world_from_limb)
     chosen = {name: getattr(options, name) for name in Options.__dataclass_fields__}
     follower = Follower(chain, start=start, rest="mean" if rest else None, **chosen)
-    scenes = {} if pictures == "none" else _scenes(recording, positions, known, pictures)
+    scenes = {} if pictures in ("none", "regions") else _scenes(recording, positions, known, pictures)
+    regions = RegionSilhouettes(tracker.body) if pictures == "regions" else None
+    seen_poses: Mapping[str, npt.ArrayLike] = tracker.estimate.world_from_limb
+    near: FloatArray | Posture = start
     others = [name for name in there if name not in known]
     postures: list[Posture] = []
     stamps, rows = [], []
@@ -139,11 +144,19 @@ def follow(
             targets = positions.at(recorded.stamp, known)
             seen = {**last, **targets} if warm else targets
             images = _silhouettes(recorded, seen, scenes, level=level) if targets else []
+            colours = [item for item in recorded.measurements if isinstance(item, ColorImage)] if regions else []
+            if regions is not None and targets:
+                # The first frame is the one whose posture is known.
+                if postures:
+                    seen_poses = solve(chain, targets, start=near, options=options).world_from_limb
+                images = _cut_out(regions, colours, seen_poses)
             if warm:
                 posture = follower.step(targets, images=images)
             else:
                 posture = solve(chain, targets, images=images, start=start, options=options)
-            last = posture.joints
+            last, near = posture.joints, posture
+            if regions is not None and targets:
+                regions.learn(colours, posture.world_from_limb)
             truth = positions.at(recorded.stamp, others)
             off = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
             rows.append([off.get(name, float("nan")) for name in others])
@@ -155,6 +168,8 @@ def follow(
         rows, stamps = rows[: len(postures)], stamps[: len(postures)]
     if not postures:
         raise VoodooError(f"{recording.name}: expected at least one frame, found none")
+    if regions is not None and not any(posture.images for posture in postures):
+        raise VoodooError(f"{recording.name}: expected color pictures, found none; --pictures says where to look")
     table = np.array(rows, dtype=np.float64).reshape(len(postures), len(others))
     errors = {name: table[:, index] for index, name in enumerate(others)}
     return _track(stamps, postures), errors
@@ -197,6 +212,14 @@ def _silhouettes(
             continue
         found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor))
     return found
+
+
+def _cut_out(
+    regions: RegionSilhouettes, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]
+) -> list[Silhouette]:
+    """Silhouettes of all pictures by their colours, near a posture."""
+    found = zip(regions.of(pictures, world_from_limb), pictures, strict=True)
+    return [Silhouette(mask, camera=camera, world_from_camera=item.root_from_sensor) for (mask, camera), item in found]
 
 
 def _scenes(

@@ -54,6 +54,7 @@ class FrontEndSettings:
         exclude: boxes (low, high), two corners [m] in the root frame: nobody is looked for in them, and nothing in them is the
             body's.
         empty_scene: sensor -> pictures (H, W, 3) of what that camera sees when nobody is there, for colour regions.
+        draw_regions: pictures of the result show what is the body by its colours, and the edges found along its contour.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
 
     Raises:
@@ -77,6 +78,7 @@ class FrontEndSettings:
     skin: SkinSettings = field(default_factory=SkinSettings)
     exclude: tuple[Box, ...] = ()
     empty_scene: Mapping[str, Sequence[ByteImage]] = field(default_factory=dict)
+    draw_regions: bool = False
     ground_z: float | None = None
 
     def __post_init__(self) -> None:

@@ -85,6 +85,10 @@ pub struct RegionSupport {
     pub shown: f64,
     /// Number of lines.
     pub lines: f64,
+    /// What a limb of an arm or leg explains of the pictures, and no limb of another one or of the trunk, patches.
+    pub gained: f64,
+    /// Its area in the pictures, hidden or not, patches.
+    pub area: f64,
 }
 
 /// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).

@@ -2,6 +2,7 @@
 
 use crate::association::correspondence::Correspondences;
 use crate::body::Model;
+use crate::body::two_bone::TwoBone;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::observer::Observation;
@@ -19,6 +20,22 @@ pub struct Context<'a> {
     pub previous: &'a [Pose],
     /// Seconds since the last frame, as multiples of 1/30 s.
     pub time_scale: f64,
+}
+
+impl Context<'_> {
+    /// Whether edges of colours tell more of a limb than what else there is: depth blurs arms, and knows legs better.
+    pub fn wants_edges(&self, limb: usize) -> bool {
+        self.pictures_alone() || {
+            let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
+            arms.flat_map(TwoBone::limbs).any(|own| own == limb)
+        }
+    }
+
+    /// Whether colours are all that shows the body.
+    pub fn pictures_alone(&self) -> bool {
+        let frame = self.seen.frame();
+        self.config.regions && !frame.colors.is_empty() && frame.images.is_empty() && frame.clouds.is_empty()
+    }
 }
 
 /// A frame before it is said what is tracked: for those who change the model meanwhile.

@@ -1,6 +1,7 @@
 //! The loop of a frame: match, solve, until the mean squared distance settles (K06 III-B and IV-B.2 to 7).
 
 mod context;
+mod edges;
 mod motion;
 
 pub use context::{Context, Matched, Setting};
@@ -17,7 +18,7 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::Pose;
-use crate::regions::{Posed, Regions};
+use crate::regions::{Regions, STEPS};
 use crate::solver::{Gate, Problem, Schedule, Solver, WarmStartInput, solver};
 
 /// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
@@ -101,7 +102,8 @@ impl Fit {
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
             self.solve(context, predicted, poses, steps);
             steps += 1;
-            if (before - distance).abs() < context.config.min_change && self.correspondences.regions.is_empty() {
+            let settled = (before - distance).abs() < context.config.min_change;
+            if settled && self.correspondences.regions.is_empty() || steps >= STEPS && context.pictures_alone() {
                 break;
             }
             before = distance;
@@ -137,6 +139,7 @@ impl Fit {
         self.contours.clear();
         self.match_assigned(context, poses, &gate, true);
         self.find_regions(context, poses, context.config.max_steps);
+        self.claim_regions(context, poses);
     }
 
     /// Points alone, within `gate`, wherever on a limb they are closest: for poses that somebody set.
@@ -214,50 +217,6 @@ impl Fit {
         self.assignment.assign(&model.body, poses, seen.candidates, config.overlap, gate.box_margin);
     }
 
-    /// Colours of limbs and surroundings.
-    pub fn regions(&self) -> &Regions {
-        &self.regions
-    }
-
-    /// The same, to change.
-    pub fn regions_mut(&mut self) -> &mut Regions {
-        &mut self.regions
-    }
-
-    /// Learns the colours of new cameras where the body is expected.
-    pub fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
-        if context.config.regions {
-            self.regions.begin(context.seen.frame(), posed(context, poses));
-        }
-    }
-
-    /// Looks for every edge of colours by itself, both sides of a limb apart: pairs that tell how wide it is.
-    pub fn match_outline(&mut self, context: Context, poses: &[Pose]) {
-        let Self { regions, correspondences, .. } = self;
-        correspondences.regions.clear();
-        if context.config.regions {
-            let (frame, posed) = (context.seen.frame(), posed(context, poses));
-            regions.find_outline(frame, posed, &mut correspondences.regions);
-        }
-    }
-
-    /// Learns colours where the body was found.
-    pub fn learn_regions(&mut self, context: Context) {
-        if context.config.regions {
-            self.regions.learn(context.seen.frame());
-        }
-    }
-
-    fn find_regions(&mut self, context: Context, poses: &[Pose], step: usize) {
-        let Self { regions, correspondences, .. } = self;
-        correspondences.regions.clear();
-        correspondences.region_support.clear();
-        let frame = context.seen.frame();
-        if context.config.regions && !frame.colors.is_empty() {
-            regions.find(frame, posed(context, poses), step, correspondences);
-        }
-    }
-
     fn find_contour(&mut self, context: Context, poses: &[Pose]) {
         if context.config.outline {
             self.contours.find(&context.model.body, poses, context.seen.views.iter());
@@ -297,10 +256,6 @@ impl Fit {
         // 7 Fit the model.
         solver.solve(&problem(context, correspondences, predicted, step), poses);
     }
-}
-
-fn posed<'a>(context: Context<'a>, poses: &'a [Pose]) -> Posed<'a> {
-    Posed { body: &context.model.body, poses, previous: context.previous, origin: context.seen.origin() }
 }
 
 fn problem<'a>(

@@ -13,14 +13,16 @@ mod unexplained;
 pub use landmark_cost::{APART, body_landmark_cost};
 pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
-use crate::association::correspondence::Correspondences;
+use crate::association::correspondence::{Correspondences, RegionSupport};
 use crate::body::Model;
 use crate::detect::Detection;
 use crate::fit::{Context, Fit, Matched, Motion};
 use crate::math::{Pose, shifted};
+use crate::regions::{Backdrop, Posed};
 use history::{Basis, History};
 use proposals::{
-    CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean, UnexplainedCluster,
+    CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
+    UnexplainedCluster,
 };
 use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
@@ -36,6 +38,8 @@ const NEARBY: f64 = 1.15;
 const PATIENCE: usize = 2;
 /// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
 const SEEN_GAIN: f64 = 10.0;
+/// In pictures, an arm or leg is suspect that explains a smaller share of its area, and no other limb.
+const CLAIMED: f64 = 0.3;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 const REFINE: usize = 8;
 
@@ -48,6 +52,7 @@ pub struct Hypotheses {
     rough: RoughSearch,
     clusters: UnexplainedCluster,
     lean: TrunkLean,
+    shown: ShownByColors,
     pool: Pool,
     refined: Refined,
 }
@@ -58,6 +63,8 @@ struct Refined {
     poses: Vec<Pose>,
     /// Its correspondences while it is tried; those of the current poses while it is.
     matched: Correspondences,
+    /// The whole body before what pictures show.
+    backdrop: Backdrop,
 }
 
 impl Hypotheses {
@@ -90,8 +97,10 @@ impl Hypotheses {
         self.make_room(context, fit);
         self.unexplained.collect(context, fit.matched(poses));
         let mut steps = 0;
+        let pictures = context.pictures_alone();
         for index in 0..context.model.extremities.len() {
-            let at = Extremity { context, matched: fit.matched(poses), index };
+            let regions = pictures.then_some(fit.regions());
+            let at = Extremity { context, matched: fit.matched(poses), regions, index };
             if !self.doubts(at) {
                 continue;
             }
@@ -101,6 +110,10 @@ impl Hypotheses {
                 self.unexplained.collect(context, fit.matched(poses));
             }
             steps += taken;
+        }
+        if pictures && steps > 0 {
+            // What was looked at last was tried.
+            fit.match_last(context, poses);
         }
         steps
     }
@@ -130,12 +143,28 @@ impl Hypotheses {
         self.rough.score.make_room(most);
         self.clusters.make_room(most);
         self.lean.make_room(most);
+        if context.pictures_alone() {
+            let (frame, limbs) = (context.seen.frame(), context.model.body.limbs().len());
+            for backdrop in [&mut self.rough.score.backdrop, &mut self.refined.backdrop] {
+                backdrop.make_room(frame, limbs);
+            }
+            self.shown.make_room(limbs);
+        }
         self.refined.matched.reserve_as(fit.correspondences());
     }
 
     /// Whether the frame, and those before it, speak against an arm or leg for long enough to try others.
     fn doubts(&mut self, at: Extremity) -> bool {
-        let (chain, near) = (at.chain(), &mut self.rough.score.unexplained);
+        let chain = at.chain();
+        if at.regions.is_some() {
+            let supports = &at.matched.correspondences.region_support;
+            let sum =
+                |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
+            let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
+            let suspect = gained < CLAIMED * area;
+            return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE));
+        }
+        let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), NEARBY * chain.stretched_length(), near);
         let unexplained = near.total();
         // Furniture stays open beside legs.
@@ -147,13 +176,20 @@ impl Hypotheses {
 
     /// Fills the pool with other configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<&Detection>) {
-        let Self { history, suspicion, rough, clusters, lean, pool, .. } = self;
+        let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current - GAIN);
         // The kinds of proposals: one more is a file and a line here.
-        let kinds: [&mut dyn Propose; 6] =
-            [clusters, &mut LastGoodEnd, &mut CarriedByParent, &mut LastProposal, lean, &mut DetectedEnd(detection)];
+        let kinds: [&mut dyn Propose; 7] = [
+            clusters,
+            &mut LastGoodEnd,
+            &mut CarriedByParent,
+            &mut LastProposal,
+            lean,
+            shown,
+            &mut DetectedEnd(detection),
+        ];
         for kind in kinds {
             kind.propose(at, history, rough, pool);
         }
@@ -209,7 +245,7 @@ impl Refined {
         basis: Basis,
     ) -> bool {
         let chain = &context.model.extremities[index];
-        let before = overall_cost(context, fit.matched(current));
+        let before = self.cost(context, fit, current);
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.exchange(&mut self.matched);
@@ -218,16 +254,32 @@ impl Refined {
             fit.step(context, hypothesis, &mut self.poses, last.saturating_sub(REFINE - step));
         }
         fit.match_last(context, &self.poses);
+        let poses = std::mem::take(&mut self.poses);
+        let cost = self.cost(context, fit, &poses);
+        self.poses = poses;
         let matched = fit.matched(&self.poses);
-        let cost = overall_cost(context, matched);
         let better = cost.total < before.total - GAIN && cost.evidence < before.evidence - SEEN_GAIN;
         // What is as suspect as before is not worth a jump.
-        let mut sure = |matched: Matched| !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
+        let pictures = context.pictures_alone();
+        let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
         if better && (basis == Basis::Lean || sure(matched)) {
             return true;
         }
         fit.exchange(&mut self.matched);
         false
+    }
+
+    /// What matched poses cost, by pictures as well where these are all there is.
+    fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
+        let mut cost = overall_cost(context, fit.matched(poses));
+        if context.pictures_alone() {
+            let Context { model, seen, previous, .. } = context;
+            let posed = Posed { body: &model.body, poses, previous, origin: seen.origin() };
+            fit.regions().draw(seen.frame(), posed, |_| true, &mut self.backdrop);
+            let explained = fit.regions().explained(seen.frame(), posed, &self.backdrop);
+            (cost.evidence, cost.total) = (cost.evidence - explained, cost.total - explained);
+        }
+        cost
     }
 }
 

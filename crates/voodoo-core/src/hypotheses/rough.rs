@@ -7,6 +7,7 @@ use super::suspicion::distances_to_others;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Pose, Vec3, WeightedPoints};
+use crate::regions::{Backdrop, Claim, Posed, Regions};
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
 /// The arm or leg that is looked at, and where everything else is.
@@ -15,6 +16,8 @@ pub(super) struct Extremity<'a> {
     pub(super) context: Context<'a>,
     /// The current poses, and what was matched there.
     pub(super) matched: Matched<'a>,
+    /// What colours tell, where nothing but pictures shows the body.
+    pub(super) regions: Option<&'a Regions>,
     /// Its number among the extremities.
     pub(super) index: usize,
 }
@@ -41,6 +44,8 @@ pub(super) struct RoughScore {
     others: Vec<f32>,
     nearest: Vec<f32>,
     distances: Vec<f32>,
+    /// What pictures show of everything else.
+    pub(super) backdrop: Backdrop,
 }
 
 /// Rough looks at places where an arm or leg may end.
@@ -63,8 +68,28 @@ impl RoughScore {
         }
     }
 
+    /// Draws everything else before what pictures show.
+    fn draw(&mut self, at: Extremity) {
+        let Some(regions) = at.regions else { return };
+        let (chain, frame, poses) = (at.chain(), at.context.seen.frame(), at.matched.poses);
+        let Context { model, previous, .. } = at.context;
+        let posed = Posed { body: &model.body, poses, previous, origin: at.context.seen.origin() };
+        regions.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut self.backdrop);
+    }
+
+    /// What pictures say of some of its limbs at `poses`.
+    pub(super) fn claimed(&self, at: Extremity, poses: &[Pose], limbs: impl Iterator<Item = usize>) -> Claim {
+        let mut claim = Claim::default();
+        let Some(regions) = at.regions else { return claim };
+        let Context { model, seen, previous, .. } = at.context;
+        let posed = Posed { body: &model.body, poses, previous, origin: seen.origin() };
+        limbs.for_each(|limb| claim += regions.claim(seen.frame(), posed, limb, &self.backdrop));
+        claim
+    }
+
     /// Takes the points that count: what is unexplained near by, and what it explains itself.
     pub(super) fn begin(&mut self, at: Extremity, own: &WeightedPoints) {
+        self.draw(at);
         let Self { unexplained, sample, others, distances, .. } = self;
         sample.clear();
         sample.extend(unexplained);
@@ -82,6 +107,10 @@ impl RoughScore {
         nearest.clone_from(others);
         chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
         let points = rough_cost(nearest, &sample.weights);
+        if at.regions.is_some() {
+            // What colours explain is the only part that may be negative.
+            return strain(context, at.matched, chain, poses) - self.claimed(at, poses, chain.limbs()).gained;
+        }
         if points >= least {
             return points;
         }
@@ -169,7 +198,7 @@ mod tests {
             with_context(&before_wall(&model.body, &seen), &config, &model, &poses, |context| {
                 let mut fit = Fit::new(&config).unwrap();
                 fit.match_last(context, &poses);
-                let at = Extremity { context, matched: fit.matched(&poses), index };
+                let at = Extremity { context, matched: fit.matched(&poses), regions: None, index };
                 let (mut unexplained, mut rough) = (Unexplained::default(), RoughSearch::default());
                 unexplained.collect(context, at.matched);
                 unexplained.near(root, arm.stretched_length(), &mut rough.score.unexplained);
@@ -190,7 +219,7 @@ mod tests {
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &poses);
-            let at = Extremity { context, matched: fit.matched(&poses), index: first_arm(&model) };
+            let at = Extremity { context, matched: fit.matched(&poses), regions: None, index: first_arm(&model) };
             let mut unexplained = Unexplained::default();
             unexplained.collect(context, at.matched);
             let mut rough = RoughSearch::default();

@@ -49,6 +49,7 @@ impl Evidence {
             against: share(against),
             shown: self.told / self.lines.max(1.0),
             lines: self.lines,
+            ..RegionSupport::default()
         }
     }
 }

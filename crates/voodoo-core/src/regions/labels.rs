@@ -3,16 +3,19 @@
 //! What lies before what is all that region lines ask of it, so the outline is the convex hull of the two ends, and depth runs
 //! linearly along the axis.
 
+use std::ops::Range;
+
 use super::lens::Lens;
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
 
-/// Pixels of the picture, across and down, that one cell stands for.
-pub(super) const PIXELS_A_CELL: usize = 2;
-/// Corners of an end's outline.
-const CORNERS: usize = 8;
+/// Corners of an end's outline: cosines and sines.
+const CORNERS: [[f64; 2]; 8] = {
+    use std::f64::consts::FRAC_1_SQRT_2 as H;
+    [[1.0, 0.0], [H, H], [0.0, 1.0], [-H, H], [-1.0, 0.0], [-H, -H], [0.0, -1.0], [H, -H]]
+};
 /// A limb with an end nearer than this to the camera's plane is not drawn, metres.
-const NEAREST_END: f64 = 0.1;
+pub(super) const NEAREST_END: f64 = 0.1;
 
 /// No limb is seen there.
 pub(super) const NOTHING: u16 = u16::MAX;
@@ -20,12 +23,19 @@ pub(super) const NOTHING: u16 = u16::MAX;
 /// A picture of limbs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Labels {
+    /// A cell is two to this power pixels wide and high.
+    bits: u32,
     columns: usize,
     rows: usize,
     limb: Vec<u16>,
+    /// Infinite where nothing is seen.
     depth: Vec<f32>,
+    /// Columns and rows that may show a limb, ends excluded.
+    drawn: [Range<usize>; 2],
     hull: Vec<[f32; 2]>,
     corners: Vec<[f32; 2]>,
+    /// Ends of the hull in every row that it spans.
+    sides: Vec<[f32; 2]>,
 }
 
 /// Depth along the picture of an axis.
@@ -36,29 +46,33 @@ struct Axis {
 }
 
 impl Labels {
-    /// Draws all limbs as a camera sees them.
-    pub(super) fn draw(&mut self, body: &Body, camera_from_limb: &[Pose], lens: &Lens) {
-        (self.columns, self.rows) = (lens.width.div_ceil(PIXELS_A_CELL), lens.height.div_ceil(PIXELS_A_CELL));
-        self.limb.clear();
-        self.limb.resize(self.columns * self.rows, NOTHING);
-        self.depth.resize(self.columns * self.rows, 0.0);
-        for (index, (limb, pose)) in body.limbs().iter().zip(camera_from_limb).enumerate() {
+    /// Draws the limbs that are `shown` as a camera sees them, in cells of two to the power of `bits` pixels.
+    pub(super) fn draw(
+        &mut self,
+        body: &Body,
+        camera_from_limb: &[Pose],
+        lens: &Lens,
+        bits: u32,
+        shown: impl Fn(usize) -> bool,
+    ) {
+        self.clear(bits, [lens.width, lens.height].map(|size| size.div_ceil(1 << bits)));
+        let scale = 1.0 / f64::from(1_u32 << bits);
+        let cells = |place: [f64; 2]| place.map(|value| (scale * value) as f32);
+        let limbs = body.limbs().iter().zip(camera_from_limb).enumerate();
+        for (index, (limb, pose)) in limbs.filter(|(index, _)| shown(*index)) {
             let shape = &limb.shape;
             let ends = [(shape.a0(), shape.b0(), 0.0), (shape.a1(), shape.b1(), shape.length())];
-            let centres = ends.map(|(_, _, z)| *pose * (Vec3::Z * z));
+            let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| pose.rotation * axis);
+            let centres = ends.map(|(_, _, along)| pose.translation + z * along);
             if ends.iter().zip(centres).any(|((a, b, _), centre)| centre.z - a.max(*b) < NEAREST_END) {
                 continue;
             }
             self.corners.clear();
-            for (a, b, z) in ends {
-                for corner in 0..CORNERS {
-                    let (s, c) = f64::sin_cos(std::f64::consts::TAU * corner as f64 / CORNERS as f64);
-                    let place = lens.project(*pose * Vec3::new(a * c, b * s, z));
-                    self.corners.push(place.map(|value| (value / PIXELS_A_CELL as f64) as f32));
-                }
+            for ((a, b, _), centre) in ends.into_iter().zip(centres) {
+                let (x, y) = (x * a, y * b);
+                self.corners.extend(CORNERS.map(|[c, s]| cells(lens.project(centre + x * c + y * s))));
             }
-            let [start, end] =
-                centres.map(|centre| lens.project(centre).map(|value| (value / PIXELS_A_CELL as f64) as f32));
+            let [start, end] = centres.map(|centre| cells(lens.project(centre)));
             let front = |end: usize| (centres[end].z - 0.5 * (ends[end].0 + ends[end].1)) as f32;
             let along = [end[0] - start[0], end[1] - start[1]];
             let square = (along[0] * along[0] + along[1] * along[1]).max(1.0);
@@ -68,10 +82,38 @@ impl Labels {
         }
     }
 
-    /// The limb that a cell shows and its depth, metres.
-    #[inline]
-    pub(super) fn at(&self, u: f32, v: f32) -> (u16, f32) {
-        let (column, row) = ((u * (1.0 / PIXELS_A_CELL as f32)) as usize, (v * (1.0 / PIXELS_A_CELL as f32)) as usize);
+    /// Makes room for pictures of a size.
+    pub(super) fn make_room(&mut self, bits: u32, width: usize, height: usize) {
+        let size = [width, height].map(|size| size.div_ceil(1 << bits));
+        self.clear(bits, size);
+        self.sides.reserve(size[1]);
+        self.corners.reserve(2 * CORNERS.len());
+        self.hull.reserve(2 * CORNERS.len() + 1);
+    }
+
+    /// Wipes what was drawn.
+    fn clear(&mut self, bits: u32, [columns, rows]: [usize; 2]) {
+        if (self.bits, self.columns, self.rows) == (bits, columns, rows) {
+            let [across, down] = self.drawn.clone();
+            for row in down {
+                let cells = row * columns + across.start..row * columns + across.end;
+                self.limb[cells.clone()].fill(NOTHING);
+                self.depth[cells].fill(f32::INFINITY);
+            }
+        } else {
+            (self.bits, self.columns, self.rows) = (bits, columns, rows);
+            self.limb.clear();
+            self.limb.resize(columns * rows, NOTHING);
+            self.depth.clear();
+            self.depth.resize(columns * rows, f32::INFINITY);
+        }
+        self.drawn = [0..0, 0..0];
+    }
+
+    /// The limb that a pixel shows and its depth, metres.
+    #[inline(always)]
+    pub(super) fn at(&self, column: usize, row: usize) -> (u16, f32) {
+        let (column, row) = (column >> self.bits, row >> self.bits);
         let index = row * self.columns + column;
         match self.limb.get(index) {
             Some(limb) if column < self.columns => (*limb, self.depth[index]),
@@ -107,30 +149,51 @@ impl Labels {
 
     /// Fills the hull where nothing nearer is.
     fn fill(&mut self, limb: u16, axis: &Axis) {
-        let Self { columns, rows, hull, depth, limb: limbs, .. } = self;
+        let Self { columns, rows, hull, depth, limb: limbs, sides, drawn, .. } = self;
         let (low, high) =
             hull.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), [_, y]| (low.min(*y), high.max(*y)));
         let first = low.ceil().max(0.0) as usize;
-        for row in first..(high.floor() + 1.0).clamp(0.0, *rows as f32) as usize {
-            let y = row as f32;
-            let (mut left, mut right) = (f32::INFINITY, f32::NEG_INFINITY);
-            for (index, [x0, y0]) in hull.iter().enumerate() {
-                let [x1, y1] = hull[(index + 1) % hull.len()];
-                if (*y0 <= y) != (y1 <= y) {
-                    let x = x0 + (x1 - x0) * (y - y0) / (y1 - y0);
-                    (left, right) = (left.min(x), right.max(x));
-                }
+        let end = (high.floor() + 1.0).clamp(0.0, *rows as f32) as usize;
+        if first >= end {
+            return;
+        }
+        sides.clear();
+        sides.resize(end - first, [f32::INFINITY, f32::NEG_INFINITY]);
+        for (index, from) in hull.iter().enumerate() {
+            let to = &hull[(index + 1) % hull.len()];
+            let ([x0, y0], [x1, y1]) = if from[1] <= to[1] { (from, to) } else { (to, from) };
+            // The rows after the upper end, as far as the lower one.
+            let from = (y0.floor() + 1.0).max(first as f32) as usize;
+            let to = (y1.floor() + 1.0).clamp(0.0, end as f32) as usize;
+            let slope = (x1 - x0) / (y1 - y0);
+            for row in from..to {
+                let x = x0 + slope * (row as f32 - y0);
+                let [left, right] = &mut sides[row - first];
+                (*left, *right) = (left.min(x), right.max(x));
             }
-            if !(left <= right) {
+        }
+        for (row, [left, right]) in (first..end).zip(&*sides) {
+            let range = left.ceil().max(0.0) as usize..(right.floor() + 1.0).clamp(0.0, *columns as f32) as usize;
+            if !(left <= right) || range.is_empty() {
                 continue;
             }
-            let range = left.ceil().max(0.0) as usize..(right.floor() + 1.0).clamp(0.0, *columns as f32) as usize;
-            for column in range {
-                let at = (column as f32 - axis.start[0]) * axis.along[0] + (y - axis.start[1]) * axis.along[1];
-                let z = axis.depth[0] + (axis.depth[1] - axis.depth[0]) * at.clamp(0.0, 1.0);
-                let index = row * *columns + column;
-                if limbs[index] == NOTHING || z < depth[index] {
-                    (limbs[index], depth[index]) = (limb, z);
+            let whole = [&range, &(row..row + 1)];
+            for (drawn, new) in drawn.iter_mut().zip(whole) {
+                *drawn = if drawn.start >= drawn.end {
+                    new.clone()
+                } else {
+                    drawn.start.min(new.start)..drawn.end.max(new.end)
+                };
+            }
+            let (y, x) = (row as f32, range.start as f32);
+            let start = (x - axis.start[0]) * axis.along[0] + (y - axis.start[1]) * axis.along[1];
+            let cells = row * *columns + range.start..row * *columns + range.end;
+            let cells = limbs[cells.clone()].iter_mut().zip(&mut depth[cells]);
+            for (column, (shown, depth)) in cells.enumerate() {
+                let at = (start + column as f32 * axis.along[0]).clamp(0.0, 1.0);
+                let z = axis.depth[0] + (axis.depth[1] - axis.depth[0]) * at;
+                if z < *depth {
+                    (*shown, *depth) = (limb, z);
                 }
             }
         }

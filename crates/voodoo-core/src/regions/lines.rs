@@ -108,7 +108,7 @@ impl Viewer<'_> {
 
     fn line(&self, limb: usize, camera_from_limb: &Pose, foot: Vec3, normal: [f64; 2]) -> Option<Line> {
         let point = *camera_from_limb * foot;
-        let norm = normal[0].hypot(normal[1]);
+        let norm = (normal[0] * normal[0] + normal[1] * normal[1]).sqrt();
         if !(point.z > 0.05 && norm > 0.0) {
             return None;
         }
@@ -139,9 +139,9 @@ impl Viewer<'_> {
         };
         let beside = BESIDE * self.unit;
         let (u, v) = inside(place[0] - beside * normal[0], place[1] - beside * normal[1])?;
-        let (own, depth) = self.labels.at(u, v);
+        let (own, depth) = self.labels.at(u as usize, v as usize);
         let (u, v) = inside(place[0] + beside * normal[0], place[1] + beside * normal[1])?;
-        let (outside, behind) = self.labels.at(u, v);
+        let (outside, behind) = self.labels.at(u as usize, v as usize);
         let clear = usize::from(own) == limb
             && usize::from(outside) != limb
             && (outside == NOTHING || {

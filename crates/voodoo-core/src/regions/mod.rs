@@ -5,6 +5,7 @@
 //! or the surroundings', and where the body is thought to be. A line's edge is a distance along one direction, as any other
 //! correspondence.
 
+mod claims;
 mod evidence;
 mod histogram;
 mod labels;
@@ -14,6 +15,7 @@ mod models;
 mod posterior;
 mod scan;
 mod scene;
+mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::{Body, Limb};
@@ -21,17 +23,29 @@ use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
+pub use claims::{Backdrop, Claim};
 use evidence::Evidence;
 use histogram::Kind;
 use labels::Labels;
 use lens::Lens;
 use lines::{Line, Viewer};
 use models::ColorModel;
-use scan::Scanner;
+use scan::{Scanner, Search};
 use scene::Scene;
 
-/// How far from the contour its edge is looked for in the steps of a frame, units.
-const REACHES: [usize; 4] = [15, 10, 6, 5];
+/// How the edge is looked for in the steps of a frame: farther at first, and less closely.
+const SEARCHES: [Search; 4] = [
+    Search { reach: 8, every: 2.0 },
+    Search { reach: 5, every: 2.0 },
+    Search { reach: 6, every: 1.0 },
+    Search { reach: 5, every: 1.0 },
+];
+/// How it is looked for where the limb's girth is asked for.
+const OUTLINE: Search = Search { reach: 10, every: 1.0 };
+/// So many steps are enough where nothing but edges is measured.
+pub const STEPS: usize = SEARCHES.len();
+/// Which limb is seen where is drawn in cells of two to this power pixels.
+const CELL_BITS: u32 = 1;
 /// Lines stand about so far apart along a limb, metres, and so many on each side at least and at most.
 const SPACING: f64 = 0.035;
 const LEAST_LINES: usize = 3;
@@ -66,8 +80,11 @@ pub struct Regions {
     groups: Vec<u16>,
     /// Time of the last frame, seconds.
     stamp: Option<f64>,
+    /// The first camera that teaches next.
+    turn: usize,
     scanner: Scanner,
     evidence: Vec<Evidence>,
+    backdrop: Backdrop,
 }
 
 /// The body at the time of a frame, in the working frame.
@@ -101,7 +118,7 @@ pub struct RegionLine {
 impl Regions {
     /// Forgets what bodies and surroundings look like.
     pub fn clear(&mut self) {
-        self.stamp = None;
+        (self.stamp, self.turn) = (None, 0);
         self.cameras.iter_mut().for_each(|camera| camera.known = false);
     }
 
@@ -142,22 +159,38 @@ impl Regions {
         }
     }
 
-    /// The edges of all limbs in all pictures, in the given step of a frame.
-    pub fn find(&mut self, frame: &Frame, posed: Posed, step: usize, found: &mut Correspondences) {
-        let reach = REACHES[step.min(REACHES.len() - 1)];
+    /// The edges of the limbs that are `wanted` in all pictures, in the given step of a frame.
+    pub fn find(
+        &mut self,
+        frame: &Frame,
+        posed: Posed,
+        step: usize,
+        wanted: impl Fn(usize) -> bool,
+        found: &mut Correspondences,
+    ) {
+        let search = SEARCHES[step.min(STEPS - 1)];
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
-        self.find_within(frame, posed, reach, true, &mut found.regions);
+        self.find_within(frame, posed, search, Some(&wanted), &mut found.regions);
         found.region_support.clear();
         found.region_support.extend(self.evidence.iter().map(Evidence::support));
     }
 
     /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
     pub fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
-        self.find_within(frame, posed, REACHES[1], false, pairs);
+        self.find_within(frame, posed, OUTLINE, None, pairs);
     }
 
-    fn find_within(&mut self, frame: &Frame, posed: Posed, reach: usize, together: bool, pairs: &mut Vec<RegionPair>) {
+    /// Edges of limbs that are wanted as a whole, or of all limbs one by one.
+    fn find_within(
+        &mut self,
+        frame: &Frame,
+        posed: Posed,
+        search: Search,
+        wanted: Option<&dyn Fn(usize) -> bool>,
+        pairs: &mut Vec<RegionPair>,
+    ) {
+        let together = wanted.is_some();
         pairs.clear();
         for picture in frame.colors {
             self.look(frame, picture, posed);
@@ -171,7 +204,8 @@ impl Regions {
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
             for line in &*lines {
-                let found = scanner.edge(&view, line, reach, together);
+                let looked = wanted.is_none_or(|wanted| wanted(usize::from(line.limb)));
+                let found = if looked { scanner.edge(&view, line, search, together) } else { None };
                 edges.push(found);
                 if together {
                     let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
@@ -212,9 +246,11 @@ impl Regions {
         })
     }
 
-    /// Learns colours where the body was found.
+    /// Learns colours where the body was found: of every second camera in turn, a frame is like the one before.
     pub fn learn(&mut self, frame: &Frame) {
-        frame.colors.iter().for_each(|picture| self.teach(picture));
+        let turn = self.turn;
+        frame.colors.iter().skip(turn).step_by(2).for_each(|picture| self.teach(picture));
+        self.turn = 1 - turn;
         self.stamp = Some(frame.stamp);
     }
 
@@ -228,21 +264,13 @@ impl Regions {
 
     /// Places the lines of one picture.
     fn look(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
-        let Posed { body, poses, previous, origin } = posed;
-        let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
-        let share = (picture.stamp - frame.stamp) / passed;
+        let viewpoint = self.viewpoint(frame, picture, posed);
         let camera = self.camera(picture.camera);
-        let camera_from_working = shifted(&picture.world_from_sensor, origin).inverse();
         camera.camera_from_limb.clear();
-        for (limb, pose) in poses.iter().enumerate() {
-            // The body of the moment that the camera saw.
-            let then =
-                previous.get(limb).filter(|_| share != 0.0).map_or(*pose, |before| moved_on(before, pose, share));
-            camera.camera_from_limb.push(camera_from_working * then);
-        }
+        camera.camera_from_limb.extend((0..posed.poses.len()).map(|limb| viewpoint.of(limb)));
         camera.lens = Lens::of(picture);
-        let Camera { lens, labels, lines, camera_from_limb, .. } = camera;
-        labels.draw(body, camera_from_limb, lens);
+        let (body, Camera { lens, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
+        labels.draw(body, camera_from_limb, lens, CELL_BITS, |_| true);
         lines.clear();
         let viewer = Viewer { body, lens, labels, unit: unit_of(lens) };
         for (limb, pose) in camera_from_limb.iter().enumerate() {

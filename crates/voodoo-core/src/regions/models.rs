@@ -1,11 +1,11 @@
 //! What colours limbs and their surroundings have in one camera's pictures.
 
-use super::histogram::{Histogram, Kind};
+use super::histogram::{Histogram, Kind, held};
 
-/// Share of a new frame in what is known of a limb's colours, and of those around it: a body keeps its clothes.
-const RATES: [f32; 2] = [0.1, 0.2];
+/// Share of what two frames bring in what is known of a limb's colours, and of those around it: a body keeps its clothes.
+const RATES: [f32; 2] = [0.19, 0.36];
 /// Fewer pixels than this teach nothing.
-const LEAST_PIXELS: f32 = 30.0;
+const LEAST_PIXELS: f32 = 15.0;
 
 /// Colours by group of limbs: the two of a pair have the same.
 #[derive(Clone, Debug, Default)]
@@ -13,6 +13,8 @@ pub(super) struct ColorModel {
     pub kind: Kind,
     pub limbs: Vec<Histogram>,
     pub around: Vec<Histogram>,
+    /// Log ratios of each group's colours and of those around it, as they count.
+    ratios: Vec<f32>,
     room: Vec<f32>,
 }
 
@@ -24,14 +26,27 @@ impl ColorModel {
             histograms.resize_with(groups, Histogram::default);
             histograms.iter_mut().for_each(|histogram| histogram.clear(kind));
         }
+        self.ratios.clear();
+        self.ratios.resize(groups * kind.bins(), 0.0);
     }
 
     /// Learns what was counted.
     pub(super) fn learn(&mut self) {
-        let Self { kind, limbs, around, room } = self;
-        for (histograms, rate) in [limbs, around].into_iter().zip(RATES) {
+        let Self { kind, limbs, around, ratios, room } = self;
+        for (histograms, rate) in [&mut *limbs, &mut *around].into_iter().zip(RATES) {
             histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, LEAST_PIXELS, room));
         }
+        for (group, ratios) in ratios.chunks_exact_mut(kind.bins()).enumerate() {
+            let logs = limbs[group].log.iter().zip(&around[group].log);
+            ratios.iter_mut().zip(logs).for_each(|(ratio, (own, other))| *ratio = held(own - other));
+        }
+    }
+
+    /// Log ratios of a group's colours and of those around it.
+    #[inline(always)]
+    pub(super) fn ratios(&self, group: usize) -> &[f32] {
+        let bins = self.kind.bins();
+        &self.ratios[group * bins..(group + 1) * bins]
     }
 
     /// Whether a group's colours and those around it are known.

@@ -3,7 +3,7 @@
 /// Log ratios of neighbouring pixels err alike: so many of them tell as much as one.
 const TEMPERATURE: f32 = 8.0;
 /// Greatest distance from the expected edge at which one is looked for, samples.
-pub(super) const MOST_REACH: usize = 24;
+pub(super) const MOST_REACH: usize = 10;
 
 /// An edge's place, in samples outward from where it is expected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,24 +14,24 @@ pub(super) struct Edge {
     pub information: f32,
 }
 
-/// The edge within `reach` samples of the middle. `ratios` are those of samples half a step beside whole ones, from
-/// `-(reach + width)` to `reach`: with a `width` above zero the limb ends there on its other side as well, else it goes on.
-pub(super) fn edge(ratios: &[f32], reach: usize, width: usize) -> Edge {
+/// The edge within `reach` samples of the middle. `near` are the log ratios of samples half a step beside whole ones, from
+/// `-reach` to `reach`; where the limb is known to end on its other side as well, `far` are those from there, else the limb goes on.
+/// What lies between the two is the limb's wherever its edge is. A sample stands for as many as one is looked at `every`.
+pub(super) fn edge(near: &[f32], far: Option<&[f32]>, reach: usize, every: f32) -> Edge {
     let count = 2 * reach + 1;
     let mut sums = [0.0_f32; 2 * MOST_REACH + 1];
     let sums = &mut sums[..count];
     // The limb ends at the displacement d: what lies inwards of it, as far as the limb goes, is the limb's.
-    let mut sum: f32 = if width > 0 { ratios[..width].iter().sum() } else { 0.0 };
-    sums[0] = sum;
-    let mut most = sum;
+    let (mut sum, mut most) = (0.0_f32, 0.0_f32);
     for index in 1..count {
-        sum += ratios[width + index - 1] - if width > 0 { ratios[index - 1] } else { 0.0 };
+        sum += near[index - 1] - far.map_or(0.0, |far| far[index - 1]);
         sums[index] = sum;
         most = most.max(sum);
     }
+    let sharpness = every / TEMPERATURE;
     let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
     for (index, sum) in sums.iter().enumerate() {
-        let share = ((sum - most) / TEMPERATURE).exp();
+        let share = ((sum - most) * sharpness).exp();
         let place = index as f32 - reach as f32;
         total += share;
         first += share * place;

@@ -1,17 +1,17 @@
 //! Looks along lines: log ratios of limb and surroundings, and what colours there are.
 
-use super::histogram::{Kind, bin_of};
+use std::ops::Range;
+
+use super::histogram::{MOST_RATIO, bin_of, color_bin, held};
 use super::labels::{Labels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::models::ColorModel;
 use super::posterior::{Edge, MOST_REACH, edge};
 use super::scene::Scene;
-use crate::observation::picture::ColorImage;
+use crate::observation::picture::{ColorImage, ColorPixels};
 
-/// Log ratios are held to this: a colour never seen before proves little.
-const MOST_RATIO: f32 = 2.0;
 /// A limb wider than this is looked for by one edge alone, units.
-const WIDEST: usize = 48;
+const WIDEST: f32 = 48.0;
 /// How far from the contour brightness is compared, units.
 const LOCAL: f32 = 12.0;
 /// Least standard deviation of brightness beside the contour, of 255.
@@ -20,8 +20,17 @@ const LEAST_SPREAD: f32 = 6.0;
 const NEXT_TO: usize = 5;
 /// Colours are learnt from this far inside and outside of the contour, units.
 const LEARN_FROM: f32 = 2.0;
+/// Neighbouring pixels are alike: one is learnt from in so many units.
+const LEARN_EVERY: f32 = 2.0;
 /// As far outside of it the surroundings are learnt, units.
 const SURROUND: f32 = 30.0;
+
+/// How an edge is looked for: within so many samples on either side of the contour, so many units apart.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    pub reach: usize,
+    pub every: f32,
+}
 
 /// What a line is looked along in.
 #[derive(Clone, Copy, Debug)]
@@ -37,12 +46,12 @@ pub(super) struct View<'a> {
 /// Working memory.
 #[derive(Debug)]
 pub(super) struct Scanner {
-    ratios: [f32; 2 * MOST_REACH + WIDEST],
+    ratios: [f32; 4 * MOST_REACH],
 }
 
 impl Default for Scanner {
     fn default() -> Self {
-        Self { ratios: [0.0; 2 * MOST_REACH + WIDEST] }
+        Self { ratios: [0.0; 4 * MOST_REACH] }
     }
 }
 
@@ -56,25 +65,45 @@ pub(super) struct Found {
 
 impl Scanner {
     /// The edge on a line; `None` where it cannot be told.
-    pub(super) fn edge(&mut self, view: &View, line: &Line, reach: usize, together: bool) -> Option<Found> {
+    pub(super) fn edge(&mut self, view: &View, line: &Line, search: Search, together: bool) -> Option<Found> {
         let group = view.group(line.limb);
         if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
             return None;
         }
-        let width = if together && line.both && line.width < WIDEST as f32 { (line.width + 0.5) as usize } else { 0 };
-        let count = 2 * reach + width;
-        let start = 0.5 - (reach + width) as f32;
-        for (index, ratio) in self.ratios[..count].iter_mut().enumerate() {
-            *ratio = view.ratio(line, group, start + index as f32);
+        let Search { reach, every } = search;
+        let width = if together && line.both && line.width < WIDEST { (line.width / every + 0.5) as usize } else { 0 };
+        // The samples about this edge and those about the other one, which may overlap.
+        let span = 2 * reach;
+        let far = width.min(span);
+        let start = 0.5 - reach as f32;
+        if far == width {
+            self.look(view, line, [start - far as f32, every], 0..far + span);
+        } else {
+            self.look(view, line, [start - width as f32, every], 0..far);
+            self.look(view, line, [start, every], far..far + span);
         }
-        if view.model.kind == Kind::Grey {
-            self.compare_locally(view, line, start, count);
-        }
-        let (inside, outside) = self.ratios[..count].split_at(reach + width);
+        let ratios = &self.ratios[..far + span];
+        let (inside, outside) = ratios.split_at(far + reach);
         let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
-        let near = NEXT_TO.min(reach);
-        let beside = [mean(&inside[inside.len() - near..]), mean(&outside[..near])];
-        Some(Found { edge: edge(&self.ratios[..count], reach, width), beside })
+        let next = NEXT_TO.min(reach);
+        let beside = [mean(&inside[inside.len() - next..]), mean(&outside[..next])];
+        let found = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
+        Some(Found {
+            edge: Edge { mean: every * found.mean, information: found.information / (every * every) },
+            beside,
+        })
+    }
+
+    /// Fills a range of ratios with those of samples outward, from so many of them on.
+    fn look(&mut self, view: &View, line: &Line, [start, every]: [f32; 2], range: Range<usize>) {
+        let ratios = &mut self.ratios[range];
+        match view.picture.pixels {
+            ColorPixels::Color(pixels) => view.fill(line, [start, every], ratios, |pixel| color_bin(pixels[pixel])),
+            ColorPixels::Grey(pixels) => {
+                view.fill(line, [start, every], ratios, |pixel| usize::from(pixels[pixel]));
+                compare_locally(view, line, [start, every], ratios);
+            }
+        }
     }
 }
 
@@ -103,27 +132,35 @@ impl Local {
     }
 }
 
-impl Scanner {
-    /// Grey alone says little of a whole limb: the ratios become the mean of theirs and of those of what is beside the contour.
-    fn compare_locally(&mut self, view: &View, line: &Line, start: f32, count: usize) {
-        let value = |r: f32| {
-            let (pixel, ..) = pixel_at(view.picture, line, r * view.unit)?;
-            Some(f32::from(view.picture.pixels.get(pixel)[0]))
-        };
-        let side = |from: f32, to: f32| {
-            let steps = (to - from).max(0.0) as usize;
-            Local::of((0..steps).filter_map(|step| value(from + step as f32)))
-        };
-        let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
-        if inside.count < 3.0 || outside.count < 3.0 {
-            return;
-        }
-        for (index, ratio) in self.ratios[..count].iter_mut().enumerate().filter(|(_, ratio)| **ratio != 0.0) {
-            let Some(value) = value(start + index as f32) else { continue };
-            let local = (inside.log(value) - outside.log(value)).clamp(-MOST_RATIO, MOST_RATIO);
+/// Grey alone says little of a whole limb: the ratios become the mean of theirs and of those of what is beside the contour.
+fn compare_locally(view: &View, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
+    let picture = view.picture;
+    let side = |from: f32, to: f32| {
+        let steps = (to - from).max(0.0) as usize;
+        let mut walk = Walk::of(line, from * view.unit, view.unit);
+        Local::of((0..steps).filter_map(|_| {
+            let pixel = walk.pixel(picture);
+            walk.go_on();
+            pixel.map(|(column, row)| brightness(picture, column, row))
+        }))
+    };
+    let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
+    if inside.count < 3.0 || outside.count < 3.0 {
+        return;
+    }
+    let mut walk = Walk::of(line, start * every * view.unit, every * view.unit);
+    for ratio in ratios {
+        if let Some((column, row)) = walk.pixel(picture).filter(|_| *ratio != 0.0) {
+            let value = brightness(picture, column, row);
+            let local = held(inside.log(value) - outside.log(value));
             *ratio = 0.5 * (*ratio + local);
         }
+        walk.go_on();
     }
+}
+
+fn brightness(picture: &ColorImage, column: usize, row: usize) -> f32 {
+    f32::from(picture.pixels.get(row * picture.width + column)[0])
 }
 
 impl View<'_> {
@@ -136,47 +173,103 @@ impl View<'_> {
         line.outside != NOTHING && self.group(line.outside) == group
     }
 
-    /// How much more likely the colour of a sample is the limb's than what would be there without it.
-    fn ratio(&self, line: &Line, group: usize, r: f32) -> f32 {
-        let Some((pixel, u, v)) = pixel_at(self.picture, line, r * self.unit) else { return 0.0 };
-        let beyond = -r - line.width;
-        let (label, depth) = self.labels.at(u, v);
-        let other = if r.abs() < BESIDE || (r < 0.0 && beyond < 0.0 && label == line.limb) {
-            line.outside
-        } else if beyond.abs() < BESIDE {
-            line.opposite
-        } else if label == line.limb {
-            line.outside
-        } else if label != NOTHING && depth < line.depth - NEARER_BY {
-            return 0.0;
-        } else {
-            label
-        };
-        let bin = bin_of(&self.picture.pixels, pixel);
-        let own = self.model.limbs[group].log[bin];
-        let other = if other == NOTHING {
-            let around = self.model.around[group].log[bin];
-            self.scene.map_or(around, |scene| scene.log(pixel, self.picture.pixels.get(pixel), around))
-        } else {
-            let other = self.group(other);
-            if other == group || !self.model.limbs[other].known {
-                return 0.0;
+    /// Log ratios of samples outward, from so many of them on; `bin` is that of a pixel.
+    #[inline(always)]
+    fn fill(&self, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32], bin: impl Fn(usize) -> usize) {
+        let (model, group) = (self.model, self.group(line.limb));
+        let known = model.ratios(group);
+        let mut r = start * every;
+        let mut walk = Walk::of(line, r * self.unit, every * self.unit);
+        for ratio in ratios {
+            *ratio = 0.0;
+            if let Some((column, row)) = walk.pixel(self.picture)
+                && let Some(other) = self.other(line, r, column, row)
+            {
+                let pixel = row * self.picture.width + column;
+                let bin = bin(pixel);
+                *ratio = if other == NOTHING && self.scene.is_none() {
+                    known[bin]
+                } else {
+                    self.ratio(group, other, pixel, bin)
+                };
             }
-            self.model.limbs[other].log[bin]
-        };
-        (own - other).clamp(-MOST_RATIO, MOST_RATIO)
+            walk.go_on();
+            r += every;
+        }
+    }
+
+    /// Log ratio of a pixel, whose bin is given, between a group's colours and those of what else would be there.
+    #[inline(always)]
+    pub(super) fn ratio(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
+        let own = self.model.limbs[group].log[bin];
+        if other == NOTHING {
+            let around = self.model.around[group].log[bin];
+            let log = |scene: &Scene| scene.log(pixel, self.picture.pixels.get(pixel), around);
+            return held(own - self.scene.map_or(around, log));
+        }
+        let other = self.group(other);
+        if other == group || !self.model.limbs[other].known {
+            return 0.0;
+        }
+        held(own - self.model.limbs[other].log[bin])
+    }
+
+    /// The same as a share of the most it can be.
+    pub(super) fn certainty(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
+        self.ratio(group, other, pixel, bin) / MOST_RATIO
+    }
+
+    /// What would be seen at `r` units outward if the limb were not there; `None` where something hides it.
+    #[inline(always)]
+    fn other(&self, line: &Line, r: f32, column: usize, row: usize) -> Option<u16> {
+        if r.abs() < BESIDE {
+            return Some(line.outside);
+        }
+        let (label, depth) = self.labels.at(column, row);
+        let beyond = -r - line.width;
+        if r < 0.0 && beyond < 0.0 && label == line.limb {
+            Some(line.outside)
+        } else if beyond.abs() < BESIDE {
+            Some(line.opposite)
+        } else if label == line.limb {
+            Some(line.outside)
+        } else if label != NOTHING && depth < line.depth - NEARER_BY {
+            None
+        } else {
+            Some(label)
+        }
     }
 }
 
-/// The pixel `r` pixels outward along a line, and its place.
-#[inline(always)]
-fn pixel_at(picture: &ColorImage, line: &Line, r: f32) -> Option<(usize, f32, f32)> {
-    let (u, v) = (line.place[0] + r * line.normal[0] + 0.5, line.place[1] + r * line.normal[1] + 0.5);
-    if !(u >= 0.0 && v >= 0.0) {
-        return None;
+/// Goes along a line, in parts of a pixel.
+struct Walk {
+    place: [i64; 2],
+    step: [i64; 2],
+}
+
+/// So many bits of a walk's places are parts of a pixel.
+const PART_BITS: u32 = 32;
+
+impl Walk {
+    /// From `from` pixels outward, `step` pixels a step.
+    fn of(line: &Line, from: f32, step: f32) -> Self {
+        let part = |value: f32| (f64::from(value) * (1_i64 << PART_BITS) as f64) as i64;
+        let place = [0, 1].map(|axis| part(line.place[axis] + from * line.normal[axis] + 0.5));
+        Self { place, step: line.normal.map(|n| part(step * n)) }
     }
-    let (column, row) = (u as usize, v as usize);
-    (column < picture.width && row < picture.height).then(|| (row * picture.width + column, u - 0.5, v - 0.5))
+
+    /// Column and row of the pixel there, if it is in the picture.
+    #[inline(always)]
+    fn pixel(&self, picture: &ColorImage) -> Option<(usize, usize)> {
+        // What lies left of the picture, or above it, is beyond any size as a number without sign.
+        let [column, row] = self.place.map(|place| (place >> PART_BITS) as usize);
+        (column < picture.width && row < picture.height).then_some((column, row))
+    }
+
+    #[inline(always)]
+    fn go_on(&mut self) {
+        self.place = [0, 1].map(|axis| self.place[axis] + self.step[axis]);
+    }
 }
 
 /// Counts the colours along a line, of the limb as far as its middle and of what is around it.
@@ -190,22 +283,19 @@ pub(super) fn count(
 ) {
     let group = usize::from(groups[usize::from(line.limb)]);
     let inner = (0.5 * line.width).min(SURROUND);
-    let mut r = LEARN_FROM;
-    while r <= inner {
-        if let Some((pixel, u, v)) = pixel_at(picture, line, -r * unit)
-            && labels.at(u, v).0 == line.limb
-        {
-            model.limbs[group].count(bin_of(&picture.pixels, pixel));
+    let ColorModel { limbs, around, .. } = model;
+    for (histogram, shown, to, sign) in
+        [(&mut limbs[group], line.limb, inner, -1.0), (&mut around[group], NOTHING, SURROUND, 1.0)]
+    {
+        let mut walk = Walk::of(line, sign * LEARN_FROM * unit, sign * LEARN_EVERY * unit);
+        let steps = ((to - LEARN_FROM) / LEARN_EVERY + 1.0).max(0.0) as usize;
+        for _ in 0..steps {
+            if let Some((column, row)) = walk.pixel(picture)
+                && labels.at(column, row).0 == shown
+            {
+                histogram.count(bin_of(&picture.pixels, row * picture.width + column));
+            }
+            walk.go_on();
         }
-        r += 1.0;
-    }
-    let mut r = LEARN_FROM;
-    while r <= SURROUND {
-        if let Some((pixel, u, v)) = pixel_at(picture, line, r * unit)
-            && labels.at(u, v).0 == NOTHING
-        {
-            model.around[group].count(bin_of(&picture.pixels, pixel));
-        }
-        r += 1.0;
     }
 }

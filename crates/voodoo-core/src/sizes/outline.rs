@@ -13,6 +13,8 @@ use crate::shape::TaperedEllipticCylinder;
 
 /// Edges of neighbouring lines err alike: so many tell as much as one.
 const LINES_ALIKE: f64 = 3.0;
+/// Girths follow in every so many frames.
+const GIRTHS_EVERY: u32 = 4;
 /// How far the axis of a tracked limb is off across itself, metres.
 const AXIS_SIGMA: f64 = 0.02;
 
@@ -116,13 +118,14 @@ impl Outline {
         if h.trace() <= 0.0 {
             return None;
         }
-        let (h, g) = (h / ALIKE, g / ALIKE);
-        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * ALIKE);
+        let alike = ALIKE / f64::from(GIRTHS_EVERY);
+        let (h, g) = (h / alike, g / alike);
+        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * alike);
         let mixed = h.fixed_view::<3, 2>(2, 0);
         let inverse = aside.try_inverse()?;
         let own = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
         let pull = g.fixed_rows::<3>(2) - mixed * inverse * g.fixed_rows::<2>(0);
-        let mut information = self.information.fixed_view::<3, 3>(2, 2) * (1.0 - 1.0 / REMEMBERED);
+        let mut information = self.information.fixed_view::<3, 3>(2, 2) * (1.0 - f64::from(GIRTHS_EVERY) / REMEMBERED);
         information += own;
         let step = information.cholesky()?.solve(&pull);
         self.information.fixed_view_mut::<3, 3>(2, 2).copy_from(&information);
@@ -144,6 +147,8 @@ impl Outline {
 #[derive(Debug, Default)]
 pub(super) struct Outlines {
     limbs: Vec<Outline>,
+    /// Frames since girths followed.
+    frames: u32,
 }
 
 impl Outlines {
@@ -157,7 +162,7 @@ impl Outlines {
         if !setting.seen.candidates.is_empty() || setting.seen.frame().colors.is_empty() {
             return;
         }
-        self.limbs = vec![Outline::default(); poses.len()];
+        (self.limbs, self.frames) = (vec![Outline::default(); poses.len()], 0);
         level_pairs(model, poses);
         for _ in 0..GIRTH_STEPS {
             fit.match_outline(setting.of(model), poses);
@@ -179,7 +184,8 @@ impl Outlines {
 
     /// Draws the girths to the edges of colours.
     pub(super) fn follow(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
-        if self.limbs.is_empty() {
+        self.frames = (self.frames + 1) % GIRTHS_EVERY;
+        if self.limbs.is_empty() || self.frames != 0 {
             return;
         }
         fit.match_outline(setting.of(model), poses);

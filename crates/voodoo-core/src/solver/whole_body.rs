@@ -146,10 +146,12 @@ impl WholeBody {
         for pair in &problem.correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
+        let points = problem.correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
+        let contours_alone = !problem.correspondences.regions.is_empty() && !points;
         self.joint_sigmas.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
-            let motion = if problem.correspondences.regions.is_empty() { motion } else { motion.max(LEAST_MOTION) };
+            let motion = if contours_alone { motion.max(LEAST_MOTION) } else { motion };
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);

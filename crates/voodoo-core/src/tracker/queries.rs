@@ -5,15 +5,42 @@ use super::estimate::Estimate;
 use crate::body::Body;
 use crate::config::Config;
 use crate::error::TrackError;
-use crate::math::{Points, Pose};
-use crate::observation::frame::PointSlice;
-use crate::regions::RegionLine;
+use crate::math::{Points, Pose, Vec3};
+use crate::observation::frame::{Frame, PointSlice};
+use crate::regions::{Posed, RegionLine, Regions};
 use crate::shape::SurfaceBatch;
 
 impl Tracker {
     /// The lines along which the last step looked for edges of colours in a camera's picture.
     pub fn region_lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         self.fit.regions().lines(camera)
+    }
+
+    /// How likely each pixel of a frame's pictures shows the body at some poses (world; none: those of now), picture after picture,
+    /// row by row, 0 to 1, by the colours that were learnt. Cameras that are new learn them there.
+    pub fn segment(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<Vec<Vec<f32>>, TrackError> {
+        self.at_poses(frame, poses, |regions, posed| regions.segment(frame, posed))
+    }
+
+    /// Learns the body's colours in a frame's pictures at some poses (world; none: those of now).
+    pub fn learn_colors(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<(), TrackError> {
+        self.at_poses(frame, poses, |regions, posed| regions.learn_at(frame, posed))
+    }
+
+    fn at_poses<R>(
+        &mut self,
+        frame: &Frame,
+        poses: Option<&[Pose]>,
+        work: impl FnOnce(&mut Regions, Posed) -> R,
+    ) -> Result<R, TrackError> {
+        if poses.is_none() && !self.is_started() {
+            return Err(TrackError::NotInitialised);
+        }
+        frame.check(&self.model.body, None)?;
+        self.fit.regions().check(frame)?;
+        let current: Vec<Pose> = self.motion.world_from_limb().collect();
+        let (body, previous, origin) = (&self.model.body, &[][..], Vec3::ZERO);
+        Ok(work(self.fit.regions_mut(), Posed { body, poses: poses.unwrap_or(&current), previous, origin }))
     }
 
     /// The body in its current sizes.

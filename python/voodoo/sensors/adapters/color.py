@@ -5,28 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Frame
 from voodoo.measurements import ColorImage
-from voodoo.sensors.adapters.base import Adapter, Context
+from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.drawing import Canvas
 from voodoo.sensors.pinhole import Pinhole
 from voodoo.tracker import Tracker
 
 _FARTHEST_S = 0.25
 """A picture that is older or newer than its frame by more [s] shows another pose; the tracker would refuse the frame."""
+_LIKELY = 0.5
+_INK = (90, 240, 250)
 _GREY = 2
 """Channels of a grey camera's picture differ by no more than coding makes of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What is kept of a camera: its lens, whether it sees no colours, and the tracker that was told of the empty scene."""
+    """What is kept of a camera: its lens, whether it sees no colours, the tracker that was told of the empty scene, and whether
+    what it tells is drawn."""
 
     lens: Pinhole
     grey: bool
-    told: object
+    told: Tracker
+    drawn: bool
 
     def picture(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
         """What the tracker is given of a picture (H, W, 3): without distortion, (H, W) of a grey camera."""
@@ -50,7 +56,8 @@ class ColorAdapter(Adapter[ColorImage]):
             return
         known = context.memory.all(self.kind).get(item.sensor)
         if known is None or known.lens.original != item.camera or known.told is not context.tracker:
-            known = _Known(Pinhole(item.camera), _is_grey(item.image), context.tracker)
+            drawn = context.settings.draw_regions
+            known = _Known(Pinhole(item.camera), _is_grey(item.image), context.tracker, drawn)
             empty = context.settings.empty_scene.get(item.sensor)
             if empty is not None:
                 context.tracker.set_background(item.sensor, [known.picture(picture) for picture in empty])
@@ -62,6 +69,28 @@ class ColorAdapter(Adapter[ColorImage]):
             stamp=item.stamp,
             source=item.sensor,
         )
+
+    def draw(self, item: ColorImage, canvas: Canvas, memory: Memory) -> None:
+        """The border of what is the body by its colours, and the edges along its contour, where the settings ask for it."""
+        known = memory.all(self.kind).get(item.sensor)
+        if known is None or not known.drawn or known.lens.original != item.camera or not known.told.estimate.joints:
+            return
+        lines = known.told.region_lines(item.sensor)
+        told = np.isfinite(lines.sigmas)
+        edges = (lines.places + lines.offsets[:, None] * lines.normals)[told]
+        frame = Frame(item.stamp)
+        frame.add_color(
+            known.picture(item.image),
+            camera=known.lens.camera,
+            world_from_sensor=item.root_from_sensor,
+            source=item.sensor,
+        )
+        likely = known.told.segment(frame)[item.sensor]
+        size = (item.camera.width, item.camera.height)
+        mask = cv2.resize((likely > _LIKELY).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+        scale = np.array(size) / (known.lens.camera.width, known.lens.camera.height)
+        marks = [(float(u), float(v)) for u, v in (edges + 0.5) * scale - 0.5]
+        canvas.regions(item, mask, marks=marks, names={}, color=_INK)
 
 
 def _is_grey(image: npt.NDArray[np.uint8]) -> bool:

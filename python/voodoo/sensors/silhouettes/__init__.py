@@ -3,9 +3,11 @@
 from voodoo.sensors.silhouettes.color import Silhouettes, StillBackground
 from voodoo.sensors.silhouettes.depth import StillScene, from_depth
 from voodoo.sensors.silhouettes.masks import filled, without_specks
+from voodoo.sensors.silhouettes.regions import RegionSilhouettes
 from voodoo.sensors.silhouettes.surroundings import surroundings
 
 __all__ = [
+    "RegionSilhouettes",
     "Silhouettes",
     "StillBackground",
     "StillScene",

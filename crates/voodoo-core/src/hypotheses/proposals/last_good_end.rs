@@ -13,7 +13,9 @@ impl Propose for LastGoodEnd {
         let Some(end) = history[at.index].last_good_end else { return };
         let place = end - at.context.seen.origin();
         let cost = rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.rest.poses);
-        if cost < f64::INFINITY {
+        // Pictures judge it as it is: a refinement takes as long as the frame.
+        let most = if at.regions.is_some() { pool.least } else { f64::INFINITY };
+        if cost < most {
             pool.rest.set(Basis::Rest);
         }
     }
@@ -36,7 +38,7 @@ mod tests {
         with_context(&pixels, &config, &model, &wrong, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &wrong);
-            let at = Extremity { context, matched: fit.matched(&wrong), index };
+            let at = Extremity { context, matched: fit.matched(&wrong), regions: None, index };
             let mut history = vec![History::default(); model.extremities.len()];
             let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
             LastGoodEnd.propose(at, &history, &mut rough, &mut pool);

@@ -40,7 +40,8 @@ mod tests {
             let mut seen = context.seen;
             seen.views.origin = Vec3::new(2.0, -1.0, 0.5);
             let fit = Fit::new(&config).unwrap();
-            let at = Extremity { context: Context { seen, ..context }, matched: fit.matched(&poses), index };
+            let at =
+                Extremity { context: Context { seen, ..context }, matched: fit.matched(&poses), regions: None, index };
             let mut history = vec![History::default(); model.extremities.len()];
             let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
             history[index].last_proposal = wanted.clone();

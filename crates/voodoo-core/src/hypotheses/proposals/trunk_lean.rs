@@ -188,7 +188,8 @@ impl TrunkLean {
 
 impl Propose for TrunkLean {
     fn propose(&mut self, at: Extremity, history: &[History], _rough: &mut RoughSearch, pool: &mut Pool) {
-        if !at.chain().leg {
+        // Pictures have no points to judge a trunk by.
+        if !at.chain().leg || at.regions.is_some() {
             return;
         }
         match self.best_stance(at.context, at.matched, history) {

@@ -1,0 +1,201 @@
+//! How much of pictures only one limb explains: each pixel is the limb's that shows there, and no other one's.
+//!
+//! Two legs on the contour of one both lie on its colours. What a limb adds to what is seen without it tells them apart.
+
+use super::histogram::bin_of;
+use super::labels::{Labels, NOTHING};
+use super::lens::Lens;
+use super::lines::NEARER_BY;
+use super::{Posed, Regions, scan};
+use crate::association::correspondence::RegionSupport;
+use crate::body::two_bone::TwoBone;
+use crate::math::{Pose, Vec3, shifted};
+use crate::observation::candidates::REFERENCE_PATCH;
+use crate::observation::frame::Frame;
+use crate::shape::TaperedEllipticCylinder;
+
+/// Where a limb is looked at: in shares of its length, and of its radius as it is seen.
+const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const OVER: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+/// One cell of what is drawn is two to this power pixels wide.
+const BACKDROP_BITS: u32 = 2;
+
+/// What pictures say of a limb, in patches, the mean of all cameras.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Claim {
+    /// What it explains better than what would be seen without it, less what it explains worse: of a limb whose colours are
+    /// certain, all that shows.
+    pub gained: f64,
+    /// Its area in the pictures, hidden or not.
+    pub area: f64,
+}
+
+impl std::ops::AddAssign for Claim {
+    fn add_assign(&mut self, other: Self) {
+        self.gained += other.gained;
+        self.area += other.area;
+    }
+}
+
+/// What each camera sees of some limbs.
+#[derive(Debug, Default)]
+pub struct Backdrop {
+    planes: Vec<Labels>,
+    camera_from_limb: Vec<Pose>,
+}
+
+impl Backdrop {
+    /// Makes room for the pictures of a frame and so many limbs.
+    pub fn make_room(&mut self, frame: &Frame, limbs: usize) {
+        self.planes.resize_with(frame.colors.len(), Labels::default);
+        for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
+            labels.make_room(BACKDROP_BITS, picture.width, picture.height);
+        }
+        self.camera_from_limb.clear();
+        self.camera_from_limb.reserve(limbs);
+    }
+}
+
+impl Regions {
+    /// Draws the limbs that are `shown` before what the cameras see.
+    pub fn draw(&self, frame: &Frame, posed: Posed, shown: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
+        let Backdrop { planes, camera_from_limb } = backdrop;
+        planes.resize_with(frame.colors.len(), Labels::default);
+        for (picture, labels) in frame.colors.iter().zip(planes) {
+            let view = self.viewpoint(frame, picture, posed);
+            camera_from_limb.clear();
+            camera_from_limb.extend((0..posed.poses.len()).map(|limb| view.of(limb)));
+            labels.draw(posed.body, camera_from_limb, &Lens::of(picture), BACKDROP_BITS, &shown);
+        }
+    }
+
+    /// What a limb, which is not drawn, would explain of what is seen.
+    pub fn claim(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> Claim {
+        self.look_at(frame, posed, limb, backdrop, |(label, behind), depth| {
+            (label == NOTHING || behind > depth - f64::from(NEARER_BY)).then_some(label)
+        })
+    }
+
+    /// What every limb of the arms and legs explains that nothing else does, into `supports`.
+    pub fn claim_all(&mut self, frame: &Frame, posed: Posed, chains: &[TwoBone], supports: &mut [RegionSupport]) {
+        let mut backdrop = std::mem::take(&mut self.backdrop);
+        for chain in chains {
+            self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut backdrop);
+            for limb in chain.limbs() {
+                let claim = self.claim(frame, posed, limb, &backdrop);
+                if let Some(support) = supports.get_mut(limb) {
+                    (support.gained, support.area) = (claim.gained, claim.area);
+                }
+            }
+        }
+        self.backdrop = backdrop;
+    }
+
+    /// How well a body explains what is seen, every pixel by the limb that shows there; all of it is drawn.
+    pub fn explained(&self, frame: &Frame, posed: Posed, backdrop: &Backdrop) -> f64 {
+        let own = |limb: usize| {
+            let show = |(label, _): (u16, f64), _| (usize::from(label) == limb).then_some(NOTHING);
+            self.look_at(frame, posed, limb, backdrop, show).gained
+        };
+        (0..posed.poses.len()).map(own).sum()
+    }
+
+    /// Sums over the places of a limb; `behind` says what would be seen there without it, given what is drawn there and its
+    /// depth, and the limb's.
+    fn look_at(
+        &self,
+        frame: &Frame,
+        posed: Posed,
+        limb: usize,
+        backdrop: &Backdrop,
+        behind: impl Fn((u16, f64), f64) -> Option<u16>,
+    ) -> Claim {
+        let mut claim = Claim::default();
+        let shape = &posed.body.limbs()[limb].shape;
+        let group = usize::from(self.groups[limb]);
+        for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
+            let known = self.cameras.iter().find(|camera| camera.number == picture.camera && camera.known);
+            let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
+            let (model, scene) = (&camera.model, camera.scene.as_ref());
+            let unit = super::unit_of(&camera.lens);
+            let view = scan::View { picture, model, labels, scene, groups: &self.groups, unit };
+            let lens = Lens::of(picture);
+            places(shape, &self.viewpoint(frame, picture, posed).of(limb), &lens, |[u, v], depth, area| {
+                claim.area += area;
+                if !(u >= 0.0 && v >= 0.0 && u < lens.width as f64 && v < lens.height as f64) {
+                    return;
+                }
+                let (column, row) = (u as usize, v as usize);
+                let (label, before) = labels.at(column, row);
+                if let Some(other) = behind((label, f64::from(before)), depth) {
+                    let pixel = row * picture.width + column;
+                    let bin = bin_of(&picture.pixels, pixel);
+                    claim.gained += area * f64::from(view.certainty(group, other, pixel, bin));
+                }
+            });
+        }
+        let cameras = frame.colors.len().max(1) as f64;
+        Claim { gained: claim.gained / cameras, area: claim.area / cameras }
+    }
+}
+
+/// Places on a limb as a camera sees it: pixels (the first one's corner is the origin), depth in metres, and area in patches.
+fn places(
+    shape: &TaperedEllipticCylinder,
+    camera_from_limb: &Pose,
+    lens: &Lens,
+    mut each: impl FnMut([f64; 2], f64, f64),
+) {
+    let ends = [0.0, shape.length()].map(|along| *camera_from_limb * (Vec3::Z * along));
+    if ends.iter().any(|end| end.z < super::labels::NEAREST_END) {
+        return;
+    }
+    let [start, end] = ends.map(|end| lens.project(end));
+    let axis = [end[0] - start[0], end[1] - start[1]];
+    let length = (axis[0] * axis[0] + axis[1] * axis[1]).sqrt().max(1e-6);
+    let aside = [-axis[1] / length, axis[0] / length];
+    let radii = [0.5 * (shape.a0() + shape.b0()), 0.5 * (shape.a1() + shape.b1())];
+    let focal = 0.5 * (lens.intrinsics[0] + lens.intrinsics[1]);
+    for along in ALONG {
+        let centre = ends[0] + (ends[1] - ends[0]) * along;
+        let radius = radii[0] + (radii[1] - radii[0]) * along;
+        let metre = focal / centre.z;
+        let [u, v] = lens.project(centre).map(|value| value + 0.5);
+        let patch = length / metre * 2.0 * radius / (ALONG.len() * OVER.len()) as f64 / REFERENCE_PATCH;
+        for across in OVER {
+            let off = across * radius * metre;
+            each([u + off * aside[0], v + off * aside[1]], centre.z - radius, patch);
+        }
+    }
+}
+
+/// Where a camera saw the limbs: those of the moment it looked.
+pub(super) struct Viewpoint<'a> {
+    pub(super) posed: Posed<'a>,
+    /// How much of the last motion lies between the frame and the picture.
+    pub(super) share: f64,
+    pub(super) camera_from_working: Pose,
+}
+
+impl Viewpoint<'_> {
+    pub(super) fn of(&self, limb: usize) -> Pose {
+        let now = &self.posed.poses[limb];
+        let before = self.posed.previous.get(limb).filter(|_| self.share != 0.0);
+        self.camera_from_working * before.map_or(*now, |before| super::moved_on(before, now, self.share))
+    }
+}
+
+impl Regions {
+    /// How a camera sees a body.
+    pub(super) fn viewpoint<'a>(
+        &self,
+        frame: &Frame,
+        picture: &crate::observation::picture::ColorImage,
+        posed: Posed<'a>,
+    ) -> Viewpoint<'a> {
+        let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
+        let share = (picture.stamp - frame.stamp) / passed;
+        let camera_from_working = shifted(&picture.world_from_sensor, posed.origin).inverse();
+        Viewpoint { posed, share, camera_from_working }
+    }
+}
