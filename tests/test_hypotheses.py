@@ -23,7 +23,7 @@ def test_nobody_is_lost_who_stands_up(voodoo_data):
 def legs_lost_at_the_end(path, *, hypotheses: bool) -> int:
     """Runs that end with a knee or ankle lost; the first is from the recording's own start, the others have 4 mm of noise on
     its joints. Hips do not count: sitting, the reference shortens the thighs by a quarter, and hips in their place are 10 to
-    15 cm behind its own."""
+    15 cm behind its own. A detector that sees the legs elsewhere would mend some of them, too."""
     recording = voodoo.open_recording(path)
     start = Init.of(recording)
     chance = np.random.default_rng(0)
@@ -34,7 +34,7 @@ def legs_lost_at_the_end(path, *, hypotheses: bool) -> int:
             name: tuple(np.add(place, off)) for (name, place), off in zip(start.joints.items(), noise, strict=True)
         }
         init = Init(height_m=start.height_m, joints=joints)
-        tracker = start_tracker(recording, init=init, config=voodoo.Config(hypotheses=hypotheses))
+        tracker = start_tracker(recording, init=init, config=voodoo.Config(hypotheses=hypotheses, relocalization=False))
         result = Track.of([frame.estimate for frame in track(recording, tracker)], body=tracker.body)
         _, gone = metrics.tracking_class(compare(recording, result), result.stamps, limit=0.15)
         lost += any(gone[-1][metrics.JOINTS.index(f"{side}_{joint}")] for side in "lr" for joint in ("knee", "ankle"))

@@ -1,18 +1,19 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
 use super::belief::ENOUGH_ODDS;
-use super::turns::Turns;
 use crate::body::Body;
 use crate::detect::Detection;
 use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 const YOUNG: f64 = 1.0;
-/// Seconds from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
-const EVERY: [f64; 2] = [0.1, 0.5];
-/// A detection is elsewhere when its trunk, legs or arms are this far from the tracked ones in the mean, metres: a body's joints are
-/// not quite those that a detector tells.
-const ELSEWHERE: f64 = 0.10;
+/// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
+const EVERY: [usize; 2] = [3, 15];
+/// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips
+/// and ankles 10 cm from where a detector tells them.
+const ELSEWHERE: f64 = 0.15;
+/// The same of arms.
+const ARMS_ELSEWHERE: f64 = 0.10;
 /// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
 const SIGMAS: f64 = 3.5;
 /// From this sum of log odds on what is tracked is no person.
@@ -25,8 +26,8 @@ const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 const LEGS: [&str; 4] = ["l_knee", "r_knee", "l_ankle", "r_ankle"];
 const ARMS: [&str; 4] = ["l_elbow", "r_elbow", "l_wrist", "r_wrist"];
 
-/// Whether detected joints are elsewhere than the tracked ones, by that many standard deviations.
-fn is_elsewhere(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str], sigmas: f64) -> bool {
+/// Mean distance of detected joints from the tracked ones, and mean of their standard deviations, metres.
+fn apart(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str]) -> [f64; 2] {
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
     for name in names {
         if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
@@ -36,7 +37,7 @@ fn is_elsewhere(detection: &Detection, body: &Body, world_from_limb: &[Pose], na
             count += 1.0;
         }
     }
-    apart > ELSEWHERE * count && apart > sigmas * spread
+    [apart, spread].map(|sum| sum / count.max(1.0))
 }
 
 /// What detections said of a track.
@@ -46,7 +47,8 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    looks: Turns,
+    /// Frames since the last look.
+    waited: Option<usize>,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
     elsewhere: f64,
     nobody: f64,
@@ -75,14 +77,20 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
-    /// Whether a detector shall look at a frame. `doubtful`: a limb is not where it should be, or the body is `lost`.
+    /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
         let young = self.young(stamp) || lost;
         self.since = self.since.or(Some(stamp));
-        (young || doubtful) && self.looks.take(stamp, if young { EVERY[0] } else { EVERY[1] })
+        self.waited = self.waited.map(|frames| frames + 1);
+        let every = if young { EVERY[0] } else { EVERY[1] };
+        let due = (young || doubtful) && self.waited.is_none_or(|frames| frames >= every);
+        if due {
+            self.waited = Some(0);
+        }
+        due
     }
 
-    /// Weighs a detection against the pose, world frame: by the trunk, and by legs and arms where the track is `young` or one
+    /// Weighs a detection against the pose, world frame: by the trunk, and by legs and arms of a `young` track or one
     /// `among` several; whether the detection's is to be tried.
     pub(super) fn weigh(
         &mut self,
@@ -93,8 +101,13 @@ impl Doubt {
         among: bool,
     ) -> bool {
         let sigmas = if among { 0.0 } else { SIGMAS };
-        let elsewhere = |names: &[&str]| is_elsewhere(detection, body, world_from_limb, names, sigmas);
-        if elsewhere(&TRUNK) || (young || among) && (elsewhere(&LEGS) || elsewhere(&ARMS)) {
+        let elsewhere = |names: &[&str], least: f64| {
+            let [apart, spread] = apart(detection, body, world_from_limb, names);
+            apart > least && apart > sigmas * spread
+        };
+        let limbs = young || among;
+        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, ARMS_ELSEWHERE));
+        if elsewhere(&TRUNK, ELSEWHERE) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
         } else {
             self.elsewhere = 0.0;
@@ -130,9 +143,9 @@ mod tests {
         let count = |from: f64, doubtful, lost| {
             let mut doubt = Doubt::default();
             doubt.due(0.0, false, false);
-            (1..=57).filter(|frame| doubt.due(from + f64::from(*frame) / 60.0, doubtful, lost)).count()
+            (1..=30).filter(|frame| doubt.due(from + f64::from(*frame) / 60.0, doubtful, lost)).count()
         };
-        assert_eq!([count(0.0, false, false), count(2.0, false, true), count(2.0, true, false)], [9, 11, 3]);
+        assert_eq!([count(0.0, false, false), count(2.0, false, true), count(2.0, true, false)], [10, 10, 2]);
         assert_eq!(count(2.0, false, false), 0);
     }
 

@@ -12,7 +12,6 @@ mod posture;
 mod seeds;
 mod segment_motion;
 mod trials;
-mod turns;
 mod watch;
 
 use crate::association::correspondence::Correspondences;

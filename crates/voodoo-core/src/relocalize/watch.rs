@@ -1,14 +1,13 @@
 //! When a body is searched: after some frames in which it was lost, and for a while after it was found.
 
 use super::hidden::Hidden;
-use super::turns::Turns;
 
 /// The body is searched from this many frames on in which it was lost: a blurred frame is no loss.
 const LOST_PATIENCE: usize = 3;
-/// After it was found, it is searched again for so long, every so many seconds, or until it was seen to walk: another facing may
-/// prove better.
+/// After it was found, every so manyth frame is searched again for so long, seconds, or until it was seen to walk: another
+/// facing may prove better.
 const WATCH: f64 = 5.0;
-const WATCHED: f64 = 1.0 / 6.0;
+const WATCHED: usize = 5;
 
 /// What a frame said of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +29,7 @@ pub(super) struct Watch {
     lost: usize,
     /// Until when the search goes on, seconds.
     until: Option<f64>,
-    turns: Turns,
+    frames: usize,
     /// Whether the present pose explains what may be the body, if anything may.
     pub(super) explained: Option<bool>,
     /// What stands before it.
@@ -67,7 +66,8 @@ impl Watch {
             self.lost = 0;
         }
         self.until = self.until.filter(|until| sighting.stamp < *until);
-        self.lost >= LOST_PATIENCE || (self.open() && self.turns.take(sighting.stamp, WATCHED))
+        self.frames += 1;
+        self.lost >= LOST_PATIENCE || (self.open() && self.frames.is_multiple_of(WATCHED))
     }
 
     /// Ends the search of a frame; `ahead`: it walks where it faces. Whether the pose is to be given up.
@@ -120,8 +120,8 @@ mod tests {
             watch.due(sighting(f64::from(frame), true));
         });
         assert!(!watch.conclude(true, sighting(2.0, false), false) && watch.open());
-        let again = (1..=30).filter(|frame| watch.due(sighting(2.0 + f64::from(*frame) / 30.0, false))).count();
-        assert_eq!(again, 7, "every fifth frame of thirty a second");
+        let again = (1..=10).filter(|frame| watch.due(sighting(2.0 + 0.1 * f64::from(*frame), false))).count();
+        assert_eq!(again, 2, "every fifth frame");
         assert!(!watch.conclude(false, sighting(3.0, false), true) && !watch.open());
         watch.conclude(true, sighting(3.0, false), false);
         assert!(!watch.due(sighting(3.0 + WATCH, false)) && !watch.open());
