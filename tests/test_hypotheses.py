@@ -16,7 +16,9 @@ STARTS = 4
 
 def test_nobody_is_lost_who_stands_up(voodoo_data):
     """The stool draws a calf."""
-    score, _ = evaluate(voodoo_data / "utd-mhad" / "Depth" / "a24_s3_t3_depth.mat")
+    path = voodoo_data / "utd-mhad" / "Depth" / "a24_s3_t3_depth.mat"
+    # Without a detector, which has its own idea of where the reference has arms.
+    score, _ = evaluate(path, config=voodoo.Config(relocalization=False))
     assert score.tracking_class > 0, f"lost at the end: {score.lost_joints}"
 
 
