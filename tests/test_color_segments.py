@@ -83,6 +83,9 @@ def test_without_a_pose_or_with_a_wrong_picture_nothing_is_cut_out():
     assert set(tracker.segment(frame_of(0), world_from_limb=truth_of(0))) == {f"cam_{n}" for n in range(CAMERAS)}
     with pytest.raises(voodoo.BodyError, match="world_from_limb"):
         tracker.learn_colors(frame_of(0), world_from_limb={})
+    for ask in (tracker.segment, tracker.learn_colors):
+        with pytest.raises(voodoo.MeasurementError, match="expected a voodoo[.]Frame, found NoneType"):
+            ask(None)
     tracker.set_background("cam_0", [np.zeros((4, 4, 3), np.uint8)])
     with pytest.raises(voodoo.MeasurementError, match="empty scene"):
         tracker.learn_colors(frame_of(0), world_from_limb=truth_of(0))

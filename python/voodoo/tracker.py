@@ -137,9 +137,7 @@ class Tracker:
                 is not looked for, because it lacks sites of a person.
             BodyError: the frame names a limb or site that is not in the body.
         """
-        if not isinstance(frame, Frame):
-            raise MeasurementError(f"frame: expected a voodoo.Frame, found {type(frame).__name__}")
-        return self._core.step(frame)
+        return self._core.step(_frame(frame))
 
     def region_lines(self, source: str) -> RegionLines:
         """The lines of the last step in the picture of the colour camera `source`; none where it gave no picture."""
@@ -165,14 +163,14 @@ class Tracker:
             MeasurementError: no pose, or a picture that cannot be used.
             BodyError: a limb is missing or unknown.
         """
-        return self._core._segment(frame, self._ordered(world_from_limb))
+        return self._core._segment(_frame(frame), self._ordered(world_from_limb))
 
     def learn_colors(self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None) -> None:
         """Learn the colours of the body, and of what is around it, in a frame's pictures; steps do so by themselves.
 
         Args, Raises: as of `segment`.
         """
-        self._core._learn_colors(frame, self._ordered(world_from_limb))
+        self._core._learn_colors(_frame(frame), self._ordered(world_from_limb))
 
     def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.NDArray[np.float64]] | None:
         return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
@@ -265,3 +263,10 @@ def _check_parts(**parts: tuple[object, type]) -> None:
         if not isinstance(value, kind):
             expected = "a name" if kind is str else f"a voodoo.{kind.__name__}"
             raise BodyError(f"{name}: expected {expected}, found {type(value).__name__}")
+
+
+def _frame(frame: object) -> Frame:
+    """The frame, if it is one."""
+    if not isinstance(frame, Frame):
+        raise MeasurementError(f"frame: expected a voodoo.Frame, found {type(frame).__name__}")
+    return frame

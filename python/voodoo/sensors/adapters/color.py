@@ -14,11 +14,11 @@ from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas
 from voodoo.sensors.pinhole import Pinhole
+from voodoo.sensors.silhouettes.regions import LIKELY
 from voodoo.tracker import Tracker
 
 _FARTHEST_S = 0.25
 """A picture that is older or newer than its frame by more [s] shows another pose; the tracker would refuse the frame."""
-_LIKELY = 0.5
 _INK = (90, 240, 250)
 _GREY = 2
 """Channels of a grey camera's picture differ by no more than coding makes of it."""
@@ -87,7 +87,7 @@ class ColorAdapter(Adapter[ColorImage]):
         )
         likely = known.told.segment(frame)[item.sensor]
         size = (item.camera.width, item.camera.height)
-        mask = cv2.resize((likely > _LIKELY).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+        mask = cv2.resize((likely > LIKELY).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
         scale = np.array(size) / (known.lens.camera.width, known.lens.camera.height)
         marks = [(float(u), float(v)) for u, v in (edges + 0.5) * scale - 0.5]
         canvas.regions(item, mask, marks=marks, names={}, color=_INK)

@@ -16,8 +16,9 @@ from voodoo.sensors.pinhole import Pinhole
 from voodoo.sensors.silhouettes.masks import Mask, filled, without_specks
 from voodoo.tracker import Tracker
 
+LIKELY = 0.5
+"""From this likelihood on a pixel is the body's."""
 _SMALLEST_PX = 60
-_LIKELY = 0.5
 
 
 class RegionSilhouettes:
@@ -46,7 +47,7 @@ class RegionSilhouettes:
         if not pictures:
             return []
         found = self._tracker.segment(self._frame(pictures), world_from_limb=world_from_limb)
-        masks = (without_specks(filled(found[item.sensor] > _LIKELY), smallest=_SMALLEST_PX) for item in pictures)
+        masks = (without_specks(filled(found[item.sensor] > LIKELY), smallest=_SMALLEST_PX) for item in pictures)
         return [(mask, self._lenses[item.sensor].camera) for mask, item in zip(masks, pictures, strict=True)]
 
     def learn(self, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]) -> None:
