@@ -84,7 +84,7 @@ def test_without_a_pose_or_with_a_wrong_picture_nothing_is_cut_out():
     with pytest.raises(voodoo.BodyError, match="world_from_limb"):
         tracker.learn_colors(frame_of(0), world_from_limb={})
     for ask in (tracker.segment, tracker.learn_colors):
-        with pytest.raises(voodoo.MeasurementError, match="expected a voodoo[.]Frame, found NoneType"):
+        with pytest.raises(voodoo.MeasurementError, match="found NoneType"):
             ask(None)
     tracker.set_background("cam_0", [np.zeros((4, 4, 3), np.uint8)])
     with pytest.raises(voodoo.MeasurementError, match="empty scene"):
