@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path, PurePath
 
+import numpy as np
+
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.calibration import Calibration, read_calibration
@@ -18,9 +20,11 @@ from voodoo.recordings.recording import (
     SensorInfo,
     mean_rate,
     number_option,
+    reference_words,
     refuse_blank,
 )
 from voodoo.recordings.stored import read_stored, read_stored_text
+from voodoo.recordings.truth import read_start, read_truth
 
 _RATE = 30.0
 """Images per second of numbered images, as most depth cameras give by default."""
@@ -38,6 +42,8 @@ class FolderRecording(Recording):
         depth.txt                     optional: lines "stamp depth/name.png", # starts a comment; then names are free
         rgb/, rgb.txt                 optional: the same for colour (PNG or JPEG)
         calibration.toml              the camera
+        truth.csv                     optional: exact joint positions in the root frame, as beside a rendered bag
+        init.json                     optional: where the person is in the first frame, as --init reads it
 
     There is one frame for each depth image, holding the colour images since the previous one. A groundtruth.txt (the
     camera's path, in that benchmark) is not used. calibration.toml::
@@ -65,6 +71,7 @@ class FolderRecording(Recording):
         path: the folder.
         calibration: another calibration file.
         rate: images per second where they are numbered; None: 30 is assumed, and said so.
+        bare: read neither truth.csv nor init.json.
         left_out: counts what cannot be used, which is then left out; None: it is refused.
 
     Raises:
@@ -77,6 +84,7 @@ class FolderRecording(Recording):
         *,
         calibration: str | Path | None = None,
         rate: float | None = None,
+        bare: bool = False,
         left_out: LeftOut | None = None,
     ) -> None:
         """List the images; see the class."""
@@ -93,6 +101,8 @@ class FolderRecording(Recording):
         self._calibration = read_calibration(file, like=self._depth[0][1])
         self.root_frame = self._calibration.root_frame
         self.start, self.reference = None, None
+        if not bare:
+            self._read_beside()
         self._color: list[tuple[float, Path]] = []
         self._unused: tuple[tuple[str, str], ...] = ()
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
@@ -101,6 +111,13 @@ class FolderRecording(Recording):
             else:
                 self._color = _listing(path, "rgb", _PICTURES, clock, left_out)
         self.assumed = tuple(clock.notes)
+
+    def _read_beside(self) -> None:
+        start, truth = self.path / "init.json", self.path / "truth.csv"
+        if start.is_file():
+            self.start = read_start(start, lambda frame: self.root_from(frame or self.root_frame, 0.0))
+        if truth.is_file():
+            self.reference = read_truth(truth, lambda stamp: np.eye(4))
 
     def __len__(self) -> int:
         """Number of depth images."""
@@ -154,6 +171,7 @@ class FolderRecording(Recording):
             root_frame=self.root_frame,
             sensors=tuple(sensors),
             unused=self._unused,
+            reference=reference_words(self.reference),
             notes=self.assumed,
         )
 

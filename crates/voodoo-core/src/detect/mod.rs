@@ -15,7 +15,7 @@ pub mod weights;
 mod winograd;
 
 use crate::math::{Aabb, Pose, Vec3};
-use crate::observation::frame::DepthImage;
+use crate::observation::frame::{DepthImage, Ground};
 pub use components::Candidate;
 use crop::Crop;
 pub use names::{JOINTS, LENGTHS};
@@ -73,6 +73,8 @@ pub struct Detection {
     pub low: Vec3,
     /// The other corner.
     pub high: Vec3,
+    /// The floor as the image shows it or as it was told, world frame.
+    pub floor: Option<Ground>,
     /// Number of its candidate, see [`Detector::mask`].
     pub(crate) candidate: usize,
 }
@@ -189,6 +191,11 @@ impl Detector {
                 kept.push(detection);
             }
         }
+        let floor = segmentation.floor().map(|floor| {
+            let normal = image.world_from_sensor.rotation * floor.normal;
+            Ground { normal, offset: floor.offset + normal.dot(image.world_from_sensor.translation) }
+        });
+        kept.iter_mut().for_each(|detection| detection.floor = floor);
         *found = kept;
         found
     }
@@ -248,6 +255,7 @@ fn detection(
         person: f64::from(answer.person),
         low: bounds.mins,
         high: bounds.maxs,
+        floor: None,
         candidate: number,
     }
 }

@@ -13,6 +13,8 @@ pub(super) enum Basis {
     Rest,
     /// The body leans: not the arm or leg alone is judged by it.
     Lean,
+    /// A detector sees the body there: as above.
+    Body,
 }
 
 /// The past of one arm or leg.

@@ -21,7 +21,7 @@ use crate::math::{Pose, shifted};
 use crate::regions::{Backdrop, Posed};
 use history::{Basis, History};
 use proposals::{
-    CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
+    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
     UnexplainedCluster,
 };
 use rough::{Extremity, RoughSearch};
@@ -85,7 +85,8 @@ impl Hypotheses {
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others, and takes what explains the frame better.
-    /// `detection` is what a detector says of this frame. Returns the number of ICP steps.
+    /// `detection` is what a detector says of this frame, and `detected` the poses there, world frame. Returns the number of ICP
+    /// steps.
     pub fn improve(
         &mut self,
         context: Context,
@@ -93,6 +94,7 @@ impl Hypotheses {
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
         detection: Option<&Detection>,
+        detected: &[Pose],
     ) -> usize {
         self.make_room(context, fit);
         self.unexplained.collect(context, fit.matched(poses));
@@ -101,10 +103,10 @@ impl Hypotheses {
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
-            if !self.doubts(at) {
+            if !self.doubts(at, detection.is_some()) {
                 continue;
             }
-            self.propose(at, detection);
+            self.propose(at, detection, detected);
             let taken = self.try_proposals(context, index, fit, poses, predicted);
             if taken > 0 {
                 self.unexplained.collect(context, fit.matched(poses));
@@ -153,8 +155,9 @@ impl Hypotheses {
         self.refined.matched.reserve_as(fit.correspondences());
     }
 
-    /// Whether the frame, and those before it, speak against an arm or leg for long enough to try others.
-    fn doubts(&mut self, at: Extremity) -> bool {
+    /// Whether the frame, and those before it, speak against an arm or leg for long enough to try others; where a detector
+    /// `looked`, there are new ones.
+    fn doubts(&mut self, at: Extremity, looked: bool) -> bool {
         let chain = at.chain();
         if at.regions.is_some() {
             let supports = &at.matched.correspondences.region_support;
@@ -162,7 +165,7 @@ impl Hypotheses {
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
             let suspect = gained < CLAIMED * area;
-            return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE));
+            return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE), false);
         }
         let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), NEARBY * chain.stretched_length(), near);
@@ -171,17 +174,18 @@ impl Hypotheses {
         let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= STRIKING;
         let suspect = unexplained >= GAIN && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
-        self.history[at.index].persistence.observe(patience)
+        // Of a leg that was refused for long a detector may tell something new.
+        self.history[at.index].persistence.observe(patience, looked && chain.leg)
     }
 
     /// Fills the pool with other configurations of one arm or leg.
-    fn propose(&mut self, at: Extremity, detection: Option<&Detection>) {
+    fn propose(&mut self, at: Extremity, detection: Option<&Detection>, detected: &[Pose]) {
         let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current - GAIN);
         // The kinds of proposals: one more is a file and a line here.
-        let kinds: [&mut dyn Propose; 7] = [
+        let kinds: [&mut dyn Propose; 8] = [
             clusters,
             &mut LastGoodEnd,
             &mut CarriedByParent,
@@ -189,6 +193,7 @@ impl Hypotheses {
             lean,
             shown,
             &mut DetectedEnd(detection),
+            &mut DetectedBody(detected),
         ];
         for kind in kinds {
             kind.propose(at, history, rough, pool);
@@ -262,7 +267,7 @@ impl Refined {
         // What is as suspect as before is not worth a jump.
         let pictures = context.pictures_alone();
         let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-        if better && (basis == Basis::Lean || sure(matched)) {
+        if better && (matches!(basis, Basis::Lean | Basis::Body) || sure(matched)) {
             return true;
         }
         fit.exchange(&mut self.matched);
@@ -302,7 +307,7 @@ mod tests {
             let mut predicted = previous.clone();
             with_context(&pixels, &config, &model, &previous, |context| {
                 fit.match_last(context, &poses);
-                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None);
+                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None, &[]);
                 assert_eq!(poses == previous, predicted == previous, "what is taken is what is expected");
                 found.push((poses.clone(), steps));
             });
@@ -370,7 +375,7 @@ mod tests {
             |hypotheses: &Hypotheses| hypotheses.history.iter().filter(|own| own.last_good_end.is_some()).count();
         assert_eq!(legs, 2);
         // One arm is not measured, and something spoke against one that is.
-        hypotheses.history[arm + 1].persistence.observe(Some(PATIENCE));
+        hypotheses.history[arm + 1].persistence.observe(Some(PATIENCE), false);
         hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
         assert_eq!(known(&hypotheses), 2, "the legs");
         hypotheses.history[arm + 1].persistence.observe(None);

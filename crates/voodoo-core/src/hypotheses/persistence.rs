@@ -18,8 +18,9 @@ pub(super) struct Persistence {
 
 impl Persistence {
     /// Takes note of a frame, which speaks against the chain when it names how many such frames it takes; whether it is time
-    /// to try other configurations. To be called in every frame.
-    pub(super) fn observe(&mut self, patience: Option<usize>) -> bool {
+    /// to try other configurations: of a chain that was refused for long in few frames, but where there is something `new`. To be
+    /// called in every frame.
+    pub(super) fn observe(&mut self, patience: Option<usize>, new: bool) -> bool {
         let voted_before = self.voted;
         self.voted = false;
         let Some(patience) = patience else {
@@ -29,7 +30,7 @@ impl Persistence {
         self.voted_before = voted_before;
         self.frames += 1;
         self.refused += 1;
-        let rests = self.refused > TIRED && !self.refused.is_multiple_of(REST);
+        let rests = !new && self.refused > TIRED && !self.refused.is_multiple_of(REST);
         self.frames >= patience && !rests
     }
 
@@ -63,41 +64,41 @@ mod tests {
     #[test]
     fn a_change_is_made_when_two_frames_in_a_row_ask_for_it() {
         let mut persistence = Persistence::default();
-        assert!(!persistence.observe(Some(2)) && persistence.observe(Some(2)));
+        assert!(!persistence.observe(Some(2), false) && persistence.observe(Some(2), false));
         assert!(!persistence.vote());
-        assert!(persistence.observe(Some(2)) && persistence.vote());
+        assert!(persistence.observe(Some(2), false) && persistence.vote());
         // A frame between that does not ask starts anew.
-        assert!(persistence.observe(Some(2)));
-        assert!(persistence.observe(Some(2)) && !persistence.vote());
+        assert!(persistence.observe(Some(2), false));
+        assert!(persistence.observe(Some(2), false) && !persistence.vote());
     }
 
     #[test]
     fn a_frame_that_is_not_tried_for_lack_of_patience_is_a_gap() {
         let mut persistence = Persistence::default();
-        persistence.observe(Some(2));
-        assert!(persistence.observe(Some(2)) && !persistence.vote());
-        assert!(!persistence.observe(Some(4)));
-        assert!(persistence.observe(Some(4)) && !persistence.vote(), "the vote before the gap was counted");
-        assert!(persistence.observe(Some(4)) && persistence.vote());
+        persistence.observe(Some(2), false);
+        assert!(persistence.observe(Some(2), false) && !persistence.vote());
+        assert!(!persistence.observe(Some(4), false));
+        assert!(persistence.observe(Some(4), false) && !persistence.vote(), "the vote before the gap was counted");
+        assert!(persistence.observe(Some(4), false) && persistence.vote());
     }
 
     #[test]
     fn a_frame_in_order_forgets_everything() {
         let mut persistence = Persistence::default();
-        persistence.observe(Some(1));
+        persistence.observe(Some(1), false);
         persistence.vote();
-        assert!(!persistence.is_clear() && !persistence.observe(None) && persistence.is_clear());
-        assert!(!persistence.observe(Some(2)) && persistence.observe(Some(2)) && !persistence.vote());
+        assert!(!persistence.is_clear() && !persistence.observe(None, false) && persistence.is_clear());
+        assert!(!persistence.observe(Some(2), false) && persistence.observe(Some(2), false) && !persistence.vote());
     }
 
     #[test]
     fn a_chain_refused_for_long_is_tried_in_every_fourth_frame_until_it_asks() {
         let mut persistence = Persistence::default();
-        let tried: Vec<bool> = (0..TIRED + 10 * REST).map(|_| persistence.observe(Some(1))).collect();
+        let tried: Vec<bool> = (0..TIRED + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
         assert!(tried[..TIRED].iter().all(|due| *due));
         assert_eq!(tried[TIRED..].iter().filter(|due| **due).count(), 10);
-        while !persistence.observe(Some(1)) {}
+        while !persistence.observe(Some(1), false) {}
         persistence.vote();
-        assert!(persistence.observe(Some(1)) && persistence.vote());
+        assert!(persistence.observe(Some(1), false) && persistence.vote());
     }
 }

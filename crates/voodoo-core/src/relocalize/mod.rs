@@ -20,7 +20,7 @@ use crate::detect::{Detection, Wanted};
 use crate::fit::{Context, Fit};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
-use crate::observation::frame::Frame;
+use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::segments::{Segment, Segments};
 use crate::observation::share::Share;
@@ -59,6 +59,8 @@ pub struct Relocalizer {
     belief: Belief,
     /// A detector knows bodies like this one.
     known: bool,
+    /// The floor on which it saw the body that it found, world frame.
+    floor: Option<Ground>,
 }
 
 impl Relocalizer {
@@ -68,6 +70,7 @@ impl Relocalizer {
         self.doubt.restart();
         self.belief = Belief::default();
         self.known = People::know(&model.body);
+        self.floor = None;
         self.motion.clear();
         self.postures.restart(&model.body, poses);
     }
@@ -97,6 +100,12 @@ impl Relocalizer {
     /// The track was started: `itself` where a detector saw somebody, and nobody had said where.
     pub fn take_note_of_start(&mut self, itself: bool) {
         self.doubt.found_itself(itself);
+        self.floor = if itself { self.people.floor() } else { None };
+    }
+
+    /// The floor under a body that was found, where nobody tells it; world frame.
+    pub fn floor(&self) -> Option<Ground> {
+        self.floor
     }
 
     /// Whether nobody had said where the track starts.

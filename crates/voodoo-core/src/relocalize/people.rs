@@ -4,9 +4,13 @@
 use crate::body::{Body, Model};
 use crate::detect::{Detection, Detector, JOINTS, Surroundings, Wanted, lengths, take_lengths};
 use crate::math::{Pose, Vec3};
-use crate::observation::frame::Frame;
+use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::share::Share;
+
+/// Height of an ankle above the floor on which a person stands, and how far it may be off, metres.
+const ANKLE: f64 = 0.08;
+const ON_FLOOR: f64 = 0.12;
 
 /// Looks for people, from the first time on that it is asked to; keeps what it last saw.
 #[derive(Debug, Default)]
@@ -29,6 +33,17 @@ impl People {
     /// What was seen in this frame.
     pub(super) fn seen(&self) -> Option<&Detection> {
         self.seen.as_ref()
+    }
+
+    /// The floor on which it stands; a table below which its feet are is none.
+    pub(super) fn floor(&self) -> Option<Ground> {
+        let seen = self.seen()?;
+        let above = |floor: &Ground, name| Some(floor.normal.dot(seen.joint(name)?.position) - floor.offset);
+        seen.floor.filter(|floor| {
+            let ankles = [above(floor, "l_ankle"), above(floor, "r_ankle")].into_iter().flatten();
+            let lowest = ankles.fold(f64::INFINITY, f64::min);
+            (lowest - ANKLE).abs() < ON_FLOOR
+        })
     }
 
     /// The pixels that show it.

@@ -94,6 +94,8 @@ impl Tracker {
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
+        // Where nobody tells the floor, it is where a detector saw it when it found the body.
+        let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
         if self.is_started() {
             self.verify_start(frame);
             self.follow(frame, None)
@@ -208,7 +210,8 @@ impl Tracker {
             }
         }
         if config.hypotheses && schedule.whole_body && known {
-            steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection());
+            let detected = relocalizer.posed(&model.body).unwrap_or_default();
+            steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection(), &detected);
         }
         // Sizes that follow what this frame shows.
         let lost = assessor.status() == Status::Lost;

@@ -46,11 +46,11 @@ mod tests {
             let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
             history[index].last_proposal = wanted.clone();
             history[index].last_basis = Basis::Lean;
-            history[index].persistence.observe(Some(1));
+            history[index].persistence.observe(Some(1), false);
             LastProposal.propose(at, &history, &mut rough, &mut pool);
             assert_eq!(pool.found().count(), 0, "nobody asked for it");
             history[index].persistence.vote();
-            history[index].persistence.observe(Some(1));
+            history[index].persistence.observe(Some(1), false);
             LastProposal.propose(at, &history, &mut rough, &mut pool);
             let found: Vec<_> = pool.found().collect();
             assert_eq!((found.len(), found[0].basis), (1, Basis::Lean));

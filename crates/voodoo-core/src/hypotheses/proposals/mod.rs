@@ -1,6 +1,7 @@
 //! Where an arm, a leg or the trunk may be instead: each kind of proposal is a file.
 
 mod carried_by_parent;
+mod detected_body;
 mod detected_end;
 mod last_good_end;
 mod last_proposal;
@@ -9,6 +10,7 @@ mod trunk_lean;
 mod unexplained_cluster;
 
 pub(super) use carried_by_parent::CarriedByParent;
+pub(super) use detected_body::DetectedBody;
 pub(super) use detected_end::DetectedEnd;
 pub(super) use last_good_end::LastGoodEnd;
 pub(super) use last_proposal::LastProposal;
@@ -54,6 +56,8 @@ pub(super) struct Pool {
     pub(super) both_feet: Proposal,
     /// The end is where a detector sees it.
     pub(super) detected: Proposal,
+    /// The whole body is as a detector sees it.
+    pub(super) body: Proposal,
 }
 
 impl Pool {
@@ -75,13 +79,13 @@ impl Pool {
 
     /// What was found, in the order in which it is refined.
     pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        let Self { lean, again, rest, points, both_feet, detected, .. } = self;
-        [lean, again, rest, points, both_feet, detected].into_iter().filter(|slot| slot.found)
+        let Self { lean, again, rest, points, both_feet, detected, body, .. } = self;
+        [lean, again, rest, points, both_feet, detected, body].into_iter().filter(|slot| slot.found)
     }
 
-    fn slots(&mut self) -> [&mut Proposal; 6] {
-        let Self { lean, again, rest, points, both_feet, detected, .. } = self;
-        [lean, again, rest, points, both_feet, detected]
+    fn slots(&mut self) -> [&mut Proposal; 7] {
+        let Self { lean, again, rest, points, both_feet, detected, body, .. } = self;
+        [lean, again, rest, points, both_feet, detected, body]
     }
 }
 
