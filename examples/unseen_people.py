@@ -43,7 +43,12 @@ ENOUGH = 6
 """So many of the twelve joints in the image are somebody in view."""
 SECOND_S = 1.0
 PAIRS = [(metrics.JOINTS.index(f"l_{joint}"), metrics.JOINTS.index(f"r_{joint}")) for joint in ("shoulder", "hip")]
-BONES = {"upperarm": ("shoulder", "elbow"), "forearm": ("elbow", "wrist"), "thigh": ("hip", "knee"), "calf": ("knee", "ankle")}
+BONES = {
+    "upperarm": ("shoulder", "elbow"),
+    "forearm": ("elbow", "wrist"),
+    "thigh": ("hip", "knee"),
+    "calf": ("knee", "ankle"),
+}
 WHEN = ("first", "after 1 s", "end")
 MIDDLE = np.linspace(0.3, 0.7, 5)
 """Shares of a limb's length at which its girth is taken."""
@@ -86,7 +91,7 @@ def run(path: Path, init: str) -> Result:
     file = path / "meta.json"
     about = json.loads(file.read_text()) if file.is_file() else {}
     tracker = start_tracker(recording, init="auto" if init == "auto" else None, use=("depth",))
-    stamps, places, inside, sizes, posed = [], [], [], [], []
+    stamps, places, sizes, posed = [], [], [], []
     for frame in track(recording, tracker, settings=FrontEndSettings.of(recording, use=("depth",))):
         estimate = frame.estimate
         there = estimate.status != SEARCHING
@@ -102,7 +107,10 @@ def run(path: Path, init: str) -> Result:
     errors = metrics.joint_errors(joints, seen)
     missed = np.array([not there for there in posed])[:, None] & np.isfinite(seen).all(axis=2)
     class_, lost = metrics.tracking_class(np.where(missed, NOWHERE_M, errors), time, limit=LIMIT_EXACT_M)
-    at_end = [bool(row.any()) and bool(lost[np.flatnonzero(row)[-1], index]) for index, row in enumerate(np.isfinite(seen).all(axis=2).T)]
+    at_end = [
+        bool(row.any()) and bool(lost[np.flatnonzero(row)[-1], index])
+        for index, row in enumerate(np.isfinite(seen).all(axis=2).T)
+    ]
     true_lengths = np.median([lengths_of(row) for row in truths], axis=0)
     radii = about.get("radii_m", {})
     true_girths = np.array([radii.get(f"{side}_{bone}", np.nan) for bone in BONES for side in "lr"])
@@ -200,7 +208,10 @@ def sizes_table(results: Sequence[Result]) -> None:
         for number, bone in enumerate([*BONES, "all"]):
             part = errors if bone == "all" else errors[:, :, 2 * number : 2 * number + 2]
             row = [part[:, when] for when in range(len(WHEN))]
-            numbers = [f"{centimetres(metrics.mean_or_nan(np.abs(one)))} ({100.0 * metrics.mean_or_nan(one):+.1f})" for one in row]
+            numbers = [
+                f"{centimetres(metrics.mean_or_nan(np.abs(one)))} ({100.0 * metrics.mean_or_nan(one):+.1f})"
+                for one in row
+            ]
             if np.isfinite(part).any():
                 print(f"| {what[:-1]}, {bone} | " + " | ".join(numbers) + " |")
 
@@ -214,21 +225,54 @@ def main() -> None:
     paths = find_recordings(options.recordings)
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
         results = list(pool.map(run, paths, [options.init] * len(paths)))
-    print("| recording | start: frame | error, cm | mean, cm | exchanged: first, later | lost at the end | class | lengths, cm | girths, cm |")
+    heads = "start: frame | error, cm | mean, cm | exchanged: first, later | lost at the end | class | lengths, cm | girths, cm"
+    print(f"| recording | {heads} |")
     print("|---|---|---|---|---|---|---|---|---|")
     for result in results:
-        sizes = [" ".join(centimetres(metrics.mean_or_nan(np.abs(row))) for row in which) for which in (result.lengths, result.girths)]
+        sizes = [
+            " ".join(centimetres(metrics.mean_or_nan(np.abs(row))) for row in which)
+            for which in (result.lengths, result.girths)
+        ]
         turned = " ".join("yes" if one else "no" for one in result.exchanged)
         lost = ", ".join(result.lost) or "none"
         start = f"{result.frame or 'never'}"
-        values = [result.name, start, centimetres(result.first), centimetres(result.mean), turned, lost, f"{result.tracking_class}", *sizes]
+        values = [
+            result.name,
+            start,
+            centimetres(result.first),
+            centimetres(result.mean),
+            turned,
+            lost,
+            f"{result.tracking_class}",
+            *sizes,
+        ]
         print("| " + " | ".join(values) + " |")
     print("\n| group | recordings | late | first pose, cm | mean, cm | exchanged: first; later | end lost | class |")
     print("|---|---|---|---|---|---|---|---|")
     print("| " + " | ".join(["all", *cells(results)]) + " |")
     if all(result.about.get("camera_tilt_deg") is not None for result in results):
-        grouped(results, "height", lambda about: "under 0.8 m" if about["camera_height_m"] < 0.8 else "0.8 to 1.5 m" if about["camera_height_m"] < 1.5 else "above 1.5 m")
-        grouped(results, "tilt", lambda about: "up" if about["camera_tilt_deg"] < -3 else "to 12 degrees" if about["camera_tilt_deg"] < 12 else "12 to 30 degrees")
+        grouped(
+            results,
+            "height",
+            lambda about: (
+                "under 0.8 m"
+                if about["camera_height_m"] < 0.8
+                else "0.8 to 1.5 m"
+                if about["camera_height_m"] < 1.5
+                else "above 1.5 m"
+            ),
+        )
+        grouped(
+            results,
+            "tilt",
+            lambda about: (
+                "up"
+                if about["camera_tilt_deg"] < -3
+                else "to 12 degrees"
+                if about["camera_tilt_deg"] < 12
+                else "12 to 30 degrees"
+            ),
+        )
         grouped(results, "sensor", lambda about: about["sensor"].split()[0])
         grouped(results, "floor", lambda about: "known" if about["floor_known"] else "not known")
         grouped(results, "person", lambda about: about["person"])

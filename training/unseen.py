@@ -1,14 +1,16 @@
-"""Depth recordings of a person with exact truth, on which nothing is tuned: motions, bodies and draws that training has not seen.
+"""Depth recordings of a person with exact truth, on which nothing is tuned: motions and bodies that training has not seen.
 
-    python -m training.unseen OUT --count 32 --seed 1
+    python -m training.unseen OUT --count 40 --seed 1
     python -m training.unseen OUT --count 8 --seed 1 --height 2.3 --tilt 25
 
-Writes folders `OUT/look/NAME` and `OUT/report/NAME` by turns: what is mended is mended by looking at the first half, the second half
-is measured only. A folder holds depth/, calibration.toml, truth.csv, init.json (the first pose, which `--init auto` leaves alone) and meta.json (what was drawn, lengths and girths of the
-body); `voodoo eval` and `examples/unseen_people.py` read it. It needs numba.
+Writes folders `OUT/look/NAME` and `OUT/report/NAME` by turns: what is mended is mended by looking at the first half, the second
+half is measured only. A folder holds depth/, calibration.toml, truth.csv, init.json (the first pose, which `--init auto` leaves
+alone) and meta.json (what was drawn, lengths and girths of the body); `voodoo eval` and `examples/unseen_people.py` read it. It
+needs numba.
 
-Bodies and clips are those that `--held-out` keeps from training; motion is captured, or goes through poses that are captured or made
-by rule. The sensors' noise keeps its character through a recording, and is not that of the training pictures.
+Bodies and clips are those that `--held-out` keeps from training; motion is captured, or goes through poses that are captured or
+made by rule: then arms may pass through the trunk. The sensors' noise is not that of the training pictures, and keeps its
+character through a recording.
 """
 
 from __future__ import annotations
@@ -27,15 +29,14 @@ from numpy.typing import NDArray
 
 from training import poses, raster, sensors, shapes
 from training.bodies import BONES, JOINTS, Bodies, Body
+from training.motions import MILLIMETRE, RATE, Clips, Motion, clips_of, story, walk
 from training.poses import Pose
-from training.rotations import about, part, shortest, unit
+from training.rotations import about, unit
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
 T = TypeVar("T")
 HALVES = ("look", "report")
-RATE = 30.0
-MILLIMETRE = 1000.0
 KINDS = ("flight", "stereo")
 SIZES = {"flight": ((160, 120, 58), (176, 144, 62), (224, 172, 62), (320, 288, 75), (640, 480, 66)),
          "stereo": ((212, 120, 85), (320, 240, 70), (424, 240, 85), (640, 480, 69))}  # fmt: skip
@@ -51,16 +52,6 @@ MATCHED, BASELINE = 848, 0.055
 """Columns in which a stereo camera matches, and the distance of its eyes [m]."""
 GIRTHS = {"upperarm": ("shoulder", "elbow", "upper"), "forearm": ("elbow", "wrist", "fore"),
           "thigh": ("hip", "knee", "thigh"), "calf": ("knee", "ankle", "shank")}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A surface (V, 3) and joints (17, 3) a frame [m], on the floor, and what they are."""
-
-    surfaces: list[Array]
-    joints: Array
-    words: str
-    seat: float | None = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +82,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("VOODOO_DATA", "../shared/data")))
-    parser.add_argument("--count", type=int, default=32, help="recordings, both halves together")
+    parser.add_argument("--count", type=int, default=40, help="recordings, both halves together")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--height", type=float, help="of the camera above the floor [m]; drawn by default")
     parser.add_argument("--tilt", type=float, help="of the camera, downwards [degrees]; drawn by default")
@@ -99,7 +90,7 @@ def main() -> None:
     bodies = Bodies(a.data / "bodies", held_out=True)
     # Each half has all heights, sensors and kinds of people, in orders of their own.
     plans = {half: _plan(np.random.default_rng([a.seed, which]), a.count) for which, half in enumerate(HALVES)}
-    clips, still = _clips(a.data), poses.load(a.data / "mocap", held_out=True)
+    clips, still = clips_of(a.data), poses.load(a.data / "mocap", held_out=True)
     for number in range(a.count):
         rng = np.random.default_rng([a.seed, number])
         half = HALVES[number % 2]
@@ -114,7 +105,12 @@ def _plan(rng: Rng, count: int) -> list[Plan]:
     def order(values: Sequence[T]) -> list[T]:
         return [values[i] for _ in range(count // len(values) + 1) for i in rng.permutation(len(values))]
 
-    heights, kinds, clips, floors = order(HEIGHTS), order(KINDS), order((True, False, False)), order((True, True, False))
+    heights, kinds, clips, floors = (
+        order(HEIGHTS),
+        order(KINDS),
+        order((True, False, False)),
+        order((True, True, False)),
+    )
     people = order(("whole", "whole", "hidden", "cut"))
     return [Plan(*row) for row in zip(heights, kinds, clips, floors, people, strict=False)]
 
@@ -124,7 +120,7 @@ def make(
     rng: Rng,
     plan: Plan,
     bodies: Bodies,
-    clips: dict[str, tuple[list[Pose], Array]],
+    clips: Clips,
     still: list[Pose],
     *,
     height: float | None,
@@ -134,7 +130,7 @@ def make(
     index = int(rng.integers(len(bodies)))
     body = bodies[index]
     dress = int(rng.integers(2**31))
-    motion = _walk(rng, body, dress, clips) if plan.clip else _story(rng, body, dress, still)
+    motion = walk(rng, body, dress, clips) if plan.clip else story(rng, body, dress, still)
     motion, view = _view(rng, motion, plan, bodies.faces, height=height, tilt=tilt)
     away = float(np.linalg.norm(motion.joints[:, 2, :2], axis=1).min())
     room = _room(rng, motion, view, plan)
@@ -180,108 +176,6 @@ def make(
             "floor known" if plan.floor else "floor not known",
         ]
     )
-
-
-def _clips(data: Path) -> dict[str, tuple[list[Pose], Array]]:
-    """Held-out clips: poses turned as they were captured, and places of the root (F, 3)."""
-    stored = np.load(data / "mocap" / "sequences.npz")
-    names = [str(name) for name in stored["joint_names"]]
-    kept = sorted(set(stored["clip"].tolist()))[poses.HELD_OUT_CLIPS // 2 :: poses.HELD_OUT_CLIPS]
-    found = {}
-    for clip in kept:
-        positions = stored["positions_m"][stored["clip"] == clip] / MILLIMETRE
-        made = poses.from_positions(positions, names)
-        if len(made) < 3 * RATE / 2 or not all(np.isfinite(pose.pelvis).all() for pose in made):
-            continue
-        across = positions[:, names.index("l_hip")] - positions[:, names.index("r_hip")]
-        heading = np.arctan2(-across[:, 0], across[:, 1])
-        turned = [pose.turned(about("z", float(angle))) for pose, angle in zip(made, heading, strict=True)]
-        found[clip] = (turned, positions[:, names.index("root")])
-    return found
-
-
-def _walk(rng: Rng, body: Body, dress: int, clips: dict[str, tuple[list[Pose], Array]]) -> Motion:
-    """A part of a captured clip; in turn to and fro where it is short."""
-    clip = str(rng.choice(sorted(clips)))
-    made, roots = clips[clip]
-    count = min(len(made), int(rng.integers(90, 160)))
-    first = int(rng.integers(len(made) - count + 1))
-    part_of = made[first : first + count]
-    places = roots[first : first + count] * body.stature / 1.75
-    if rng.random() < 0.5:
-        part_of, places = [pose.mirrored() for pose in part_of], places * [1.0, -1.0, 1.0]
-    if count < 90:
-        part_of, places = part_of + part_of[-2::-1], np.concatenate([places, places[-2::-1]])
-    surfaces, joints = [], []
-    for pose, place in zip(part_of, places, strict=True):
-        surface, at = body.posed(pose, np.random.default_rng(dress))
-        surfaces.append(surface + place)
-        joints.append([at[name] + place for name in JOINTS])
-    lowest = np.array([surface[:, 2].min() for surface in surfaces])
-    # Legs of another length would sink into the floor; who jumps stays in the air.
-    lift = np.maximum(-np.median(lowest), -lowest)
-    surfaces = [surface + [0, 0, up] for surface, up in zip(surfaces, lift, strict=True)]
-    return Motion(surfaces, np.array(joints) + lift[:, None, None] * [0, 0, 1.0], f"clip {clip}")
-
-
-def _story(rng: Rng, body: Body, dress: int, still: list[Pose]) -> Motion:
-    """From pose to pose by rule and from motion capture, with the feet at one place; at times on a chair."""
-    kinds = [str(rng.choice(["squat", "bend", "kneel", "lunge", "kick", "captured", "captured", "stand"])) for _ in range(3)]
-    sits = rng.random() < 0.25
-    if sits:
-        kinds = ["sit", "sit", "sit"]
-    turn = rng.normal(0, 0.2, 4)
-    keys = [poses.standing(rng)]
-    for kind in kinds:
-        if kind == "stand":
-            keys.append(poses.standing(rng))
-        elif kind == "captured":
-            keys.append(still[int(rng.integers(len(still)))])
-        else:
-            keys.append(poses._crouch(rng, kind))
-    if sits:  # one seat, of which the arms and the trunk move
-        keys = [keys[1], *(_legs_of(keys[1], key) for key in keys[2:])]
-    keys = [key.turned(about("z", float(angle))) for key, angle in zip(keys, turn, strict=False)]
-    surfaces, joints = [], []
-    seat = None
-    for number, key in enumerate(keys):
-        other = keys[min(number + 1, len(keys) - 1)]
-        rest, move = int(rng.integers(6, 20)), int(rng.integers(18, 38))
-        for step in range(rest + (move if other is not key else 0)):
-            share = max(step - rest, 0) / move
-            pose = _between(key, other, share * share * (3 - 2 * share))
-            surface, at = body.posed(pose, np.random.default_rng(dress))
-            feet = 0.5 * (at["l_ankle"] + at["r_ankle"])
-            shift = -np.array([feet[0], feet[1], surface[:, 2].min()])
-            surfaces.append(surface + shift)
-            joints.append([at[name] + shift for name in JOINTS])
-    if sits:
-        seat = float(joints[0][2][2] - 0.09 * body.stature / 1.7)
-    return Motion(surfaces, np.array(joints), "story " + " ".join(kinds), seat)
-
-
-def _legs_of(pose: Pose, other: Pose) -> Pose:
-    """`other` with pelvis and legs of `pose`."""
-    limbs = other.limbs.copy()
-    limbs[:, 3:] = pose.limbs[:, 3:]
-    return Pose(pose.pelvis, other.chest, other.head, limbs, other.clavicle)
-
-
-def _between(a: Pose, b: Pose, share: float) -> Pose:
-    """A pose on the way from one to another: limbs turn relative to the trunk."""
-
-    def turned(one: Array, other: Array) -> Array:
-        return one @ part(one.T @ other, share)
-
-    pelvis, chest, head = turned(a.pelvis, b.pelvis), turned(a.chest, b.chest), turned(a.head, b.head)
-    limbs = np.zeros((2, 6, 3))
-    for side in range(2):
-        for bone in range(6):
-            which = ("chest", chest) if bone < 3 else ("pelvis", pelvis)
-            one, other = (unit(getattr(p, which[0]).T @ p.limbs[side, bone]) for p in (a, b))
-            limbs[side, bone] = which[1] @ part(shortest(one, other), share) @ one
-    clavicle = np.stack([turned(a.clavicle[k], b.clavicle[k]) for k in range(2)])
-    return Pose(pelvis, chest, head, limbs, clavicle)
 
 
 def _view(
@@ -377,7 +271,13 @@ def _furnished(rng: Rng, motion: Motion, *, hidden: bool) -> list[shapes.Mesh]:
 
 
 def _draw(
-    view: View, points: Array, faces: NDArray[np.int32], label: int, depth: Array, labels: NDArray[np.uint8], closed: bool = True
+    view: View,
+    points: Array,
+    faces: NDArray[np.int32],
+    label: int,
+    depth: Array,
+    labels: NDArray[np.uint8],
+    closed: bool = True,
 ) -> None:
     seen = np.ascontiguousarray((points - view.pose[:3, 3]) @ view.pose[:3, :3])
     raster.draw(seen, faces, label, view.sensor.intrinsics, closed, depth, labels)
@@ -411,7 +311,7 @@ def _noise(rng: Rng, sensor: sensors.Sensor) -> Callable[[Array], Array]:
 
     def stereo(true: Array) -> Array:
         # Disparities with noise that neighbours share, in steps of a sixteenth of a pixel, fattened borders.
-        fat = cv2.erode(true, np.ones((3, 3))) 
+        fat = cv2.erode(true, np.ones((3, 3)))
         near = np.where(rng.random(true.shape) < 0.4, fat, true)
         disparity = matched / near + 0.08 * gain * sensors._smooth(rng, true.shape, grain)
         depth = matched / np.maximum(np.round(disparity * 16) / 16, 1e-3)
@@ -450,7 +350,10 @@ def _radii(body: Body, dress: int) -> dict[str, float]:
 def _write_calibration(out: Path, view: View, root_from_camera: Array, floor_known: bool) -> None:
     fx, fy, cx, cy = view.sensor.intrinsics
     lines = [f"width = {view.sensor.width}", f"height = {view.sensor.height}"]
-    lines += [f"{name} = {value!r}" for name, value in zip(("fx", "fy", "cx", "cy"), map(float, (fx, fy, cx, cy)), strict=True)]
+    lines += [
+        f"{name} = {value!r}"
+        for name, value in zip(("fx", "fy", "cx", "cy"), map(float, (fx, fy, cx, cy)), strict=True)
+    ]
     lines += [f"depth_factor = {MILLIMETRE}", 'sensor_frame = "camera_depth_optical_frame"']
     if floor_known:
         lines += ['root_frame = "base_link"', f"root_from_sensor = {root_from_camera.tolist()}"]
