@@ -47,6 +47,11 @@ impl Claims {
         &self.owners
     }
 
+    /// How many pixels somebody explains.
+    pub(super) fn explained(&self, number: usize) -> usize {
+        self.owners.iter().flatten().filter(|owner| usize::from(**owner) == number).count()
+    }
+
     /// Gives every pixel that is no scene to the body whose surface is nearest, within reach.
     pub(super) fn settle<'a>(
         &mut self,

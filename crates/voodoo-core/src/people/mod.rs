@@ -171,14 +171,19 @@ impl People {
         }
     }
 
-    /// Of two on one body the younger goes; who leaves the region goes, and who is not wanted.
+    /// Of two on one body the one that explains less of it goes, or the younger; who leaves the region goes, and who is not wanted.
     fn part(&mut self) {
         for younger in 0..self.persons.len() {
             let place = self.persons[younger].place;
-            let same = |older: &Person| older.tracked() && older.place.distance(place) < ONE_BODY;
-            let twice = self.persons[younger].tracked() && self.persons[..younger].iter().any(same);
+            for older in 0..younger {
+                let [a, b] = [older, younger].map(|number| &self.persons[number]);
+                if a.tracked() && b.tracked() && a.place.distance(place) < ONE_BODY {
+                    let more = self.claims.explained(younger) > self.claims.explained(older);
+                    self.persons[if more { older } else { younger }].there = false;
+                }
+            }
             let wanted = self.options.allows(place) && self.options.wants(self.persons[younger].id);
-            self.persons[younger].there &= wanted && !twice;
+            self.persons[younger].there &= wanted;
         }
     }
 
