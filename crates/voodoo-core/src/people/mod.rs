@@ -338,8 +338,6 @@ impl People {
 const NEW: f64 = 4.0;
 /// How far a person comes at once and in a second, metres.
 const COMES: [f64; 2] = [0.4, 1.2];
-/// Standard deviation of a detected person's sizes, relative.
-const SIZE_SIGMA: f64 = 0.025;
 /// How unlike the clothes of one person are who is seen twice, and the spread of that.
 const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// What like clothes speak for a person.
@@ -355,7 +353,7 @@ fn came_from(person: &Person, place: Vec3, stamp: f64) -> f64 {
 /// What speaks against a stranger's being this person.
 fn person_cost(person: &Person, stranger: &Stranger, clothes: &Clothes, stamp: f64) -> f64 {
     let far = came_from(person, stranger.place, stamp);
-    let size = 0.5 * (person.unlike(&stranger.detection) / SIZE_SIGMA).powi(2);
+    let size = person.unlike(&stranger.detection);
     let unlike = person.clothes.unlike(clothes);
     let color = unlike.map_or(0.0, |unlike| 0.5 * ((unlike - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
     far + size + color
