@@ -189,3 +189,21 @@ def test_names_that_are_no_stamps_and_files_that_are_gone_are_named(folder):
     (folder / "depth.txt").write_text("1.0 depth/gone.png\n")
     with pytest.raises(RecordingError, match=r"gone\.png"):
         list(open_recording(folder))
+
+
+def test_truth_and_start_beside_the_images_are_read_unless_nothing_beside_is(folder):
+    (folder / "truth.csv").write_text(
+        "stamp_s,l_wrist_x,l_wrist_y,l_wrist_z\n1305031102.16,1.0,2.0,3.0\n1305031103.5,,,\n"
+    )
+    (folder / "init.json").write_text('{"height_m": 1.7, "joints": {"l_wrist": [1.0, 2.0, 3.0]}}')
+    recording = open_recording(folder)
+    assert recording.reference.exact and recording.reference.names == ("l_wrist",)
+    np.testing.assert_array_equal(recording.reference.positions[:, 0], [[1.0, 2.0, 3.0], [np.nan] * 3])
+    assert recording.start == {"height_m": 1.7, "joints": {"l_wrist": (1.0, 2.0, 3.0)}}
+    assert "exact" in recording.info().reference
+    bare = open_recording(folder, bare=True)
+    assert bare.reference is None and bare.start is None
+    (folder / "truth.csv").write_text("nothing\n")
+    open_recording(folder, bare=True)
+    with pytest.raises(RecordingError, match=r"truth\.csv"):
+        open_recording(folder)

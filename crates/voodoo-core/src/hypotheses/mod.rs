@@ -378,7 +378,7 @@ mod tests {
         hypotheses.history[arm + 1].persistence.observe(Some(PATIENCE), false);
         hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
         assert_eq!(known(&hypotheses), 2, "the legs");
-        hypotheses.history[arm + 1].persistence.observe(None);
+        hypotheses.history[arm + 1].persistence.observe(None, false);
         hypotheses.remember(&model, &motion, false, |_| true);
         for (own, chain) in hypotheses.history.iter().zip(&model.extremities) {
             assert_eq!(own.last_good_end, Some(chain.end(&motion.poses) + origin));

@@ -97,6 +97,8 @@ mod tests {
         let tried: Vec<bool> = (0..TIRED + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
         assert!(tried[..TIRED].iter().all(|due| *due));
         assert_eq!(tried[TIRED..].iter().filter(|due| **due).count(), 10);
+        let mut tired = persistence;
+        assert!((0..REST).all(|_| tired.observe(Some(1), true)), "there is something new");
         while !persistence.observe(Some(1), false) {}
         persistence.vote();
         assert!(persistence.observe(Some(1), false) && persistence.vote());

@@ -59,8 +59,6 @@ pub struct Relocalizer {
     belief: Belief,
     /// A detector knows bodies like this one.
     known: bool,
-    /// The floor on which it saw the body that it found, world frame.
-    floor: Option<Ground>,
 }
 
 impl Relocalizer {
@@ -70,7 +68,7 @@ impl Relocalizer {
         self.doubt.restart();
         self.belief = Belief::default();
         self.known = People::know(&model.body);
-        self.floor = None;
+        self.people.keep_floor(false);
         self.motion.clear();
         self.postures.restart(&model.body, poses);
     }
@@ -100,12 +98,12 @@ impl Relocalizer {
     /// The track was started: `itself` where a detector saw somebody, and nobody had said where.
     pub fn take_note_of_start(&mut self, itself: bool) {
         self.doubt.found_itself(itself);
-        self.floor = if itself { self.people.floor() } else { None };
+        self.people.keep_floor(itself);
     }
 
     /// The floor under a body that was found, where nobody tells it; world frame.
     pub fn floor(&self) -> Option<Ground> {
-        self.floor
+        self.people.floor
     }
 
     /// Whether nobody had said where the track starts.

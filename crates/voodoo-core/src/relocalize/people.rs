@@ -22,6 +22,8 @@ pub(super) struct People {
     pixels: Vec<usize>,
     /// Log odds that what stands at the place that was looked at is a person; the surest of all images.
     verdict: Option<f64>,
+    /// The floor on which it stood when it was found, world frame.
+    pub(super) floor: Option<Ground>,
 }
 
 impl People {
@@ -35,8 +37,13 @@ impl People {
         self.seen.as_ref()
     }
 
+    /// Keeps the floor on which what was seen stands, if it was `found` there; else forgets it.
+    pub(super) fn keep_floor(&mut self, found: bool) {
+        self.floor = if found { self.under_feet() } else { None };
+    }
+
     /// The floor on which it stands; a table below which its feet are is none.
-    pub(super) fn floor(&self) -> Option<Ground> {
+    fn under_feet(&self) -> Option<Ground> {
         let seen = self.seen()?;
         let above = |floor: &Ground, name| Some(floor.normal.dot(seen.joint(name)?.position) - floor.offset);
         seen.floor.filter(|floor| {
@@ -128,4 +135,31 @@ pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
 /// Positions of a body's sites.
 fn positions(body: &Body, joints: &[Vec3]) -> Vec<(usize, Vec3)> {
     JOINTS.iter().zip(joints).filter_map(|(name, position)| Some((body.site_index(name).ok()?, *position))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::DetectedJoint;
+
+    #[test]
+    fn a_plane_under_the_feet_is_the_floor_and_a_table_above_them_is_none() {
+        let floor_at = |offset: f64, ankle: f64| {
+            let joint = |name: &&str| {
+                let z = if name.ends_with("ankle") { ankle } else { 1.0 };
+                DetectedJoint { position: Vec3::new(2.0, 0.0, z), sigma: 0.05, visible: 1.0 }
+            };
+            let ground = Ground { normal: Vec3::Z, offset };
+            let joints = JOINTS.iter().map(joint).collect();
+            let seen = Some(Detection { joints, floor: Some(ground), ..Detection::default() });
+            let mut people = People { seen, ..People::default() };
+            people.keep_floor(true);
+            let kept = people.floor.is_some();
+            people.keep_floor(false);
+            assert_eq!(people.floor, None);
+            kept
+        };
+        assert!(floor_at(0.0, 0.08) && floor_at(-0.3, -0.25));
+        assert!(!floor_at(0.7, 0.08) && !floor_at(0.0, 0.6));
+    }
 }

@@ -21,3 +21,39 @@ impl Propose for DetectedBody<'_> {
         pool.body.set(Basis::Body);
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::fit::{Context, Fit};
+    use crate::math::Vec3;
+    use crate::testing::{before_wall, farthest, moved, standing, with_context, without_background};
+
+    #[test]
+    fn of_a_leg_in_doubt_the_whole_body_is_proposed_in_the_frame_of_now_and_of_an_arm_it_is_not() {
+        let (model, poses) = standing();
+        let (pixels, config, origin) =
+            (before_wall(&model.body, &poses), without_background(), Vec3::new(2.0, -1.0, 0.5));
+        let seen_at = moved(&poses, 0.1 * Vec3::X + origin);
+        with_context(&pixels, &config, &model, &poses, |context| {
+            let mut seen = context.seen;
+            seen.views.origin = origin;
+            let fit = Fit::new(&config).unwrap();
+            let proposed = |leg: bool, detected: &[Pose]| {
+                let index = model.extremities.iter().position(|chain| chain.leg == leg).unwrap();
+                let context = Context { seen, ..context };
+                let at = Extremity { context, matched: fit.matched(&poses), regions: None, index };
+                let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
+                DetectedBody(detected).propose(at, &[], &mut rough, &mut pool);
+                let found: Vec<_> = pool.found().map(|proposal| proposal.poses.clone()).collect();
+                found
+            };
+            let found = proposed(true, &seen_at);
+            assert_eq!(found.len(), 1);
+            assert!(farthest(&found[0], &moved(&poses, 0.1 * Vec3::X)) < 1e-12);
+            assert!(proposed(false, &seen_at).is_empty());
+            assert!(proposed(true, &[]).is_empty(), "nobody looked");
+        });
+    }
+}
