@@ -223,8 +223,11 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2, help="processes (default 2)")
     options = parser.parse_args()
     paths = find_recordings(options.recordings)
-    with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-        results = list(pool.map(run, paths, [options.init] * len(paths)))
+    if options.jobs == 1:
+        results = [run(path, options.init) for path in paths]
+    else:
+        with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
+            results = list(pool.map(run, paths, [options.init] * len(paths)))
     heads = "start: frame | error, cm | mean, cm | exchanged: first, later | lost at the end | class | lengths, cm | girths, cm"
     print(f"| recording | {heads} |")
     print("|---|---|---|---|---|---|---|---|---|")
