@@ -132,6 +132,16 @@ pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
     body.fit(&positions(body, &joints), false).ok().map(|(_, poses)| poses)
 }
 
+/// Whether a body has the sizes of a detected person, each within so many of its standard deviations.
+pub(super) fn is_sized_like(body: &Body, detection: &Detection, sigmas: f64) -> bool {
+    let rest = body.rest_pose(Pose::identity());
+    let joints: Option<Vec<Vec3>> =
+        JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
+    let own = joints.map_or_else(Vec::new, |joints| lengths(&joints));
+    let like = |(own, [length, sigma]): (&f64, &[f64; 2])| (own / length).ln().abs() <= sigmas * sigma;
+    own.iter().zip(&detection.lengths).all(like)
+}
+
 /// Positions of a body's sites.
 fn positions(body: &Body, joints: &[Vec3]) -> Vec<(usize, Vec3)> {
     JOINTS.iter().zip(joints).filter_map(|(name, position)| Some((body.site_index(name).ok()?, *position))).collect()
