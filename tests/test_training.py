@@ -10,11 +10,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 torch = pytest.importorskip("torch", reason="the extra `training` is not installed")
 pytest.importorskip("numba", reason="the extra `training` is not installed")
 
-from training import crops, data, export, train  # noqa: E402
+from training import crops, data, export, train, unseen  # noqa: E402
 from training.bodies import JOINTS, Bodies  # noqa: E402
 from training.loader import SWAP, Store, augment  # noqa: E402
 from training.poses import load, standing  # noqa: E402
 from training.scenes import Scenes  # noqa: E402
+
+import voodoo  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +87,23 @@ def test_a_toy_learns_and_its_weights_come_back(store, tmp_path):
     assert (a.joints - b.joints).abs().max() < 0.01
     for name in ("visible", "facing", "person", "scale", "length"):
         assert (getattr(a, name) - getattr(b, name)).abs().max() < 0.05, name
+
+
+def test_a_recording_that_nothing_was_tuned_on_has_its_joints_inside_what_the_camera_sees(
+    voodoo_data, tmp_path, monkeypatch
+):
+    command = ["unseen", str(tmp_path), "--data", str(voodoo_data), "--count", "1", "--seed", "3"]
+    monkeypatch.setattr(sys, "argv", command)
+    unseen.main()
+    recording = voodoo.open_recording(next((tmp_path / "look").iterdir()))
+    reference, inside = recording.reference, []
+    assert reference is not None and reference.exact and len(reference.stamps) == len(recording) >= 60
+    for frame in recording:
+        image = frame.measurements[0]
+        pose, camera = np.asarray(image.root_from_sensor), image.camera
+        truth = reference.positions[np.argmin(np.abs(reference.stamps - frame.stamp))]
+        at = (truth[reference.names.index("humanoid_root")] - pose[:3, 3]) @ pose[:3, :3]
+        u, v = round(camera.fx * at[0] / at[2] + camera.cx), round(camera.fy * at[1] / at[2] + camera.cy)
+        if 0 <= u < camera.width and 0 <= v < camera.height and image.image[v, u]:
+            inside.append(at[2] - image.image[v, u] * image.metres_per_unit)
+    assert len(inside) > 30 and -0.1 < np.median(inside) < 1.5  # hidden by furniture at most

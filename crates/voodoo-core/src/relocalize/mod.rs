@@ -126,6 +126,11 @@ impl Relocalizer {
         people::sized(model, detection)
     }
 
+    /// The pose in which a detector saw this body in this frame, world frame.
+    pub fn shown(&self, body: &Body) -> Option<Vec<Pose>> {
+        people::posed(body, self.people.seen()?)
+    }
+
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
     /// was not where it should be in the frame before, or the body `lost`.
     pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {

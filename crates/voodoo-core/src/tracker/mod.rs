@@ -210,7 +210,7 @@ impl Tracker {
             }
         }
         if config.hypotheses && schedule.whole_body && known {
-            let detected = relocalizer.posed(&model.body).unwrap_or_default();
+            let detected = relocalizer.shown(&model.body).unwrap_or_default();
             steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection(), &detected);
         }
         // Sizes that follow what this frame shows.
