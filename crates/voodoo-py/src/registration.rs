@@ -4,7 +4,9 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use voodoo_core::error::TrackError;
 use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
+use voodoo_core::observation::still::still;
 
 use crate::errors::{IntoPy, exception};
 
@@ -49,11 +51,12 @@ pub fn points_within<'py>(
 
 type Image<'py, T> = Bound<'py, PyArray2<T>>;
 type Splatted<'py> =
-    (Image<'py, u8>, Option<Image<'py, u8>>, Bound<'py, PyArray1<isize>>, (usize, usize), Image<'py, f32>);
+    (Image<'py, u8>, Option<Image<'py, u8>>, Bound<'py, PyArray1<isize>>, (usize, usize), Image<'py, bool>);
 
-/// Where points are in a picture: all of them, the marked ones, which are inside, and the least depths from a corner on.
+/// Where points are in a picture: all of them, the marked ones, which are inside, and edges of surfaces from a corner on.
 #[pyfunction]
-#[pyo3(signature = (pixels, points, marks, *, height, width))]
+#[pyo3(signature = (pixels, points, marks, *, height, width, reach))]
+#[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn splat<'py>(
     py: Python<'py>,
     pixels: PyReadonlyArray2<'py, f64>,
@@ -61,13 +64,19 @@ pub fn splat<'py>(
     marks: Option<PyReadonlyArray1<'py, bool>>,
     height: usize,
     width: usize,
+    reach: usize,
 ) -> PyResult<Splatted<'py>> {
     columns(py, "pixels", &pixels, 2)?;
     columns(py, "points", &points, 3)?;
     let (places, points) = (pixels.as_slice()?.as_chunks().0, points.as_slice()?.as_chunks().0);
     let marks = marks.as_ref().map(|marks| marks.as_slice()).transpose()?;
-    let found = py.detach(|| ProjectedPoints::new(places, points, marks, [height, width]));
-    let ProjectedPoints { seen, marked, inside, rows, columns, nearest } = found.map_err(|error| error.into_py(py))?;
+    let found = py.detach(|| {
+        let found = ProjectedPoints::new(places, points, marks, [height, width])?;
+        let edges = found.behind_edges(reach);
+        Ok((found, edges))
+    });
+    let (ProjectedPoints { seen, marked, inside, rows, columns, .. }, edges) =
+        found.map_err(|error: TrackError| error.into_py(py))?;
     let marked = match marks {
         Some(_) => Some(PyArray1::from_vec(py, marked).reshape([height, width])?),
         None => None,
@@ -77,7 +86,7 @@ pub fn splat<'py>(
         marked,
         PyArray1::from_vec(py, inside),
         (rows.start, columns.start),
-        PyArray1::from_vec(py, nearest).reshape([rows.len(), columns.len()])?,
+        PyArray1::from_vec(py, edges).reshape([rows.len(), columns.len()])?,
     ))
 }
 
@@ -98,6 +107,42 @@ pub fn nearest_surface<'py>(
     let among = among.as_ref().map(|marks| marks.as_slice()).transpose()?;
     let measured = MeasuredPixels { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
     measured.nearest_surface(pixel, radius, among).map_err(|error| error.into_py(py))
+}
+
+/// Depth of the nearest surface around each of some places in a picture and whether most of it is still; none with too few points.
+#[pyfunction]
+#[pyo3(signature = (pixels, depths, still, *, labels, places, radius))]
+pub fn nearest_surfaces<'py>(
+    py: Python<'py>,
+    pixels: PyReadonlyArray2<'py, f64>,
+    depths: PyReadonlyArray1<'py, f64>,
+    still: Option<PyReadonlyArray1<'py, bool>>,
+    labels: PyReadonlyArray2<'py, i32>,
+    places: Vec<([f64; 2], i32)>,
+    radius: f64,
+) -> PyResult<Vec<Option<(f64, bool)>>> {
+    columns(py, "pixels", &pixels, 2)?;
+    let still = still.as_ref().map(|marks| marks.as_slice()).transpose()?;
+    let measured = MeasuredPixels { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
+    let (image, size) = (labels.as_slice()?, labels.dims());
+    let image = (image, [size[0], size[1]]);
+    py.detach(|| measured.nearest_surfaces(image, &places, radius)).map_err(|error| error.into_py(py))
+}
+
+type Marks<'py> = Bound<'py, PyArray2<bool>>;
+
+/// Where a depth image shows what may be the scene, and where something before what was seen there once.
+#[pyfunction]
+pub fn still_scene<'py>(
+    py: Python<'py>,
+    now: PyReadonlyArray2<'py, f32>,
+    farthest: PyReadonlyArray2<'py, f32>,
+    then: PyReadonlyArray2<'py, f32>,
+) -> PyResult<(Marks<'py>, Marks<'py>)> {
+    let size = now.dims();
+    let (now, farthest, then) = (now.as_slice()?, farthest.as_slice()?, then.as_slice()?);
+    let (stays, before) = py.detach(|| still(now, farthest, then, size[1])).map_err(|error| error.into_py(py))?;
+    Ok((PyArray1::from_vec(py, stays).reshape(size)?, PyArray1::from_vec(py, before).reshape(size)?))
 }
 
 fn columns(py: Python<'_>, name: &str, array: &PyReadonlyArray2<'_, f64>, count: usize) -> PyResult<()> {
