@@ -15,7 +15,7 @@ const ELSEWHERE: f64 = 0.15;
 /// The same of arms.
 const ARMS_ELSEWHERE: f64 = 0.10;
 /// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
-const SIGMAS: f64 = 3.5;
+pub(super) const SIGMAS: f64 = 3.5;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
 /// A body that has been lost for so long is gone, seconds.

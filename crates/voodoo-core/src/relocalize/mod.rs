@@ -26,7 +26,7 @@ use crate::observation::segments::{Segment, Segments};
 use crate::observation::share::Share;
 use belief::Belief;
 pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
-use doubt::Doubt;
+use doubt::{Doubt, SIGMAS};
 use facing::Known;
 use people::People;
 pub(crate) use people::sized;
@@ -109,9 +109,14 @@ impl Relocalizer {
         self.doubt.young(stamp)
     }
 
-    /// The pose of a body that fits best what a detector saw in this frame, world frame.
-    pub fn posed(&self, body: &Body) -> Option<Vec<Pose>> {
-        people::posed(body, self.people.seen()?)
+    /// The pose of a body that fits best what a detector saw in this frame, world frame; the body is that of a start, or has the
+    /// sizes that the detector saw where they are surely others.
+    pub fn posed(&self, model: &Model, set: &Body) -> Option<(Body, Vec<Pose>)> {
+        let detection = self.people.seen()?;
+        if people::is_sized_like(set, detection, SIGMAS) {
+            return Some((set.clone(), people::posed(set, detection)?));
+        }
+        people::sized(model, detection)
     }
 
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
@@ -130,6 +135,7 @@ impl Relocalizer {
     pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
         if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
+            self.people.leave_out_beyond(root, SAME_PERSON);
         } else {
             self.people.forget();
         }

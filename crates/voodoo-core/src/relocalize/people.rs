@@ -47,6 +47,14 @@ impl People {
         (self.seen, self.verdict) = (None, None);
     }
 
+    /// Forgets who was seen farther than this from a place, metres: somebody else.
+    pub(super) fn leave_out_beyond(&mut self, place: Vec3, distance: f64) {
+        let near = |seen: &Detection| {
+            seen.joint("humanoid_root").is_some_and(|root| root.position.distance(place) <= distance)
+        };
+        self.seen = self.seen.take().filter(near);
+    }
+
     /// Looks at all depth images of a frame, or at its share of them; keeps and returns the surest person.
     pub(super) fn look(&mut self, frame: &Frame, share: Option<Share>, wanted: Wanted) -> Option<&Detection> {
         self.forget();
@@ -100,6 +108,16 @@ pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
         JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
     take_lengths(&mut joints, &lengths(&own?));
     body.fit(&positions(body, &joints), false).ok().map(|(_, poses)| poses)
+}
+
+/// Whether a body has the sizes of a detected person, each within so many of its standard deviations.
+pub(super) fn is_sized_like(body: &Body, detection: &Detection, sigmas: f64) -> bool {
+    let rest = body.rest_pose(Pose::identity());
+    let joints: Option<Vec<Vec3>> =
+        JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
+    let own = joints.map_or_else(Vec::new, |joints| lengths(&joints));
+    let like = |(own, [length, sigma]): (&f64, &[f64; 2])| (own / length).ln().abs() <= sigmas * sigma;
+    own.iter().zip(&detection.lengths).all(like)
 }
 
 /// Positions of a body's sites.

@@ -125,10 +125,10 @@ impl Tracker {
         relocalizer.forget();
     }
 
-    /// Starts anew where a detector sees the body, in the sizes it was set in; whether it could.
+    /// Starts anew where a detector sees the body, in the sizes it was set in or clearly has; whether it could.
     fn restart_at_detection(&mut self) -> bool {
-        let body = self.sizes.as_set().unwrap_or(&self.model.body).clone();
-        let Some(poses) = self.relocalizer.posed(&body) else { return false };
+        let set = self.sizes.as_set().unwrap_or(&self.model.body);
+        let Some((body, poses)) = self.relocalizer.posed(&self.model, set) else { return false };
         let (known, itself) = (self.sizes.known(), self.relocalizer.found_itself());
         self.restart(body, poses, !known);
         self.relocalizer.take_note_of_start(itself);
