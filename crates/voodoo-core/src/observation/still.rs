@@ -17,7 +17,8 @@ const STAYS: [f32; 2] = [0.02, 0.015];
 /// # Errors
 /// [`TrackError::Measurement`] when the images are not of one size.
 pub fn still(now: &[f32], farthest: &[f32], then: &[f32], width: usize) -> Result<(Vec<bool>, Vec<bool>), TrackError> {
-    if [farthest.len(), then.len()] != [now.len(); 2] || !now.len().is_multiple_of(width.max(1)) {
+    let whole = if width > 0 { now.len().is_multiple_of(width) } else { now.is_empty() };
+    if [farthest.len(), then.len()] != [now.len(); 2] || !whole {
         let found = format!("{}, {} and {} pixels in rows of {width}", now.len(), farthest.len(), then.len());
         return Err(TrackError::measurement("depth", "images of one size", found));
     }
