@@ -69,19 +69,16 @@ def test_points_fall_into_pixels_and_the_nearest_counts():
     pixels = np.array([[2.4, 1.0], [1.6, 0.6], [5.0, 3.0], [np.nan, 1.0], [-0.6, 1.0], [7.6, 2.0], [-0.4, 2.5]])
     points = np.column_stack([np.zeros((7, 2)), [2.0, 1.5, 3.0, 1.0, 1.0, 1.0, 4.0]])
     marks = np.array([False, False, True, True, True, True, False])
-    seen, marked, inside, corner, edges = _core.splat(pixels, points, marks, height=4, width=8, reach=1)
+    seen, marked, inside, corner, nearest = _core.splat(pixels, points, marks, height=4, width=8)
     assert inside.tolist() == [0, 1, 2, 6]
     assert np.argwhere(seen).tolist() == [[1, 2], [2, 0], [3, 5]]
     assert np.argwhere(marked).tolist() == [[3, 5]]
-    # A half goes to the even pixel; of the two at (1, 2) the nearer one counts, and each reaches a pixel far.
-    far = np.inf
-    depth = np.array([[4, 1.5, 1.5, 1.5, far, far], [4, 1.5, 1.5, 1.5, 3, 3], [4, 4, far, far, 3, 3]])
+    expected = np.full((4, 8), np.inf, np.float32)
+    expected[1, 2], expected[2, 0], expected[3, 5] = 1.5, 4.0, 3.0  # a half goes to the even pixel
     assert corner == (1, 0)
-    around = np.pad(depth, 1, constant_values=np.inf)
-    least = np.min([around[v : v + 3, u : u + 6] for v in range(3) for u in range(3)], axis=0)
-    np.testing.assert_array_equal(edges, np.isfinite(depth) & (depth > least + 0.1))
-    assert _core.splat(pixels, points, None, height=4, width=8, reach=1)[1] is None
-    nothing = _core.splat(np.full((2, 2), np.nan), np.ones((2, 3)), None, height=4, width=8, reach=1)
+    np.testing.assert_array_equal(nearest, expected[1:, :6])
+    assert _core.splat(pixels, points, None, height=4, width=8)[1] is None
+    nothing = _core.splat(np.full((2, 2), np.nan), np.ones((2, 3)), None, height=4, width=8)
     assert not nothing[0].any() and nothing[4].size == 0
 
 
@@ -147,10 +144,10 @@ def test_bins_are_those_of_opencv():
 def test_arrays_that_do_not_belong_together_are_refused():
     pixels, points = np.zeros((4, 2)), np.zeros((4, 3))
     with pytest.raises(MeasurementError, match="points: expected"):
-        _core.splat(pixels, points[:3], None, height=4, width=8, reach=1)
+        _core.splat(pixels, points[:3], None, height=4, width=8)
     with pytest.raises(MeasurementError, match="marks"):
-        _core.splat(pixels, points, np.zeros(3, bool), height=4, width=8, reach=1)
+        _core.splat(pixels, points, np.zeros(3, bool), height=4, width=8)
     with pytest.raises(MeasurementError, match=r"pixels: expected shape \(N, 2\), found \(4, 3\)"):
-        _core.splat(points, points, None, height=4, width=8, reach=1)
+        _core.splat(points, points, None, height=4, width=8)
     with pytest.raises(MeasurementError, match="depths: expected"):
         _core.nearest_surface(pixels, np.zeros(3), None, pixel=(0.0, 0.0), radius=1.0)

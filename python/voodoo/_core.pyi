@@ -129,26 +129,24 @@ def splat(
     *,
     height: int,
     width: int,
-    reach: int,
 ) -> tuple[
     npt.NDArray[np.uint8],
     npt.NDArray[np.uint8] | None,
     npt.NDArray[np.intp],
     tuple[int, int],
-    npt.NDArray[np.bool_],
+    npt.NDArray[np.float32],
 ]:
-    """Where points are in a picture, and where in it one surface ends before another.
+    """Where points are in a picture.
 
     Args:
         pixels: (N, 2) where they are, NaN = nowhere.
         points: (N, 3) in the camera's frame [m].
         marks: (N,) of some of them.
         height, width: of the picture.
-        reach: from a point a surface reaches so many pixels, where it shows no other point.
 
     Returns:
         (height, width) 1 where points are; the same of the marked ones; which lie in the picture; and, from the pixel (row,
-        column) on, True in a line on the far side of the edges between surfaces.
+        column) on, the depth of the nearest one in each, infinite where none is.
 
     Raises:
         MeasurementError: other shapes.

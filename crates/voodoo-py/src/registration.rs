@@ -4,7 +4,6 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use voodoo_core::error::TrackError;
 use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
 use voodoo_core::observation::still::still;
 
@@ -51,12 +50,11 @@ pub fn points_within<'py>(
 
 type Image<'py, T> = Bound<'py, PyArray2<T>>;
 type Splatted<'py> =
-    (Image<'py, u8>, Option<Image<'py, u8>>, Bound<'py, PyArray1<isize>>, (usize, usize), Image<'py, bool>);
+    (Image<'py, u8>, Option<Image<'py, u8>>, Bound<'py, PyArray1<isize>>, (usize, usize), Image<'py, f32>);
 
-/// Where points are in a picture: all of them, the marked ones, which are inside, and edges of surfaces from a corner on.
+/// Where points are in a picture: all of them, the marked ones, which are inside, and the least depths from a corner on.
 #[pyfunction]
-#[pyo3(signature = (pixels, points, marks, *, height, width, reach))]
-#[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+#[pyo3(signature = (pixels, points, marks, *, height, width))]
 pub fn splat<'py>(
     py: Python<'py>,
     pixels: PyReadonlyArray2<'py, f64>,
@@ -64,19 +62,13 @@ pub fn splat<'py>(
     marks: Option<PyReadonlyArray1<'py, bool>>,
     height: usize,
     width: usize,
-    reach: usize,
 ) -> PyResult<Splatted<'py>> {
     columns(py, "pixels", &pixels, 2)?;
     columns(py, "points", &points, 3)?;
     let (places, points) = (pixels.as_slice()?.as_chunks().0, points.as_slice()?.as_chunks().0);
     let marks = marks.as_ref().map(|marks| marks.as_slice()).transpose()?;
-    let found = py.detach(|| {
-        let found = ProjectedPoints::new(places, points, marks, [height, width])?;
-        let edges = found.behind_edges(reach);
-        Ok((found, edges))
-    });
-    let (ProjectedPoints { seen, marked, inside, rows, columns, .. }, edges) =
-        found.map_err(|error: TrackError| error.into_py(py))?;
+    let found = py.detach(|| ProjectedPoints::new(places, points, marks, [height, width]));
+    let ProjectedPoints { seen, marked, inside, rows, columns, nearest } = found.map_err(|error| error.into_py(py))?;
     let marked = match marks {
         Some(_) => Some(PyArray1::from_vec(py, marked).reshape([height, width])?),
         None => None,
@@ -86,7 +78,7 @@ pub fn splat<'py>(
         marked,
         PyArray1::from_vec(py, inside),
         (rows.start, columns.start),
-        PyArray1::from_vec(py, edges).reshape([rows.len(), columns.len()])?,
+        PyArray1::from_vec(py, nearest).reshape([rows.len(), columns.len()])?,
     ))
 }
 

@@ -13,7 +13,6 @@ pub mod chroma;
 pub(crate) mod clusters;
 pub mod depth_view;
 pub mod frame;
-mod least;
 pub mod observer;
 pub mod picture;
 pub(crate) mod pixels;

@@ -2,12 +2,7 @@
 
 use std::ops::Range;
 
-use super::least::least_around;
 use crate::error::TrackError;
-use crate::math::widest;
-
-/// Surfaces that differ by more than this in depth do not touch, metres.
-const UNCONNECTED: f32 = 0.10;
 
 /// Part of a depth image (metres, along the optical axis) in which the body is expected.
 #[derive(Clone, Debug)]
@@ -163,29 +158,6 @@ impl ProjectedPoints {
     }
 }
 
-impl ProjectedPoints {
-    /// Of the rows and columns that hold points, row by row: whether a pixel is in a line on the far side of an edge between
-    /// surfaces. What shows no point is taken for the nearest of the surfaces around it, as far as `reach` pixels away.
-    pub fn behind_edges(&self, reach: usize) -> Vec<bool> {
-        let width = self.columns.len();
-        let (mut depths, mut least, mut row) = (self.nearest.clone(), vec![0.0; self.nearest.len()], vec![0.0; width]);
-        widest(
-            #[inline(always)]
-            || {
-                for _ in 0..reach {
-                    least_around(&depths, width, &mut row, &mut least);
-                    for (depth, least) in depths.iter_mut().zip(&least) {
-                        *depth = if *depth < f32::INFINITY { *depth } else { *least };
-                    }
-                }
-                least_around(&depths, width, &mut row, &mut least);
-                let behind = |(depth, least): (&f32, &f32)| (*depth < f32::INFINITY) & (*depth > *least + UNCONNECTED);
-                depths.iter().zip(&least).map(behind).collect()
-            },
-        )
-    }
-}
-
 /// Places of a picture, and what was measured there.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasuredPixels<'a> {
@@ -270,35 +242,5 @@ impl MeasuredPixels<'_> {
         near.retain(|index| (self.depths[*index] - fifth).abs() < ONE_SURFACE);
         let still = self.still.map_or(0, |still| near.iter().filter(|index| still[**index]).count());
         Ok(near.get(near.len() / 2).map(|middle| (self.depths[*middle], 2 * still > near.len())))
-    }
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_line_behind_an_edge_runs_between_surfaces_that_are_apart_and_nowhere_else() {
-        // A hand at 1 m before a table at 2 m, and beside it one at 1.05 m: every second pixel shows a point.
-        let depth = |u: usize| [1.0, 2.0, 1.0, 1.05][u / 10];
-        let (mut places, mut points) = (Vec::new(), Vec::new());
-        for v in (0..20).step_by(2) {
-            for u in (0..40).step_by(2) {
-                places.push([u as f64 + 3.0, v as f64 + 5.0]);
-                points.push([0.0, 0.0, depth(u)]);
-            }
-        }
-        let found = ProjectedPoints::new(&places, &points, None, [100, 100]).unwrap();
-        let edges = found.behind_edges(2);
-        assert_eq!((found.rows.clone(), found.columns.clone()), (5..24, 3..42));
-        for v in 0..19 {
-            let columns: Vec<usize> = (0..39).filter(|u| edges[v * 39 + u]).collect();
-            assert_eq!(columns, [10, 18], "row {v}");
-        }
-        // Without a way across the gaps nothing touches.
-        assert!(found.behind_edges(0).iter().all(|edge| !edge));
-        let nothing = ProjectedPoints::new(&[], &[], None, [10, 10]).unwrap();
-        assert!(nothing.behind_edges(3).is_empty());
     }
 }
