@@ -1,5 +1,6 @@
 """A depth camera's points in the picture of a camera beside it: the compiled functions against plain NumPy."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -98,6 +99,46 @@ def test_the_nearest_surface_around_a_place():
         2, abs=0.1
     )
     assert _core.nearest_surface(pixels, depths, None, pixel=(90.0, 20.0), radius=8.0) is None
+
+
+def test_each_place_is_looked_at_among_the_points_of_its_region():
+    chance = np.random.default_rng(6)
+    pixels = np.vstack([chance.uniform(0.0, 40.0, (600, 2)), [[np.nan, 3.0], [-5.0, 3.0], [3.0, 99.0]]])
+    depths = np.where(pixels[:, 0] < 20.0, 2.0, 3.0)
+    labels = np.zeros((41, 41), np.int32)
+    labels[:, 20:] = 7
+    u, v = np.rint(np.nan_to_num(pixels, nan=-1.0)).astype(int).T
+    inside = (u >= 0) & (v >= 0) & (u < 41) & (v < 41)
+    of = np.where(inside, labels[v * inside, u * inside], -1)
+    places = [((20.0, 20.0), 7), ((20.0, 20.0), 0), ((20.0, 20.0), 5), ((90.0, 90.0), 7)]
+    found = _core.nearest_surfaces(pixels, depths, None, labels=labels, places=places, radius=8.0)
+    alone = [
+        _core.nearest_surface(pixels, depths, None, pixel=place, radius=8.0, among=of == region)
+        for place, region in places
+    ]
+    assert found == alone == [(3.0, False), (2.0, False), (2.0, False), None]
+    with pytest.raises(MeasurementError, match="depths: expected"):
+        _core.nearest_surfaces(pixels, depths[1:], None, labels=labels, places=places, radius=8.0)
+
+
+def test_bins_are_those_of_opencv():
+    chance = np.random.default_rng(7)
+    image = chance.integers(0, 256, (90, 70, 3), dtype=np.uint8)
+    image[:20] //= 8
+    luma, cr, cb = (plane.astype(int) for plane in cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)))
+    bins = _core.color_bins(image)
+    number = (cr >> 2) * 512 + (cb >> 2) * 8 + (luma >> 5)
+    np.testing.assert_array_equal(bins, number + 32768 * (luma < 30))
+    table, mask = chance.random(32768) < 0.3, (chance.random((90, 70)) < 0.5).astype(np.uint8)
+    np.testing.assert_array_equal(_core.bins_among(bins, table), table[number] & (luma >= 30))
+    counts = np.bincount(number[mask > 0], minlength=32768)
+    np.testing.assert_array_equal(_core.bin_counts(bins, mask), counts)
+    with pytest.raises(MeasurementError, match="table: expected"):
+        _core.bins_among(bins, table[1:])
+    with pytest.raises(MeasurementError, match="mask: expected"):
+        _core.bin_counts(bins, mask[1:])
+    with pytest.raises(MeasurementError, match="image: expected shape"):
+        _core.color_bins(np.zeros((4, 4, 4), np.uint8))
 
 
 def test_arrays_that_do_not_belong_together_are_refused():

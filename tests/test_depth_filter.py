@@ -44,8 +44,8 @@ def test_body_view_is_where_the_body_is():
         joints=joints,
     )
     mask = view.mask
-    assert view.look_at((140.0, 120.0), 8.0) == (pytest.approx(Z), False)
-    assert view.look_at((300.0, 120.0), 8.0) is None
+    places = [((140.0, 120.0), 1), ((300.0, 120.0), 1)]
+    assert view.look_at(np.zeros((240, 320), np.int32), places, 8.0) == [(pytest.approx(Z), False), None]
     assert mask.shape == (240, 320)
     assert mask[62:178, 122:158].all()
     assert not mask[:, :110].any() and not mask[:, 175:].any()

@@ -22,12 +22,17 @@ __all__ = [
     "View",
     "__version__",
     "_estimate",
+    "bin_counts",
+    "bins_among",
+    "color_bins",
     "config_fields",
     "nearest_surface",
+    "nearest_surfaces",
     "person_candidates",
     "points_within",
     "render_depth",
     "splat",
+    "still_scene",
 ]
 
 __version__: str
@@ -89,6 +94,34 @@ def points_within(
         MeasurementError: sizes that do not fit together.
     """
 
+def color_bins(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint16]:
+    """The bin of each pixel's colour in a histogram of 64 x 64 x 8 of Cr, Cb and Y, row by row; 32768 more where it is too
+    dark to have a colour.
+
+    Args:
+        image: (H, W, 3) BGR.
+
+    Returns:
+        (H, W).
+
+    Raises:
+        MeasurementError: another shape.
+    """
+
+def bins_among(bins: npt.NDArray[np.uint16], table: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    """(H, W): 1 where a pixel is light enough and its bin is one of those that a table (32768,) names.
+
+    Raises:
+        MeasurementError: a table of another size.
+    """
+
+def bin_counts(bins: npt.NDArray[np.uint16], mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
+    """How many pixels of a mask (H, W), where it is not 0, are of each bin (32768,).
+
+    Raises:
+        MeasurementError: a mask of another size.
+    """
+
 def splat(
     pixels: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
@@ -117,6 +150,40 @@ def splat(
 
     Raises:
         MeasurementError: other shapes.
+    """
+
+def still_scene(
+    now: npt.NDArray[np.float32], farthest: npt.NDArray[np.float32], then: npt.NDArray[np.float32]
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """(H, W): where a depth image shows what may be the still scene; (H, W): where something before what was seen there once.
+
+    Args:
+        now: (H, W) [m], 0 = no return.
+        farthest: (H, W) the farthest that was ever seen [m].
+        then: (H, W) an image some pictures ago [m].
+
+    Raises:
+        MeasurementError: images of different sizes.
+    """
+
+def nearest_surfaces(
+    pixels: npt.NDArray[np.float64],
+    depths: npt.NDArray[np.float64],
+    still: npt.NDArray[np.bool_] | None,
+    *,
+    labels: npt.NDArray[np.int32],
+    places: Sequence[tuple[tuple[float, float], int]],
+    radius: float,
+) -> list[tuple[float, bool] | None]:
+    """`nearest_surface` of each of some places in an image, among the points in its region if there are enough.
+
+    Args:
+        pixels, depths, still, radius: as of `nearest_surface`.
+        labels: (H, W) numbers of regions.
+        places: (u, v) and the number of its region, each.
+
+    Raises:
+        MeasurementError: arrays that do not belong together.
     """
 
 def nearest_surface(

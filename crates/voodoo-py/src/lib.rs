@@ -8,6 +8,7 @@ mod arguments;
 mod arrays;
 mod body;
 mod borrowed;
+mod chroma;
 mod config;
 mod detect;
 mod errors;
@@ -28,6 +29,8 @@ mod _core {
     #[pymodule_export]
     use super::body::PyBody;
     #[pymodule_export]
+    use super::chroma::{bin_counts, bins_among, color_bins};
+    #[pymodule_export]
     use super::config::config_fields;
     #[pymodule_export]
     use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
@@ -42,7 +45,7 @@ mod _core {
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
-    use super::registration::{nearest_surface, points_within, splat};
+    use super::registration::{nearest_surface, nearest_surfaces, points_within, splat, still_scene};
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]

@@ -164,7 +164,8 @@ class Camera:
             raise CameraError(f"points: expected shape (N, 3), found {short(points_cam)}") from None
         if points.ndim != 2 or points.shape[1] != 3:
             raise CameraError(f"points: expected shape (N, 3), found {points.shape}")
-        if np.isfinite(points).all() and (points[:, 2] > 0.0).all():
+        # What is not finite anywhere is not in the sum.
+        if not len(points) or (points[:, 2].min() > 0.0 and math.isfinite(points.sum())):
             return self._seen(points)
         pixels = np.full((len(points), 2), np.nan)
         front = np.isfinite(points).all(axis=1) & (points[:, 2] > 0.0)

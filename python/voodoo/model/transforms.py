@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import struct
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -22,22 +26,26 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
         pose = as_numbers(value)
     except (TypeError, ValueError, OverflowError):
         pose = np.empty(0)
-    if pose.shape != (4, 4) or not np.isfinite(pose).all() or not _turns_and_shifts(pose.tolist()):
+    if pose.shape != (4, 4) or not _turns_and_shifts(pose.tobytes()):
         raise MeasurementError(f"{name}: expected a rigid 4x4 transform, found {value!r}")
     return pose
 
 
-def _turns_and_shifts(rows: list[list[float]]) -> bool:
-    # Sixteen numbers are faster without arrays.
-    x, y, z, last = rows
-    across = [y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0]]
+# Sensors stand still for most of the time, and several steps of a frame ask.
+@lru_cache(maxsize=64)
+def _turns_and_shifts(entries: bytes) -> bool:
+    # Sixteen numbers are faster without arrays; what is not finite fails a comparison.
+    numbers = struct.unpack("16d", entries)
+    x, y, z, last = (numbers[start : start + 4] for start in (0, 4, 8, 12))
+    across = (y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0])
     return (
         all(abs(_dot(axis, axis) - 1.0) <= _OFF for axis in (x, y, z))
         and all(abs(_dot(one, two)) <= _OFF for one, two in ((x, y), (y, z), (z, x)))
         and _dot(x, across) > 0.0
-        and last == [0.0, 0.0, 0.0, 1.0]
+        and last == (0.0, 0.0, 0.0, 1.0)
+        and all(math.isfinite(row[3]) for row in (x, y, z))
     )
 
 
-def _dot(a: list[float], b: list[float]) -> float:
+def _dot(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from statistics import median
 
 import cv2
@@ -31,12 +33,8 @@ _STANDS = 1e-3
 """A pose whose entries change by less is that of a camera that stands."""
 
 
-_BEHIND = (0.05, 0.02)
-"""What lies so far behind is another surface: metres, and share of the depth."""
-
-
-_STAYS, _STAYED = 6, (0.02, 0.015)
-"""Over so many pictures the depth of a still surface changes by less than this: metres, and share of the depth."""
+_STAYS = 6
+"""Over so many pictures the depth of a still surface hardly changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,18 +56,12 @@ class BodyView:
     before: npt.NDArray[np.bool_] | None = None
 
     def look_at(
-        self, pixel: tuple[float, float], radius: float, *, among: npt.NDArray[np.bool_] | None = None
-    ) -> tuple[float, bool] | None:
-        """Depth [m] of the nearest surface within `radius` pixels of a place, and whether most of it is still; None with
-        less than three points there. Where three of the points `among` (N,) are there, only those count."""
-        return _core.nearest_surface(self.pixels, self.depths, self.still, pixel=pixel, radius=radius, among=among)
-
-    def sample(self, image: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-        """Values (N,) of the picture (H, W) at the points, -1 outside."""
-        u, v = np.rint(self.pixels).astype(np.intp).T
-        inside = (u >= 0) & (v >= 0) & (u < image.shape[1]) & (v < image.shape[0])
-        place = np.where(inside, v * image.shape[1] + u, 0)
-        return np.where(inside, image.take(place), np.int32(-1))
+        self, labels: npt.NDArray[np.int32], places: Sequence[tuple[tuple[float, float], int]], radius: float
+    ) -> list[tuple[float, bool] | None]:
+        """Depth [m] of the nearest surface within `radius` pixels of each place (u, v), and whether most of it is still; None
+        with less than three points there. Where three of them are in its region, by its number among `labels` (H, W) of the
+        picture, only those count."""
+        return _core.nearest_surfaces(self.pixels, self.depths, self.still, labels=labels, places=places, radius=radius)
 
 
 class StillDepth:
@@ -107,11 +99,7 @@ class StillDepth:
         self._farthest = np.maximum(self._farthest, z)
         still = None
         if len(self._last) == _STAYS:
-            # At the edges of things every camera sees now the one, now the other.
-            behind = cv2.erode(self._farthest, _AROUND)
-            near, stayed = (low + share * z for low, share in (_BEHIND, _STAYED))
-            before = np.asarray(behind - z >= near)
-            still = (np.asarray(~before & (np.abs(z - self._last[0]) < stayed)), before)
+            still = _core.still_scene(z, self._farthest, self._last[0])
         self._last.append(z)
         return still
 
@@ -170,7 +158,10 @@ def body_view(
     around = np.ones((size, size), np.uint8)
     grown = cv2.dilate(mask, around).view(np.bool_)
     before = None if front is None else cv2.dilate(front, around).view(np.bool_)
-    grown |= _beyond(depth_camera, world_from_depth, color_camera, world_from_color, places)
+    # A few centimetres of the body's distance move what is beyond by less than a pixel.
+    z = round(median(in_sensor(world_from_depth, places)[:, 2].tolist()), 1)
+    poses = [np.asarray(pose, dtype=np.float64).tobytes() for pose in (world_from_depth, world_from_color)]
+    grown |= _beyond(depth_camera, poses[0], color_camera, poses[1], max(z, 0.1))
     # A hand's region ends where a table behind it begins.
     edges = _behind_edges(nearest)
     window = tuple(slice(first, first + count) for first, count in zip(corner, edges.shape, strict=True))
@@ -213,15 +204,12 @@ def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high:
     return spans[0], spans[1]
 
 
+@lru_cache(maxsize=8)
 def _beyond(
-    depth_camera: Camera,
-    world_from_depth: FloatArray,
-    color_camera: Camera,
-    world_from_color: FloatArray,
-    places: FloatArray,
+    depth_camera: Camera, depth_pose: bytes, color_camera: Camera, color_pose: bytes, z: float
 ) -> npt.NDArray[np.bool_]:
-    """(H, W) of the colour image: True where the depth camera does not look, at the distance of the body."""
-    z = max(median(in_sensor(world_from_depth, places)[:, 2].tolist()), 0.1)
+    """(H, W) of the colour image: True where the depth camera does not look, at a distance from it [m]; read-only."""
+    world_from_depth, world_from_color = (np.frombuffer(pose).reshape(4, 4) for pose in (depth_pose, color_pose))
     right, bottom = depth_camera.width - 1, depth_camera.height - 1
     rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]]
     corners = np.ones((4, 3))
@@ -234,4 +222,5 @@ def _beyond(
     away = np.ones((color_camera.height, color_camera.width), dtype=np.uint8)
     if np.isfinite(outline).all():
         cv2.fillConvexPoly(away, outline.round().clip(-9999, 9999).astype(np.int32), 0)
+    away.setflags(write=False)
     return away.view(np.bool_)

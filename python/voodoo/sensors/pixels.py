@@ -72,4 +72,4 @@ def ray_distance(origin: FloatArray, directions: FloatArray, points: FloatArray)
 
 def lengths(vectors: FloatArray) -> FloatArray:
     """Of vectors (..., 3)."""
-    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1)))
+    return np.asarray(np.sqrt(np.add.reduce(vectors * vectors, axis=-1)))

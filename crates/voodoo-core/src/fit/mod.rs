@@ -246,7 +246,7 @@ impl Fit {
     }
 
     /// Steps 6 and 7: moves the body to what was matched.
-    fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
+    pub fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
         let bands = self.schedule(context.config).bands;
         let Self { solver, correspondences, band_weights, .. } = self;
         // 6 Elastic bands on both limbs.

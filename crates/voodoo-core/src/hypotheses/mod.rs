@@ -21,8 +21,8 @@ use crate::math::{Pose, shifted};
 use crate::regions::{Backdrop, Posed};
 use history::{Basis, History};
 use proposals::{
-    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
-    UnexplainedCluster,
+    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Proposal, Propose, ShownByColors,
+    TrunkLean, UnexplainedCluster,
 };
 use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
@@ -42,6 +42,10 @@ const SEEN_GAIN: f64 = 10.0;
 const CLAIMED: f64 = 0.3;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 const REFINE: usize = 8;
+/// After so many of them a hypothesis is given up that costs so many patches more than the current pose: of 63 that were taken in the
+/// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
+const GIVE_UP_AFTER: usize = 6;
+const FALLEN_BEHIND: f64 = 15.0;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]
@@ -55,6 +59,17 @@ pub struct Hypotheses {
     shown: ShownByColors,
     pool: Pool,
     refined: Refined,
+}
+
+/// How the look at a hypothesis ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    /// It explains the frame better.
+    Better,
+    /// It does not, or is as suspect as the current pose.
+    Refused,
+    /// It is so much worse that the next frame will hardly think otherwise.
+    Hopeless,
 }
 
 /// A hypothesis after its ICP steps.
@@ -213,10 +228,16 @@ impl Hypotheses {
         let Self { history, suspicion, pool, refined, .. } = self;
         let own = &mut history[index];
         own.last_proposal.clear();
-        let mut steps = 0;
+        if pool.found().next().is_none() {
+            return 0;
+        }
+        let present = refined.cost(context, fit, poses);
+        let (mut steps, mut hopeless) = (0, true);
         for proposal in pool.found() {
-            steps += REFINE;
-            if !refined.refine(context, index, fit, poses, &proposal.poses, suspicion, proposal.basis) {
+            let (taken, outcome) = refined.refine(context, index, fit, present, proposal, suspicion);
+            steps += taken;
+            hopeless &= outcome == Outcome::Hopeless;
+            if outcome != Outcome::Better {
                 continue;
             }
             if own.persistence.vote() {
@@ -231,47 +252,60 @@ impl Hypotheses {
             }
             break;
         }
+        if hopeless {
+            own.persistence.rest();
+        }
         steps
     }
 }
 
 impl Refined {
-    /// Refines a hypothesis with the whole body. True when it explains the frame better as a whole, and `fit` then holds its
-    /// matches; else `fit` is as before.
-    #[allow(clippy::too_many_arguments, reason = "what is tried, where, and with what")]
+    /// Refines a hypothesis with the whole body, whose `present` pose costs so much. Returns the ICP steps that took, and whether
+    /// it explains the frame better as a whole: then `fit` holds its matches, else it is as before.
     fn refine(
         &mut self,
         context: Context,
         index: usize,
         fit: &mut Fit,
-        current: &[Pose],
-        hypothesis: &[Pose],
+        present: Cost,
+        hypothesis: &Proposal,
         suspicion: &mut Suspicion,
-        basis: Basis,
-    ) -> bool {
+    ) -> (usize, Outcome) {
         let chain = &context.model.extremities[index];
-        let before = self.cost(context, fit, current);
+        let (basis, last, pictures) = (hypothesis.basis, context.config.max_steps, context.pictures_alone());
         self.poses.clear();
-        self.poses.extend_from_slice(hypothesis);
+        self.poses.extend_from_slice(&hypothesis.poses);
         fit.exchange(&mut self.matched);
-        let last = context.config.max_steps;
         for step in 0..REFINE {
-            fit.step(context, hypothesis, &mut self.poses, last.saturating_sub(REFINE - step));
+            let at = last.saturating_sub(REFINE - step);
+            fit.match_all(context, &self.poses, at);
+            // What colours alone tell on the way says little.
+            if step == GIVE_UP_AFTER && !pictures && self.own_cost(context, fit).total > present.total + FALLEN_BEHIND {
+                fit.exchange(&mut self.matched);
+                return (step, Outcome::Hopeless);
+            }
+            fit.solve(context, &hypothesis.poses, &mut self.poses, at);
         }
         fit.match_last(context, &self.poses);
+        let cost = self.own_cost(context, fit);
+        let matched = fit.matched(&self.poses);
+        let better = cost.total < present.total - GAIN && cost.evidence < present.evidence - SEEN_GAIN;
+        // What is as suspect as before is not worth a jump.
+        let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
+        if better && (matches!(basis, Basis::Lean | Basis::Body) || sure(matched)) {
+            return (REFINE, Outcome::Better);
+        }
+        fit.exchange(&mut self.matched);
+        let hopeless = !pictures && cost.total > present.total + FALLEN_BEHIND;
+        (REFINE, if hopeless { Outcome::Hopeless } else { Outcome::Refused })
+    }
+
+    /// What its own poses cost.
+    fn own_cost(&mut self, context: Context, fit: &Fit) -> Cost {
         let poses = std::mem::take(&mut self.poses);
         let cost = self.cost(context, fit, &poses);
         self.poses = poses;
-        let matched = fit.matched(&self.poses);
-        let better = cost.total < before.total - GAIN && cost.evidence < before.evidence - SEEN_GAIN;
-        // What is as suspect as before is not worth a jump.
-        let pictures = context.pictures_alone();
-        let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-        if better && (matches!(basis, Basis::Lean | Basis::Body) || sure(matched)) {
-            return true;
-        }
-        fit.exchange(&mut self.matched);
-        false
+        cost
     }
 
     /// What matched poses cost, by pictures as well where these are all there is.
@@ -354,9 +388,16 @@ mod tests {
             let before = format!("{:?}", fit.correspondences());
             let (wrong, _) = raised(&model, &poses, 0.2);
             // The second is as good as the current one, and no better.
-            for (tried, basis) in [(&wrong, Basis::Rest), (&poses, Basis::Lean)] {
+            let present = refined.cost(context, &fit, &poses);
+            for (tried, basis, ended) in [
+                (&wrong, Basis::Rest, |steps, outcome| steps < REFINE && outcome == Outcome::Hopeless),
+                (&poses, Basis::Lean, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
+            ] as [(_, _, fn(usize, Outcome) -> bool); 2]
+            {
+                let tried = Proposal { found: true, basis, poses: tried.clone() };
                 let arm = first_arm(&model);
-                assert!(!refined.refine(context, arm, &mut fit, &poses, tried, &mut suspicion, basis), "{basis:?}");
+                let (steps, outcome) = refined.refine(context, arm, &mut fit, present, &tried, &mut suspicion);
+                assert!(ended(steps, outcome), "{basis:?}: {outcome:?} after {steps}");
             }
             assert_eq!(format!("{:?}", fit.correspondences()), before);
         });

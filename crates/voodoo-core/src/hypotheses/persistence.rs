@@ -1,6 +1,7 @@
 //! How long frames have spoken against an arm or leg, and whether two in a row asked for the same change.
 
-/// After so many refusals in a row a chain is tried in every `REST`th frame only: a hidden arm is refused for seconds.
+/// A chain is tried in every `REST`th frame only after so many refusals in a row, since a hidden arm is refused for seconds, and
+/// once where nothing came near to what the frame shows.
 const TIRED: usize = 30;
 const REST: usize = 4;
 
@@ -14,6 +15,8 @@ pub(super) struct Persistence {
     /// This frame voted for a change, and the frame before did.
     voted: bool,
     voted_before: bool,
+    /// So many more frames are let pass.
+    rest: usize,
 }
 
 impl Persistence {
@@ -30,8 +33,15 @@ impl Persistence {
         self.voted_before = voted_before;
         self.frames += 1;
         self.refused += 1;
-        let rests = !new && self.refused > TIRED && !self.refused.is_multiple_of(REST);
+        let rests = self.rest > 0 || self.refused > TIRED && !self.refused.is_multiple_of(REST);
+        let rests = rests && !new;
+        self.rest = self.rest.saturating_sub(1);
         self.frames >= patience && !rests
+    }
+
+    /// Nothing that was tried in this frame came near to what it shows: the next frames will hardly think otherwise.
+    pub(super) fn rest(&mut self) {
+        self.rest = REST - 1;
     }
 
     /// This frame asks for a change; whether it is made, because the frame before asked as well: a single frame may be disturbed.
@@ -89,6 +99,17 @@ mod tests {
         persistence.vote();
         assert!(!persistence.is_clear() && !persistence.observe(None, false) && persistence.is_clear());
         assert!(!persistence.observe(Some(2), false) && persistence.observe(Some(2), false) && !persistence.vote());
+    }
+
+    #[test]
+    fn a_chain_for_which_nothing_came_near_rests_for_three_frames_unless_it_was_in_order() {
+        let mut persistence = Persistence::default();
+        assert!(persistence.observe(Some(1), false));
+        persistence.rest();
+        let tried: Vec<bool> = (0..2 * REST).map(|_| persistence.observe(Some(1), false)).collect();
+        assert_eq!(tried, [false, false, false, true, true, true, true, true]);
+        persistence.rest();
+        assert!(!persistence.observe(None, false) && persistence.observe(Some(1), false));
     }
 
     #[test]

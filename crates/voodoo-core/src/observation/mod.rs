@@ -2,12 +2,14 @@
 //!
 //! `frame` is what goes in (K06 IV-A). Step 1 of the method, the choice of points that may lie on the body (K06 IV-B.1), is
 //! `candidates`, with `pixels` and `background`; `clusters` sorts them for the next step. `depth_view` asks the images about places in
-//! space, `segments` looks for a lost body, and `registration` brings depths into the picture of another camera.
+//! space, `segments` looks for a lost body, and `registration` brings depths into the picture of
+//! another camera, `chroma` tells colours, and `still` what stands.
 
 pub mod background;
 mod background_moved;
 mod background_update;
 pub mod candidates;
+pub mod chroma;
 pub(crate) mod clusters;
 pub mod depth_view;
 pub mod frame;
@@ -17,3 +19,4 @@ pub(crate) mod pixels;
 pub mod registration;
 pub(crate) mod segments;
 pub mod share;
+pub mod still;

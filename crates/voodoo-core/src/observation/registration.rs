@@ -175,6 +175,35 @@ const ONE_SURFACE: f64 = 0.1;
 const FEWEST_POINTS: usize = 3;
 
 impl MeasuredPixels<'_> {
+    /// [`Self::nearest_surface`] of each of some places of an image of so many rows and columns, by the points in its region, as
+    /// `labels` number it, if there are enough.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when arrays do not belong together.
+    pub fn nearest_surfaces(
+        &self,
+        (labels, [height, width]): (&[i32], [usize; 2]),
+        places: &[([f64; 2], i32)],
+        radius: f64,
+    ) -> Result<Vec<Option<(f64, bool)>>, TrackError> {
+        if height.checked_mul(width) != Some(labels.len()) {
+            let found = format!("{} for {height} rows of {width}", labels.len());
+            return Err(TrackError::measurement("labels", "one for every pixel", found));
+        }
+        let label = |place: &[f64; 2]| {
+            let [u, v] = place.map(f64::round_ties_even);
+            let inside = u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
+            if inside { labels[v as usize * width + u as usize] } else { -1 }
+        };
+        let of: Vec<i32> = self.places.iter().map(label).collect();
+        let mut among = vec![false; of.len()];
+        let mut look = |(place, region): &([f64; 2], i32)| {
+            among.iter_mut().zip(&of).for_each(|(among, label)| *among = label == region);
+            self.nearest_surface(*place, radius, Some(&among))
+        };
+        places.iter().map(&mut look).collect()
+    }
+
     /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
     /// three points there. Where three of the points `among` are there, only those count.
     ///

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -17,7 +17,6 @@ from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
 from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.skin.tracker import SkinTracker
-from voodoo.tracker import Tracker
 
 SKIN = (80, 255, 255)
 """Colour in overlays, BGR."""
@@ -44,7 +43,7 @@ class SkinAdapter(Adapter[ColorImage]):
         then = context.predictor.predict(item.stamp)
         view = _body_view(item, then, context)
         sites = skin.settings.sites if view is not None else ()
-        tracker = context.tracker
+        tracker, status = context.tracker, context.tracker.estimate.limb_status
         rays = skin.observe(
             item.image,
             item.camera,
@@ -52,11 +51,11 @@ class SkinAdapter(Adapter[ColorImage]):
             then,
             stamp=item.stamp,
             body=view,
-            surface=lambda places: _limb_distances(tracker, places),
+            surface=lambda places: dict(zip(status, tracker.limb_distances(places), strict=True)),
             strangers=partial(_distance, context.others) if context.others else None,
-            arm_lost=_hands(tracker, sites, "forearm", measured=False),
-            upper_arm_visible=_hands(tracker, sites, "upperarm", measured=True),
-            head_visible=_heads(tracker, sites),
+            arm_lost=_hands(status, sites, "forearm", measured=False),
+            upper_arm_visible=_hands(status, sites, "upperarm", measured=True),
+            head_visible=_heads(status, sites),
             source=item.sensor,
         )
         context.rays.extend(ray.moved(context.predicted[ray.site] - then[ray.site]) for ray in rays)
@@ -117,23 +116,18 @@ def _body_view(item: ColorImage, then: dict[str, FloatArray], context: Context) 
     )
 
 
-def _hands(tracker: Tracker | Followed, sites: Iterable[str], limb: str, *, measured: bool) -> set[str]:
-    """Hands whose forearm or upper arm was, or was not, measured in the last frame."""
-    status = tracker.estimate.limb_status
+def _hands(status: Mapping[str, str], sites: Iterable[str], limb: str, *, measured: bool) -> set[str]:
+    """Hands whose forearm or upper arm was, or was not, measured in the last frame, by the status of limbs."""
     known = {site: status.get(f"{site[:2]}{limb}") for site in sites}
     return {site for site, value in known.items() if value is not None and (value == "measured") == measured}
 
 
-def _heads(tracker: Tracker | Followed, sites: Iterable[str]) -> set[str]:
+def _heads(status: Mapping[str, str], sites: Iterable[str]) -> set[str]:
     """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
-    measured = tracker.estimate.limb_status.get("head") == "measured"
+    measured = status.get("head") == "measured"
     return {site for site in sites if measured and site.startswith("head")}
 
 
 def _distance(others: Sequence[Followed], places: FloatArray) -> npt.NDArray[np.float32]:
     """Of places from the nearest of several bodies."""
     return np.asarray(np.min([other.distance(places) for other in others], axis=0))
-
-
-def _limb_distances(tracker: Tracker | Followed, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:
-    return dict(zip(tracker.estimate.limb_names, tracker.limb_distances(places), strict=True))

@@ -10,17 +10,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
+import voodoo._core as _core
+
 ByteImage = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
 Histogram = npt.NDArray[np.float32]
 
 LUMA_BINS, CHROMA_BINS = 8, 64
-"""Bins of Y, and of either chroma axis, of YCrCb. Luma is coarse: it parts a face from a dark poster of the same
-hue."""
+"""Bins of Y, and of either chroma axis, of YCrCb, as in the core. Luma is coarse: it parts a face from a dark poster of
+the same hue."""
 _SHAPE = (CHROMA_BINS, CHROMA_BINS, LUMA_BINS)
 """Of a histogram: Cr, Cb, Y."""
 _SIZE = CHROMA_BINS**2 * LUMA_BINS
-_RANGES = [0.0, 256.0] * 3
 _SMOOTHING = (0.7, 0.8)
 """Standard deviations along luma and chroma [bins]."""
 
@@ -32,35 +33,29 @@ _PRIOR_CENTRE, _PRIOR_SPREAD = (150.0, 110.0), (8.0, 8.0)
 
 @dataclass(frozen=True, eq=False)
 class Colours:
-    """A picture's planes Cr, Cb and Y, (H, W) each, and where it is light enough to have a colour (H, W), 1 or 0."""
+    """A picture's colours: the bin of each pixel (H, W), see `_core.color_bins`."""
 
-    planes: tuple[ByteImage, ...]
-    lit: ByteImage
+    bins: npt.NDArray[np.uint16]
 
     @classmethod
-    def of(cls, image: ByteImage, *, darkest: int = 30) -> Colours:
-        """Those of a BGR picture (H, W, 3); pixels with less luma than `darkest` have no reliable chroma."""
-        planes = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb))
-        luma, cr, cb = (np.asarray(plane, dtype=np.uint8) for plane in planes)
-        return cls((cr, cb, luma), (luma >= darkest).view(np.uint8))
+    def of(cls, image: ByteImage) -> Colours:
+        """Those of a BGR picture (H, W, 3)."""
+        return cls(_core.color_bins(np.ascontiguousarray(image)))
 
     def within(self, mask: ByteImage) -> tuple[Colours, ByteImage]:
         """The smallest part that holds all of a mask (H, W), and the mask there."""
         x, y, w, h = cv2.boundingRect(mask)
         window = (slice(y, y + h), slice(x, x + w))
-        return Colours(tuple(plane[window] for plane in self.planes), self.lit[window]), mask[window]
+        return Colours(np.ascontiguousarray(self.bins[window])), np.ascontiguousarray(mask[window])
 
     def among(self, table: Mask) -> ByteImage:
-        """(H, W): 1 where a picture is lit and its colour is one of a histogram's bins."""
-        # Without the wrapper the last axis of an array would be taken for channels.
-        bins = cv2.Mat(table.astype(np.float32), wrap_channels=False)  # type: ignore[no-untyped-call]
-        found = np.asarray(cv2.calcBackProject(self.planes, [0, 1, 2], bins, _RANGES, 1.0), dtype=np.uint8)
-        return found & self.lit
+        """(H, W): 1 where a picture is light enough to have a colour, and it is one of a histogram's bins."""
+        return _core.bins_among(self.bins, table.reshape(-1))
 
     def shares(self, mask: ByteImage) -> Histogram:
         """Share of each bin among the pixels of a mask (H, W)."""
-        counts = cv2.calcHist(self.planes, [0, 1, 2], mask, list(_SHAPE), _RANGES)
-        return np.asarray(counts / np.float32(max(cv2.countNonZero(mask), 1)), dtype=np.float32)
+        counts = _core.bin_counts(self.bins, mask)
+        return np.asarray(counts.reshape(_SHAPE) / np.float32(max(cv2.countNonZero(mask), 1)), dtype=np.float32)
 
 
 class SkinColour:

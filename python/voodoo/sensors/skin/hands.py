@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.sensors.pixels import FloatArray, lengths
+from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.skin.tracks import Sight
 
 BARE = ("head", "neck", "upperarm", "forearm", "hand")
@@ -38,16 +39,23 @@ def elsewhere(
     """(S, B): whether a sight is the surface of a limb other than a hand's own forearm, of a bare one if that is lost."""
     result = np.zeros((len(sites), len(sights)), dtype=np.bool_)
     deep = np.array([sight.deep for sight in sights])
-    away = np.array(list(limbs.values()))
+    away, names = np.array(list(limbs.values())), tuple(limbs)
     for row, site in enumerate(sites):
-        own = np.array([name.startswith(site[0]) and name.endswith(("forearm", "hand")) for name in limbs])
-        if not own.any() or site.startswith("head"):
+        own, rest = _own_and_others(names, site[0], site in arm_lost)
+        if not own or site.startswith("head"):
             continue
-        rest = ~own & [site not in arm_lost or name.endswith(BARE) for name in limbs]
         others = away[rest].min(axis=0, initial=np.inf)
         own_away = away[own].min(axis=0)
         result[row] = deep & (others < ON_LIMB_M) & (own_away > others + OFF_LIMB_M)
     return result
+
+
+@lru_cache(maxsize=64)
+def _own_and_others(limbs: tuple[str, ...], side: str, lost: bool) -> tuple[list[int], list[int]]:
+    """Numbers of the limbs of a side's forearm, and of those that its hand cannot be on; of a lost arm only the bare ones."""
+    own = [row for row, name in enumerate(limbs) if name.startswith(side) and name.endswith(("forearm", "hand"))]
+    others = [row for row, name in enumerate(limbs) if row not in own and (not lost or name.endswith(BARE))]
+    return own, others
 
 
 def to_palm(site: str, predicted: Mapping[str, FloatArray]) -> FloatArray:
@@ -75,10 +83,14 @@ def of_pieces(place: FloatArray, pieces: list[FloatArray], expected: FloatArray)
     return nearest
 
 
-def hand_ends(sights: list[Sight], hand: FloatArray | None, elbow: FloatArray) -> list[bool]:
-    """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region."""
-    places = np.array([item.place for item in sights])
-    towards = ((0.0 if hand is None else lengths(places - hand)) - lengths(places - elbow)).tolist()
+def hand_ends(sights: list[Sight], to_hand: FloatArray | float, to_elbow: FloatArray) -> list[bool]:
+    """False for those ends of a bare forearm that are nearer to its elbow than another end of the same region.
+
+    Args:
+        sights: candidates.
+        to_hand, to_elbow: distances (N,) from where these are expected [m]; 0.0 where nothing speaks for a hand's place.
+    """
+    towards = (to_hand - to_elbow).tolist()
     least: dict[int, float] = {}
     for item, value in zip(sights, towards, strict=True):
         if item.hand:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d
 
 Mask = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.int32]
@@ -83,11 +82,11 @@ def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
     found: list[Candidate] = []
     if not (w and h):
         return found, regions
-    count, labels, stats, centres = cv2.connectedComponentsWithStats(pixels[y : y + h, x : x + w], connectivity=8)
+    _, labels, stats, centres = cv2.connectedComponentsWithStats(pixels[y : y + h, x : x + w], connectivity=8)
     regions[y : y + h, x : x + w] = labels
-    for region in range(1, count):
-        left, top, width, height, area = (int(value) for value in stats[region])
-        if not smallest <= area <= largest:
+    for region, (left, top, width, height, area) in enumerate(stats.tolist()):
+        # The first is what lies around all of them.
+        if not region or not smallest <= area <= largest:
             continue
         middle = (float(centres[region][0]) + x, float(centres[region][1]) + y)
         if math.hypot(width, height) <= LONGEST_HAND * palm_px:
@@ -115,7 +114,10 @@ def _tips(mask: Mask, palm_px: float) -> list[tuple[float, float]]:
     v, u = np.nonzero(mask)
     distance = (outline[:, 0] - u.mean()) ** 2 + (outline[:, 1] - v.mean()) ** 2
     # A tip is farther out than all of the contour around it.
-    peak = distance >= maximum_filter1d(distance, 2 * round(2.5 * palm_px) + 1, mode="wrap")
+    reach = round(2.5 * palm_px)
+    around = distance.take(np.arange(-reach, len(distance) + reach), mode="wrap")
+    farthest = cv2.dilate(around[None], np.ones((1, 2 * reach + 1), np.uint8))[0, reach : reach + len(distance)]
+    peak = distance >= farthest
     peaks = np.flatnonzero(peak & (distance >= (1.5 * palm_px) ** 2))
     tips: list[tuple[float, float]] = []
     taken: list[list[float]] = []

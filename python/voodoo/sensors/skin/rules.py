@@ -70,9 +70,10 @@ def allowed_sites(
             least, most = NEAREST_HAND * forearm, math.inf if site in arm_lost else forearm + FARTHEST_HAND_M
             allowed[row] *= ~deep | ((least < apart) & (apart < most))
         if elbow is not None:
-            ends = np.array(hand_ends(sights, predicted[site], elbow))
+            to_elbow = lengths(places - elbow)
+            ends = np.array(hand_ends(sights, lengths(places - predicted[site]), to_elbow))
             if site in arm_lost:
                 # Nothing speaks for where the hand is expected, but it may be there all the same.
-                ends |= hand_ends(sights, None, elbow)
+                ends |= hand_ends(sights, 0.0, to_elbow)
             allowed[row] *= ends
     return allowed

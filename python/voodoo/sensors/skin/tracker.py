@@ -224,10 +224,9 @@ class SkinTracker:
         radius: float,
     ) -> tuple[FloatArray, list[Sight]]:
         """Depths (B,) along the optical axis and places of the candidates: as the depth camera has it, else `nearest`."""
-        regions = None if body is None else body.sample(labels)
         looked: list[tuple[float, bool] | None] = [None] * len(self.candidates)
-        if body is not None and regions is not None:
-            looked = [body.look_at(item.pixel, radius, among=regions == item.region) for item in self.candidates]
+        if body is not None:
+            looked = body.look_at(labels, [(item.pixel, item.region) for item in self.candidates], radius)
         z = np.array([nearest if found is None else found[0] for found in looked])
         surfaces = origin + directions * (z / (directions @ axis))[:, None]
         return z, [
@@ -333,11 +332,9 @@ class SkinTracker:
             return {}
         points = in_sensor(pose, [positions[site] for site in sites])
         pixels = camera.project(points)
-        return {
-            site: (pixel, float(point[2]))
-            for site, pixel, point in zip(sites, pixels, points, strict=True)
-            if np.isfinite(pixel).all() and point[2] > 0.1
-        }
+        usable = np.asarray(np.isfinite(pixels).all(axis=1) & (points[:, 2] > 0.1)).tolist()
+        found = zip(sites, pixels, points[:, 2].tolist(), usable, strict=True)
+        return {site: (pixel, z) for site, pixel, z, able in found if able}
 
 
 def _check_image(image: ByteImage, camera: Camera) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -76,6 +76,10 @@ class Blob:
     far: dict[str, float] = field(default_factory=dict)
     doubt: dict[str, float] = field(default_factory=dict)
 
+    def copy(self) -> Blob:
+        """The same, with a history of its own."""
+        return Blob(self.sight, self.stamp, self.velocity, self.count, self.label, dict(self.far), dict(self.doubt))
+
     def move(self, sight: Sight, stamp: float) -> None:
         """It was seen again."""
         elapsed = stamp - self.stamp
@@ -107,7 +111,7 @@ class Blobs:
     def __copy__(self) -> Blobs:
         """The same, with blobs of its own."""
         twin = Blobs()
-        twin.items = [replace(blob, far=dict(blob.far), doubt=dict(blob.doubt)) for blob in self.items]
+        twin.items = [blob.copy() for blob in self.items]
         twin._missed, twin._stamp = dict(self._missed), self._stamp
         return twin
 
@@ -245,10 +249,11 @@ def _apart(blobs: Sequence[Blob], sights: Sequence[Sight], stamp: float) -> Floa
     elapsed = np.array([stamp - blob.stamp for blob in blobs])
     expected = np.array([blob.sight.place for blob in blobs]) + elapsed[:, None] * [blob.velocity for blob in blobs]
     offset = np.array([sight.place for sight in sights]) - expected[:, None]
-    directions = np.array([sight.direction for sight in sights])
-    deep = np.outer([blob.sight.deep for blob in blobs], [sight.deep for sight in sights])
-    along = np.where(deep, 0.0, (offset * directions).sum(axis=2))
-    offset -= along[..., None] * directions
+    if not (all(blob.sight.deep for blob in blobs) and all(sight.deep for sight in sights)):
+        directions = np.array([sight.direction for sight in sights])
+        deep = np.outer([blob.sight.deep for blob in blobs], [sight.deep for sight in sights])
+        along = np.where(deep, 0.0, (offset * directions).sum(axis=2))
+        offset -= along[..., None] * directions
     return lengths(offset) / np.array([_limit(blob, stamp) for blob in blobs])[:, None]
 
 

@@ -1,0 +1,113 @@
+//! Colours of a picture as numbers of histogram bins, chroma and coarse luma: what skin is told by.
+
+use crate::error::TrackError;
+use crate::math::widest;
+
+/// Bins of either axis of chroma, Cr and Cb, and of luma: coarse, to part a face from a dark poster of the same hue.
+pub const CHROMA_BINS: usize = 64;
+/// Of luma.
+pub const LUMA_BINS: usize = 8;
+/// Of a histogram, Cr by Cb by luma.
+pub const BINS: usize = CHROMA_BINS * CHROMA_BINS * LUMA_BINS;
+/// A pixel with less luma has no reliable chroma.
+const DARKEST: i32 = 30;
+/// Marks such a pixel, beside its bin.
+const DARK: u16 = 1 << 15;
+
+/// The bin of every pixel (blue, green, red), and a mark of dark ones: luma and chroma as ITU-R BT.601 has them, rounded to whole
+/// numbers of eight bits.
+pub fn bins(image: &[[u8; 3]]) -> Vec<u16> {
+    let mut found = vec![0; image.len()];
+    widest(
+        #[inline(always)]
+        || {
+            for (bin, [b, g, r]) in found.iter_mut().zip(image) {
+                *bin = bin_of([*b, *g, *r].map(i32::from));
+            }
+        },
+    );
+    found
+}
+
+#[inline(always)]
+fn bin_of([b, g, r]: [i32; 3]) -> u16 {
+    // Shares of 2^14.
+    let rounded = |sum: i32| (sum + (1 << 13)) >> 14;
+    let luma = rounded(1868 * b + 9617 * g + 4899 * r);
+    let chroma = |difference: i32, share: i32| rounded(difference * share + (128 << 14)).clamp(0, 255);
+    let (cr, cb) = (chroma(r - luma, 11682), chroma(b - luma, 9241));
+    let bin = ((cr >> 2) << 9 | (cb >> 2) << 3 | luma >> 5) as u16;
+    if luma < DARKEST { bin | DARK } else { bin }
+}
+
+/// 1 where a pixel is light enough and its bin is one of a `table`'s, which has [`BINS`].
+///
+/// # Errors
+/// [`TrackError::Measurement`] when the table has another size.
+pub fn among(bins: &[u16], table: &[bool]) -> Result<Vec<u8>, TrackError> {
+    let count = table.len();
+    let Ok(table): Result<&[bool; BINS], _> = table.try_into() else {
+        return Err(TrackError::measurement("table", "a mark for each of 32768 bins", count.to_string()));
+    };
+    Ok(bins.iter().map(|bin| u8::from(table[usize::from(bin & !DARK)] & (bin & DARK == 0))).collect())
+}
+
+/// How many pixels of a mask, where it is not zero, are of each bin.
+///
+/// # Errors
+/// [`TrackError::Measurement`] when there are not as many places in the mask as bins.
+pub fn counts(bins: &[u16], mask: &[u8]) -> Result<Vec<f32>, TrackError> {
+    if bins.len() != mask.len() {
+        let found = format!("{} and {}", mask.len(), bins.len());
+        return Err(TrackError::measurement("mask", "as many pixels as the picture has", found));
+    }
+    let mut counts = vec![0.0; BINS];
+    for (bin, _) in bins.iter().zip(mask).filter(|(_, mask)| **mask != 0) {
+        counts[usize::from(bin & !DARK)] += 1.0;
+    }
+    Ok(counts)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    /// Luma and chroma by the definition, in double precision.
+    fn defined([b, g, r]: [u8; 3]) -> [f64; 3] {
+        let [b, g, r] = [b, g, r].map(f64::from);
+        let luma = 0.299 * r + 0.587 * g + 0.114 * b;
+        [(r - luma) * 0.713 + 128.0, (b - luma) * 0.564 + 128.0, luma]
+    }
+
+    #[test]
+    fn a_bin_is_that_of_the_colour_by_its_definition() {
+        let mut dark = 0;
+        for n in 0..50_000_u32 {
+            let colour = [n.wrapping_mul(2_654_435_761) >> 24, n * 7 % 256, n * 131 % 256].map(|value| value as u8);
+            let [bin] = bins(&[colour])[..] else { panic!("one pixel, one bin") };
+            let (place, [cr, cb, luma]) = (usize::from(bin & !DARK), defined(colour));
+            for (found, wanted, width) in [(place >> 9, cr, 4.0), (place >> 3 & 63, cb, 4.0), (place & 7, luma, 32.0)] {
+                let middle = (found as f64 + 0.5) * width - 0.5;
+                assert!((wanted.clamp(0.0, 255.0) - middle).abs() < 0.5 * width + 1.1, "{colour:?}: {found}");
+            }
+            assert!((bin & DARK != 0) == (luma < 29.5) || (luma - 29.5).abs() < 0.6);
+            dark += usize::from(bin & DARK != 0);
+        }
+        assert!(dark > 100);
+    }
+
+    #[test]
+    fn colours_are_found_and_counted_but_dark_ones_only_counted() {
+        let picture = [[10, 10, 200], [0, 0, 20], [200, 10, 10], [10, 10, 200]];
+        let found = bins(&picture);
+        let mut table = vec![false; BINS];
+        for bin in &found[..2] {
+            table[usize::from(bin & !DARK)] = true;
+        }
+        assert_eq!(among(&found, &table).unwrap(), [1, 0, 0, 1]);
+        let shares = counts(&found, &[1, 255, 1, 0]).unwrap();
+        assert_eq!((shares.iter().sum::<f32>(), shares[usize::from(found[0])]), (3.0, 1.0));
+        assert!(among(&found, &table[1..]).is_err() && counts(&found, &[1]).is_err());
+    }
+}
