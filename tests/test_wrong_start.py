@@ -1,12 +1,18 @@
 """The table of examples/wrong_start.py."""
 
 import sys
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import voodoo
 from ik_cases import load_example
+from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.pairing import paired
+from voodoo.recordings import open_recording, sample_path
+from voodoo.sensors.settings import FrontEndSettings
 
 ROOT = Path(__file__).resolve().parent.parent
 BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
@@ -71,3 +77,21 @@ def test_a_wrong_start_is_told_by_being_right_or_by_the_status(wrong):
     assert wrong.told(bad, late, stamps) == (False, 1, 2), "too late"
     soon = np.array([1, 1, 1, 0, 1, 1], dtype=bool)
     assert wrong.told(bad, soon, stamps) == (True, 2, 2)
+
+
+@pytest.mark.parametrize("scale", [0.75, 1.25])
+def test_a_start_elsewhere_that_had_another_stature_leaves_it_too(scale):
+    """Half a metre beside the person, and of a child's or a giant's size."""
+    recording = open_recording(sample_path())
+    names, truth = recording.reference.names, recording.reference.positions
+    root = truth[0][names.index("humanoid_root")]
+    given = {
+        name: tuple(root + scale * (place - root) + [0.0, 0.5, 0.0])
+        for name, place in zip(names, truth[0], strict=True)
+    }
+    tracker = voodoo.Tracker(voodoo.Body.human(model="measured"))
+    tracker.reset(joints=given)
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth",)))
+    *_, (last, estimate) = ((index, front_end.step(frame)) for index, frame in enumerate(islice(paired(recording), 16)))
+    apart = [np.linalg.norm(estimate.joints[name] - place) for name, place in zip(names, truth[last], strict=True)]
+    assert np.mean(apart) < 0.05
