@@ -1,6 +1,7 @@
 //! Trying other configurations of arms and legs where the frame speaks against the current ones, and keeping the best by one
 //! score.
 
+mod exchange;
 mod history;
 mod landmark_cost;
 mod persistence;
@@ -19,6 +20,7 @@ use crate::detect::Detection;
 use crate::fit::{Context, Fit, Matched, Motion};
 use crate::math::{Pose, shifted};
 use crate::regions::{Backdrop, Posed};
+use exchange::Exchange;
 use history::{Basis, History};
 use proposals::{
     CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
@@ -36,8 +38,6 @@ const NEARBY: f64 = 1.15;
 /// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
 /// a single frame may be disturbed.
 const PATIENCE: usize = 2;
-/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
-const SEEN_GAIN: f64 = 10.0;
 /// In pictures, an arm or leg is suspect that explains a smaller share of its area, and no other limb.
 const CLAIMED: f64 = 0.3;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
@@ -54,6 +54,7 @@ pub struct Hypotheses {
     lean: TrunkLean,
     shown: ShownByColors,
     pool: Pool,
+    exchange: Exchange,
     refined: Refined,
 }
 
@@ -79,6 +80,7 @@ impl Hypotheses {
         // Room at once, not when the first hard frame comes.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
+        self.exchange.prepare(limbs);
         self.lean.prepare(model);
         self.refined.poses.clear();
         self.refined.poses.reserve(limbs);
@@ -110,6 +112,9 @@ impl Hypotheses {
                 self.unexplained.collect(context, fit.matched(poses));
             }
             steps += taken;
+        }
+        if pictures {
+            steps += self.try_exchange(context, fit, poses, predicted);
         }
         if pictures && steps > 0 {
             // What was looked at last was tried.
@@ -174,6 +179,39 @@ impl Hypotheses {
         self.history[at.index].persistence.observe(patience)
     }
 
+    /// Tries the legs where the other one is: each explains what the other would. Returns the number of ICP steps.
+    fn try_exchange(
+        &mut self,
+        context: Context,
+        fit: &mut Fit,
+        poses: &mut Vec<Pose>,
+        predicted: &mut Vec<Pose>,
+    ) -> usize {
+        let Self { history, suspicion, exchange, refined, .. } = self;
+        let chains = &context.model.extremities;
+        let mut legs = (0..chains.len()).filter(|index| chains[*index].leg);
+        let (Some(one), Some(other), None) = (legs.next(), legs.next(), legs.next()) else { return 0 };
+        let doubtful = [one, other].iter().any(|leg| !history[*leg].persistence.is_clear());
+        if !exchange.is_due(doubtful) {
+            return 0;
+        }
+        let (origin, before) = (context.seen.origin(), refined.cost(context, fit, poses));
+        exchange.put(&context.model.body, [&chains[one], &chains[other]], poses, origin);
+        if !exchange.goes_on() && !exchange.is_worth_a_look(before, refined.cost(context, fit, &exchange.poses)) {
+            return 0;
+        }
+        let cost = refined.refine(context, fit, &exchange.poses);
+        if std::env::var("DBGX").is_ok() { eprintln!("X {before:?} {cost:?} turned {:.2} g {:.0}", poses[0].rotation.angle_between(refined.poses[0].rotation), before.total-cost.total); }
+        if exchange.gains([before, cost], [poses, &refined.poses]) {
+            poses.clone_from(&refined.poses);
+            predicted.clone_from(&exchange.poses);
+        } else {
+            fit.exchange(&mut refined.matched);
+        }
+        exchange.keep(&refined.poses, origin);
+        REFINE
+    }
+
     /// Fills the pool with other configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<&Detection>) {
         let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
@@ -211,7 +249,7 @@ impl Hypotheses {
         let mut steps = 0;
         for proposal in pool.found() {
             steps += REFINE;
-            if !refined.refine(context, index, fit, poses, &proposal.poses, suspicion, proposal.basis) {
+            if !refined.improves(context, index, fit, poses, &proposal.poses, suspicion, proposal.basis) {
                 continue;
             }
             if own.persistence.vote() {
@@ -234,7 +272,7 @@ impl Refined {
     /// Refines a hypothesis with the whole body. True when it explains the frame better as a whole, and `fit` then holds its
     /// matches; else `fit` is as before.
     #[allow(clippy::too_many_arguments, reason = "what is tried, where, and with what")]
-    fn refine(
+    fn improves(
         &mut self,
         context: Context,
         index: usize,
@@ -246,6 +284,20 @@ impl Refined {
     ) -> bool {
         let chain = &context.model.extremities[index];
         let before = self.cost(context, fit, current);
+        let cost = self.refine(context, fit, hypothesis);
+        let matched = fit.matched(&self.poses);
+        // What is as suspect as before is not worth a jump.
+        let pictures = context.pictures_alone();
+        let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
+        if cost.is_better_than(&before) && (basis == Basis::Lean || sure(matched)) {
+            return true;
+        }
+        fit.exchange(&mut self.matched);
+        false
+    }
+
+    /// Refines a hypothesis with the whole body; `fit` then holds its matches, and `matched` those of before.
+    fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> Cost {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.exchange(&mut self.matched);
@@ -257,16 +309,7 @@ impl Refined {
         let poses = std::mem::take(&mut self.poses);
         let cost = self.cost(context, fit, &poses);
         self.poses = poses;
-        let matched = fit.matched(&self.poses);
-        let better = cost.total < before.total - GAIN && cost.evidence < before.evidence - SEEN_GAIN;
-        // What is as suspect as before is not worth a jump.
-        let pictures = context.pictures_alone();
-        let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-        if better && (basis == Basis::Lean || sure(matched)) {
-            return true;
-        }
-        fit.exchange(&mut self.matched);
-        false
+        cost
     }
 
     /// What matched poses cost, by pictures as well where these are all there is.
@@ -351,7 +394,7 @@ mod tests {
             // The second is as good as the current one, and no better.
             for (tried, basis) in [(&wrong, Basis::Rest), (&poses, Basis::Lean)] {
                 let arm = first_arm(&model);
-                assert!(!refined.refine(context, arm, &mut fit, &poses, tried, &mut suspicion, basis), "{basis:?}");
+                assert!(!refined.improves(context, arm, &mut fit, &poses, tried, &mut suspicion, basis), "{basis:?}");
             }
             assert_eq!(format!("{:?}", fit.correspondences()), before);
         });
