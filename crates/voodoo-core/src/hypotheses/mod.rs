@@ -100,6 +100,9 @@ impl Hypotheses {
         self.unexplained.collect(context, fit.matched(poses));
         let mut steps = 0;
         let pictures = context.pictures_alone();
+        if pictures && context.moves_unknown() {
+            steps += self.try_far(context, fit, poses, predicted);
+        }
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
@@ -177,6 +180,26 @@ impl Hypotheses {
         let suspect = unexplained >= GAIN && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
         self.history[at.index].persistence.observe(patience)
+    }
+
+    /// Tries to find a body that may have moved far with edges that are looked for far away. Returns the number of ICP steps.
+    fn try_far(&mut self, context: Context, fit: &mut Fit, poses: &mut Vec<Pose>, predicted: &[Pose]) -> usize {
+        let refined = &mut self.refined;
+        let before = refined.cost(context, fit, poses);
+        refined.poses.clear();
+        refined.poses.extend_from_slice(predicted);
+        fit.exchange(&mut refined.matched);
+        let mut tried = std::mem::take(&mut refined.poses);
+        let steps = fit.run_far(context, predicted, &mut tried);
+        let cost = refined.cost(context, fit, &tried);
+        refined.poses = tried;
+        if std::env::var("DBGX").is_ok() { eprintln!("F {before:?} {cost:?}"); }
+        if cost.is_better_than(&before) {
+            poses.clone_from(&refined.poses);
+        } else {
+            fit.exchange(&mut refined.matched);
+        }
+        steps
     }
 
     /// Tries the legs where the other one is: each explains what the other would. Returns the number of ICP steps.
