@@ -6,6 +6,7 @@ mod history;
 mod landmark_cost;
 mod persistence;
 mod proposals;
+mod refined;
 mod rough;
 mod score;
 mod suspicion;
@@ -14,18 +15,18 @@ mod unexplained;
 pub use landmark_cost::{APART, body_landmark_cost};
 pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
-use crate::association::correspondence::{Correspondences, RegionSupport};
+use crate::association::correspondence::RegionSupport;
 use crate::body::Model;
 use crate::detect::Detection;
-use crate::fit::{Context, Fit, Matched, Motion};
+use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
-use crate::regions::{Backdrop, Posed};
 use exchange::Exchange;
-use history::{Basis, History};
+use history::History;
 use proposals::{
     CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
     UnexplainedCluster,
 };
+use refined::{REFINE, Refined};
 use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
 use unexplained::Unexplained;
@@ -40,8 +41,6 @@ const NEARBY: f64 = 1.15;
 const PATIENCE: usize = 2;
 /// In pictures, an arm or leg is suspect that explains a smaller share of its area, and no other limb.
 const CLAIMED: f64 = 0.3;
-/// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
-const REFINE: usize = 8;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]
@@ -56,16 +55,6 @@ pub struct Hypotheses {
     pool: Pool,
     exchange: Exchange,
     refined: Refined,
-}
-
-/// A hypothesis after its ICP steps.
-#[derive(Debug, Default)]
-struct Refined {
-    poses: Vec<Pose>,
-    /// Its correspondences while it is tried; those of the current poses while it is.
-    matched: Correspondences,
-    /// The whole body before what pictures show.
-    backdrop: Backdrop,
 }
 
 impl Hypotheses {
@@ -101,7 +90,7 @@ impl Hypotheses {
         let mut steps = 0;
         let pictures = context.pictures_alone();
         if pictures && context.moves_unknown() {
-            steps += self.try_far(context, fit, poses, predicted);
+            steps += self.refined.try_far(context, fit, poses, predicted);
         }
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
@@ -117,7 +106,8 @@ impl Hypotheses {
             steps += taken;
         }
         if pictures {
-            steps += self.try_exchange(context, fit, poses, predicted);
+            let doubtful = |index: usize| !self.history[index].persistence.is_clear();
+            steps += self.exchange.attempt(context, doubtful, &mut self.refined, fit, poses, predicted);
         }
         if pictures && steps > 0 {
             // What was looked at last was tried.
@@ -182,59 +172,6 @@ impl Hypotheses {
         self.history[at.index].persistence.observe(patience)
     }
 
-    /// Tries to find a body that may have moved far with edges that are looked for far away. Returns the number of ICP steps.
-    fn try_far(&mut self, context: Context, fit: &mut Fit, poses: &mut Vec<Pose>, predicted: &[Pose]) -> usize {
-        let refined = &mut self.refined;
-        let before = refined.cost(context, fit, poses);
-        refined.poses.clear();
-        refined.poses.extend_from_slice(predicted);
-        fit.exchange(&mut refined.matched);
-        let mut tried = std::mem::take(&mut refined.poses);
-        let steps = fit.run_far(context, predicted, &mut tried);
-        let cost = refined.cost(context, fit, &tried);
-        refined.poses = tried;
-        if std::env::var("DBGX").is_ok() { eprintln!("F {before:?} {cost:?}"); }
-        if cost.is_better_than(&before) {
-            poses.clone_from(&refined.poses);
-        } else {
-            fit.exchange(&mut refined.matched);
-        }
-        steps
-    }
-
-    /// Tries the legs where the other one is: each explains what the other would. Returns the number of ICP steps.
-    fn try_exchange(
-        &mut self,
-        context: Context,
-        fit: &mut Fit,
-        poses: &mut Vec<Pose>,
-        predicted: &mut Vec<Pose>,
-    ) -> usize {
-        let Self { history, suspicion, exchange, refined, .. } = self;
-        let chains = &context.model.extremities;
-        let mut legs = (0..chains.len()).filter(|index| chains[*index].leg);
-        let (Some(one), Some(other), None) = (legs.next(), legs.next(), legs.next()) else { return 0 };
-        let doubtful = [one, other].iter().any(|leg| !history[*leg].persistence.is_clear());
-        if !exchange.is_due(doubtful) {
-            return 0;
-        }
-        let (origin, before) = (context.seen.origin(), refined.cost(context, fit, poses));
-        exchange.put(&context.model.body, [&chains[one], &chains[other]], poses, origin);
-        if !exchange.goes_on() && !exchange.is_worth_a_look(before, refined.cost(context, fit, &exchange.poses)) {
-            return 0;
-        }
-        let cost = refined.refine(context, fit, &exchange.poses);
-        if std::env::var("DBGX").is_ok() { eprintln!("X {before:?} {cost:?} turned {:.2} g {:.0}", poses[0].rotation.angle_between(refined.poses[0].rotation), before.total-cost.total); }
-        if exchange.gains([before, cost], [poses, &refined.poses]) {
-            poses.clone_from(&refined.poses);
-            predicted.clone_from(&exchange.poses);
-        } else {
-            fit.exchange(&mut refined.matched);
-        }
-        exchange.keep(&refined.poses, origin);
-        REFINE
-    }
-
     /// Fills the pool with other configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<&Detection>) {
         let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
@@ -291,67 +228,10 @@ impl Hypotheses {
     }
 }
 
-impl Refined {
-    /// Refines a hypothesis with the whole body. True when it explains the frame better as a whole, and `fit` then holds its
-    /// matches; else `fit` is as before.
-    #[allow(clippy::too_many_arguments, reason = "what is tried, where, and with what")]
-    fn improves(
-        &mut self,
-        context: Context,
-        index: usize,
-        fit: &mut Fit,
-        current: &[Pose],
-        hypothesis: &[Pose],
-        suspicion: &mut Suspicion,
-        basis: Basis,
-    ) -> bool {
-        let chain = &context.model.extremities[index];
-        let before = self.cost(context, fit, current);
-        let cost = self.refine(context, fit, hypothesis);
-        let matched = fit.matched(&self.poses);
-        // What is as suspect as before is not worth a jump.
-        let pictures = context.pictures_alone();
-        let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-        if cost.is_better_than(&before) && (basis == Basis::Lean || sure(matched)) {
-            return true;
-        }
-        fit.exchange(&mut self.matched);
-        false
-    }
-
-    /// Refines a hypothesis with the whole body; `fit` then holds its matches, and `matched` those of before.
-    fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> Cost {
-        self.poses.clear();
-        self.poses.extend_from_slice(hypothesis);
-        fit.exchange(&mut self.matched);
-        let last = context.config.max_steps;
-        for step in 0..REFINE {
-            fit.step(context, hypothesis, &mut self.poses, last.saturating_sub(REFINE - step));
-        }
-        fit.match_last(context, &self.poses);
-        let poses = std::mem::take(&mut self.poses);
-        let cost = self.cost(context, fit, &poses);
-        self.poses = poses;
-        cost
-    }
-
-    /// What matched poses cost, by pictures as well where these are all there is.
-    fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
-        let mut cost = overall_cost(context, fit.matched(poses));
-        if context.pictures_alone() {
-            let Context { model, seen, previous, .. } = context;
-            let posed = Posed { body: &model.body, poses, previous, origin: seen.origin() };
-            fit.regions().draw(seen.frame(), posed, |_| true, &mut self.backdrop);
-            let explained = fit.regions().explained(seen.frame(), posed, &self.backdrop);
-            (cost.evidence, cost.total) = (cost.evidence - explained, cost.total - explained);
-        }
-        cost
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
+    use super::history::Basis;
     use super::*;
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};

@@ -28,7 +28,7 @@ use evidence::Evidence;
 use histogram::Kind;
 use labels::Labels;
 use lens::Lens;
-use lines::{Line, Viewer};
+use lines::{Beside, Line, Viewer};
 use models::ColorModel;
 use scan::{Scanner, Search};
 use scene::Scene;
@@ -279,7 +279,7 @@ impl Regions {
         let (body, Camera { lens, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, lens, CELL_BITS, |_| true);
         lines.clear();
-        let viewer = Viewer { body, lens, labels, unit: unit_of(lens) };
+        let viewer = Viewer { body, lens, labels, unit: unit_of(lens), beside: Beside::of(frame, picture) };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
@@ -295,7 +295,7 @@ impl Regions {
         let light = evidence.iter().filter(|evidence| evidence.doubts()).count() > MANY;
         for line in &camera.lines {
             let doubtful = evidence.get(usize::from(line.limb)).is_some_and(Evidence::doubts);
-            if light || !doubtful {
+            if !line.hidden && (light || !doubtful) {
                 scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
             }
         }

@@ -112,8 +112,15 @@ fn set(at: Extremity, poses: &mut [Pose], turn: Quat, twist: f64, bend: f64) {
     else {
         return;
     };
+    if let Some((shoulder, _)) = &body.limbs()[chain.upper].parent
+        && let Some((trunk, joint)) = &body.limbs()[*shoulder].parent
+        && !chain.leg
+    {
+        poses[*shoulder] = place(joint, &poses[*trunk], Quat::IDENTITY);
+    }
     let rotation = turn * at.matched.poses[chain.upper].rotation * Quat::from_rotation_z(twist);
-    poses[chain.upper] = Pose::from_parts(at.root() - rotation * ball.limb_from_joint.translation, rotation);
+    let root = chain.root(body, poses);
+    poses[chain.upper] = Pose::from_parts(root - rotation * ball.limb_from_joint.translation, rotation);
     let axis = hinge_axis(hinge);
     let [low, high] = hinge.limits.map_or([0.0, 0.8 * PI], |limits| limits[if axis == Vec3::X { 0 } else { 1 }]);
     let flexion = Quat::from_axis_angle(axis, low + bend * (high - low));
