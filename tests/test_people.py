@@ -75,6 +75,43 @@ def test_what_is_measured_of_one_person_is_theirs(someone):
     assert len(people.step(frame(0.2, someone))) == 0
 
 
+def shifted(joints, *by):
+    return {name: tuple(np.add(place, by)) for name, place in joints.items()}
+
+
+def test_of_two_near_each_other_the_one_that_explains_more_stays(someone):
+    people = voodoo.People()
+    # The one who came first is 20 cm beside the one who is seen.
+    assert [people.add(shifted(STANDING, 0.0, 0.2, 0.0), fit_sizes=False), people.add(STANDING, fit_sizes=False)] == [
+        1,
+        2,
+    ]
+    assert [person.id for person in people.step(frame(0.0, someone))] == [2]
+
+
+def test_free_points_belong_to_whose_surface_explains_them(someone):
+    body, estimate = someone
+    beside = shifted(STANDING, 0.0, 0.62, 0.0)
+    people = voodoo.People()
+    assert [people.add(joints, fit_sizes=False) for joints in (STANDING, beside)] == [1, 2]
+    shown = voodoo.Tracker(body)
+    poses = (estimate.world_from_limb, shown.reset(joints=beside, fit_sizes=False).world_from_limb)
+    clouds = [render_depth(body, pose, camera=CAMERA, world_from_sensor=WORLD_FROM_SENSOR).depth for pose in poses]
+    own = [(depth > 0.0) & ((other <= 0.0) | (depth < other)) for depth, other in (clouds, clouds[::-1])]
+    points = [_points(np.where(mask, depth, 0.0)) for mask, depth in zip(own, clouds, strict=True)]
+    seen = voodoo.Frame(0.0)
+    seen.add_points(np.concatenate(points), world_from_sensor=WORLD_FROM_SENSOR, source="lidar")
+    given = [person.estimate.sources["lidar"][0] for person in people.step(seen)]
+    # Each of the two has the points of the other's near arm within its own box.
+    assert given == [pytest.approx(len(each), rel=0.02) for each in points]
+
+
+def _points(depth):
+    rows, columns = np.nonzero(depth > 0.0)
+    z = depth[rows, columns]
+    return np.stack([(columns - CAMERA.cx) / CAMERA.fx * z, (rows - CAMERA.cy) / CAMERA.fy * z, z], axis=1)
+
+
 def test_what_cannot_be_meant_is_refused(someone):
     for wrong in ({"limit": 0}, {"forget_after": float("nan")}, {"region": ((0, 0, 0), (1, 1))}, {"config": "fast"}):
         with pytest.raises(ConfigError, match=next(iter(wrong))):

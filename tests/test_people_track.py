@@ -20,7 +20,7 @@ from voodoo.export.track import Track
 from voodoo.names import SEARCHING
 from voodoo.pipeline.people import track_people
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.people import MadeUpRecording
+from voodoo.synthetic.people import COLOR, MadeUpRecording
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.overlay import Overlay
 
@@ -225,3 +225,13 @@ def test_boxes_and_the_floor_reach_the_frame():
     everywhere = FrontEndSettings(use=("depth",), exclude=(((0.0, -5.0, -1.0), (9.0, 5.0, 3.0)),))
     steps = list(track_people(recording, voodoo.People(), settings=everywhere))
     assert all(len(step.estimate) == 0 for step in steps)
+
+
+def test_skin_is_looked_for_on_everybody_where_it_is_asked_for():
+    recording = two_people()
+    used = {}
+    for use in (None, ("depth", "skin")):
+        *_, last = track_people(recording, voodoo.People(), settings=FrontEndSettings.of(recording, use=use))
+        used[use] = [person.estimate.sources[COLOR][1] for person in last.estimate]
+    assert len(used[None]) == 2 and max(used[None]) == 0
+    assert min(used["depth", "skin"]) >= 1, used

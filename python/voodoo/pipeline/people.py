@@ -12,7 +12,7 @@ from voodoo.measurements import ColorImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate
 from voodoo.pipeline.frozen import FrozenSensors
-from voodoo.pipeline.people_keypoints import PeopleKeypoints
+from voodoo.pipeline.people_own import PeopleOwn
 from voodoo.pipeline.run import stepped
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
@@ -25,7 +25,7 @@ from voodoo.tracker import Tracker
 
 
 class PeopleFrontEnd:
-    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose, pictures in colour, keypoints.
+    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose, pictures in colour, keypoints, skin.
 
     Args:
         people: who is followed.
@@ -37,7 +37,7 @@ class PeopleFrontEnd:
         self.people = people
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
-        self.keypoints = PeopleKeypoints(people, self.settings)
+        self.own = PeopleOwn(people, self.settings)
         self._frozen = FrozenSensors()
         # Adapters ask who is tracked; nobody in particular is.
         self._nobody = Tracker(Body.human())
@@ -48,23 +48,23 @@ class PeopleFrontEnd:
         Raises:
             MeasurementError: a measurement that cannot be used; all is as it was.
         """
-        memory, frozen, keypoints = copy(self.memory), copy(self._frozen), copy(self.keypoints)
+        memory, frozen, own = copy(self.memory), copy(self._frozen), copy(self.own)
         try:
             frame = self.frame(recorded)
-            own = self.keypoints.frames(recorded.stamp, self._alive)
-            estimate = self.people.step(frame, own=own)
+            estimate = self.people.step(frame, own=self.own.frames(recorded.stamp, self._alive))
         except BaseException:
-            self.memory, self._frozen, self.keypoints = memory, frozen, keypoints
+            self.memory, self._frozen, self.own = memory, frozen, own
             raise
-        self.keypoints.learn(estimate)
+        self.own.learn(estimate, self._alive)
         return estimate
 
     def frame(self, recorded: RecordedFrame) -> Frame:
         """The frame of all persons, without stepping."""
         chosen = self.settings
         colored = self.people.wants_color
+        looked_at = colored or self.own.skin
         alive = self._alive = self._frozen.without(
-            recorded.measurements, use=chosen.use, idle=lambda item: isinstance(item, ColorImage) and not colored
+            recorded.measurements, use=chosen.use, idle=lambda item: isinstance(item, ColorImage) and not looked_at
         )
         frame = Frame(stamp=recorded.stamp)
         for low, high in chosen.exclude:

@@ -95,7 +95,7 @@ class FrontEndSettings:
         """The defaults for a recording, with the inputs in `use`.
 
         Without `use` all inputs, colour regions only where nothing tells the whole body's pose (see WHOLE_BODY), and no skin
-        in pictures that are all there is. The floor is known where the root frame is one of LEVEL_FRAMES.
+        in pictures that are all there is, nor of several persons. The floor is known where the root frame is one of LEVEL_FRAMES.
 
         Raises:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
@@ -107,7 +107,10 @@ class FrontEndSettings:
                 f"use: expected some of what {recording.name} has ({', '.join(sorted(has))}), found {', '.join(settings.use)}"
             )
         scene = recording.empty_scene() if "color" in settings.use else {}
-        return replace(settings, empty_scene=scene, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None)
+        skin = replace(settings.skin, each=use is not None and "skin" in settings.use)
+        return replace(
+            settings, skin=skin, empty_scene=scene, ground_z=0.0 if recording.root_frame in LEVEL_FRAMES else None
+        )
 
 
 def inputs_for(recording: Recording) -> tuple[str, ...]:

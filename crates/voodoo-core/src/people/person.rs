@@ -34,9 +34,8 @@ pub(super) struct Person {
     pub(super) seen: f64,
     /// Root where last seen, world frame.
     pub(super) place: Vec3,
-    /// Sizes as the detector told them, the mean of all looks, and their number.
-    sizes: Vec<f64>,
-    looks: f64,
+    /// Natural logarithm of their stature as the detector told it and its variance, the mean of all looks by what each is worth.
+    stature: Option<[f64; 2]>,
     /// What they wear.
     pub(super) clothes: Clothes,
     looked: f64,
@@ -53,8 +52,7 @@ impl Person {
             born: stamp,
             seen: stamp,
             place: Vec3::ZERO,
-            sizes: Vec::new(),
-            looks: 0.0,
+            stature: None,
             clothes: Clothes::default(),
             looked: f64::NEG_INFINITY,
             expected: Vec::new(),
@@ -71,21 +69,19 @@ impl Person {
         self.there && !matches!(self.tracker.estimate().status, Status::Lost | Status::Searching)
     }
 
-    /// Takes the sizes of a look in.
+    /// Takes the stature of a look in. What one look has wrong the next one has, too: the best says how sure all are.
     pub(super) fn measure(&mut self, detection: &Detection) {
-        let sizes = detection.sizes();
-        self.sizes.resize(sizes.len(), 0.0);
-        self.looks += 1.0;
-        for (mean, size) in self.sizes.iter_mut().zip(sizes) {
-            *mean += (size - *mean) / self.looks;
-        }
+        let Some([seen, variance]) = stature(detection) else { return };
+        self.stature = Some(self.stature.map_or([seen, variance], |[known, before]| {
+            let share = before / (before + variance);
+            [known + share * (seen - known), before.min(variance)]
+        }));
     }
 
-    /// By how much a detected person's stature differs, relative: all sizes follow it.
+    /// What a detected person's stature speaks against being this one, nats.
     pub(super) fn unlike(&self, detection: &Detection) -> f64 {
-        let sizes = detection.sizes();
-        let stature = |sizes: &[f64]| sizes.get(STATURE).copied();
-        stature(&self.sizes).zip(stature(&sizes)).map_or(0.0, |(own, other)| (other / own).ln().abs())
+        let both = self.stature.zip(stature(detection));
+        both.map_or(0.0, |([own, a], [other, b])| 0.5 * (other - own).powi(2) / (a + b))
     }
 
     /// Notes how they came out of a frame; they are away when they are lost for too long.
@@ -131,6 +127,11 @@ impl Person {
             _ => Whereabouts::Gone,
         }
     }
+}
+
+/// Natural logarithm of a detected person's stature, and its variance; all sizes follow it.
+fn stature(detection: &Detection) -> Option<[f64; 2]> {
+    detection.lengths.get(STATURE).map(|[length, sigma]| [length.ln(), sigma * sigma])
 }
 
 /// Where somebody is who is not seen.

@@ -78,6 +78,7 @@ class Context:
         motion: how limbs move.
         gate: around the predicted sites.
         memory: of this front end.
+        others: those who are followed beside the one whose frame is made.
         rays: to put rays of named sites into; they are weighed against each other before they join the frame.
     """
 
@@ -90,6 +91,7 @@ class Context:
     motion: LimbMotion
     gate: SiteGate
     memory: Memory
+    others: Sequence[Followed] = ()
     rays: list[SiteRay] = field(default_factory=list)
 
     @property

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,7 @@ class SkinAdapter(Adapter[ColorImage]):
             stamp=item.stamp,
             body=view,
             surface=lambda places: _limb_distances(tracker, places),
+            strangers=partial(_distance, context.others) if context.others else None,
             arm_lost=_hands(tracker, sites, "forearm", measured=False),
             upper_arm_visible=_hands(tracker, sites, "upperarm", measured=True),
             head_visible=_heads(tracker, sites),
@@ -126,6 +128,11 @@ def _heads(tracker: Tracker | Followed, sites: Iterable[str]) -> set[str]:
     """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
     measured = tracker.estimate.limb_status.get("head") == "measured"
     return {site for site in sites if measured and site.startswith("head")}
+
+
+def _distance(others: Sequence[Followed], places: FloatArray) -> npt.NDArray[np.float32]:
+    """Of places from the nearest of several bodies."""
+    return np.asarray(np.min([other.distance(places) for other in others], axis=0))
 
 
 def _limb_distances(tracker: Tracker | Followed, places: FloatArray) -> dict[str, npt.NDArray[np.float32]]:

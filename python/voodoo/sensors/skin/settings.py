@@ -30,6 +30,7 @@ class SkinSettings:
         static_seconds: what has skin's colour for so long away from head and hands is background [s].
         settled_frames: pictures to learn from before the cue is used.
         learn_every: of the pictures after those, every n-th is learnt from.
+        each: with several persons, of each of them; it costs about as much for everybody as for one.
 
     Raises:
         MeasurementError: a number that is not above zero.
@@ -49,6 +50,7 @@ class SkinSettings:
     static_seconds: float = 1.0
     settled_frames: int = 1
     learn_every: int = 3
+    each: bool = False
 
     def __post_init__(self) -> None:
         """Check the numbers."""

@@ -98,6 +98,7 @@ class SkinTracker:
         stamp: float | None = None,
         body: BodyView | None = None,
         surface: Surface | None = None,
+        strangers: Callable[[FloatArray], npt.NDArray[np.floating[Any]]] | None = None,
         arm_lost: Collection[str] = (),
         upper_arm_visible: Collection[str] = (),
         head_visible: Collection[str] = (),
@@ -115,6 +116,7 @@ class SkinTracker:
                 of its site, so that a hand hidden behind the body does not jump to what is in front.
             surface: distances of places (N, 3) from each limb's surface, limb name -> (N,) [m]; see
                 `Tracker.limb_distances`.
+            strangers: distances (N,) of places (N, 3) from other persons; what is nearer to them than to the body is theirs.
             arm_lost: sites whose limb the other sensors do not show where the body has it.
             upper_arm_visible: sites whose upper arm they do show there: its hand is a forearm away from that elbow.
             head_visible: sites whose own limb they show there, see `SkinSettings.shown_bias`.
@@ -165,6 +167,9 @@ class SkinTracker:
             specks=specks,
             unexplained=self.settings.unexplained,
         )
+        if strangers is not None and limbs:
+            own = np.min(list(limbs.values()), axis=0)
+            allowed[:, deep & (strangers(surfaces) < own)] = 0.0
         # A speck far from where the hand is expected is what is left of another region.
         allowed[(distance > self.settings.gate) & specks] = 0.0
         others = elsewhere(sites, sights, limbs, arm_lost)

@@ -1,20 +1,21 @@
-"""Keypoints of several people in several cameras: whose they are, and who is new."""
+"""What is one person's alone among several: their keypoints in several cameras, and their skin; and who is new."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from voodoo._core import Frame
 from voodoo.errors import MeasurementError
-from voodoo.measurements import KeypointImage
+from voodoo.measurements import ColorImage, DepthImage, KeypointImage
 from voodoo.people import Followed, People, PeopleEstimate
 from voodoo.pipeline.starts.base import Seen
 from voodoo.pipeline.starts.cameras import everybody
-from voodoo.sensors.adapters import Context, Memory, adapter_of
+from voodoo.sensors.adapters import Adapter, Context, Memory, adapters_of
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.keypoints.people import shared_out
 from voodoo.sensors.motion import LimbMotion
@@ -34,13 +35,20 @@ class _Person:
     gate: SiteGate
     predictor: SitePredictor = field(default_factory=SitePredictor)
     motion: LimbMotion = field(default_factory=LimbMotion)
+    memory: Memory = field(default_factory=Memory)
 
     def __copy__(self) -> _Person:
-        return replace(self, gate=copy(self.gate), predictor=copy(self.predictor), motion=copy(self.motion))
+        return replace(
+            self,
+            gate=copy(self.gate),
+            predictor=copy(self.predictor),
+            motion=copy(self.motion),
+            memory=copy(self.memory),
+        )
 
 
-class PeopleKeypoints:
-    """Gives the keypoints of every picture to persons, and lets somebody in whom most of the cameras show.
+class PeopleOwn:
+    """Gives the keypoints and the skin of every picture to persons, and lets somebody in whom most of the cameras show.
 
     Args:
         people: who is followed.
@@ -54,22 +62,23 @@ class PeopleKeypoints:
         self._persons: dict[int, _Person] = {}
         self._cameras: set[str] = set()
 
-    def __copy__(self) -> PeopleKeypoints:
+    def __copy__(self) -> PeopleOwn:
         """The same, with a memory of its own."""
-        twin = PeopleKeypoints(self._people, self._settings)
+        twin = PeopleOwn(self._people, self._settings)
         twin._persons = {number: copy(person) for number, person in self._persons.items()}
         twin._cameras = set(self._cameras)
         return twin
 
     def frames(self, stamp: float, measurements: Iterable[object]) -> dict[int, Frame]:
-        """Number of a person -> their keypoints as rays; somebody new is followed from this frame on.
+        """Number of a person -> their keypoints and skin as rays; somebody new is followed from this frame on.
 
         Raises:
-            MeasurementError: keypoints that cannot be used.
+            MeasurementError: keypoints or a picture that cannot be used.
         """
-        if "keypoints" not in self._settings.use:
-            return {}
-        images = [item for item in measurements if isinstance(item, KeypointImage)]
+        used = list(measurements)
+        images = [item for item in used if isinstance(item, KeypointImage) and "keypoints" in self._settings.use]
+        pictured = [item for item in used if isinstance(item, ColorImage) and self.skin]
+        depths = [item for item in used if isinstance(item, DepthImage)]
         self._cameras.update(item.sensor for item in images)
         predicted = {number: person.predictor.predict(stamp) for number, person in self._persons.items()}
         shared = [shared_out(item, predicted) for item in images]
@@ -78,18 +87,29 @@ class PeopleKeypoints:
             predicted[number] = dict(joints)
             rest = [shared_out(each.rest, {number: joints}).of for each in shared]
             pictures[number] = [of[number] for of in rest if number in of]
-        return {
-            number: self._frame(stamp, number, predicted[number], items) for number, items in pictures.items() if items
-        }
+        frames = {}
+        for number, items in pictures.items():
+            if items or pictured:
+                frames[number] = self._frame(stamp, number, predicted, [*items, *pictured], depths)
+        return frames
 
-    def learn(self, estimate: PeopleEstimate) -> None:
-        """Take up where everybody is."""
+    def learn(self, estimate: PeopleEstimate, measurements: Iterable[object]) -> None:
+        """Take up where everybody is, and how their skin looks."""
+        pictured = [item for item in measurements if isinstance(item, ColorImage) and self.skin]
         there = {person.id: person.estimate for person in estimate}
         self._persons = {number: kept for number, kept in self._persons.items() if number in there}
         for number, found in there.items():
             person = self._persons.setdefault(number, self._new())
             person.predictor.update(estimate.stamp, found.joints)
             person.motion.update(estimate.stamp, found.world_from_limb)
+            for item in pictured:
+                for adapter in _own_adapters(item, self._settings):
+                    adapter.learn(item, found, person.memory, vouched=False)
+
+    @property
+    def skin(self) -> bool:
+        """Whether skin is looked for on each of them."""
+        return "skin" in self._settings.use and self._settings.skin.each
 
     def _new(self) -> _Person:
         chosen = self._settings
@@ -116,26 +136,43 @@ class PeopleKeypoints:
         return come
 
     def _frame(
-        self, stamp: float, number: int, predicted: Mapping[str, FloatArray], items: Sequence[KeypointImage]
+        self,
+        stamp: float,
+        number: int,
+        everybody_predicted: Mapping[int, Mapping[str, FloatArray]],
+        items: Sequence[KeypointImage | ColorImage],
+        depths: Sequence[DepthImage],
     ) -> Frame:
         chosen = self._settings
         person = self._persons.setdefault(number, self._new())
+        predicted = everybody_predicted[number]
         frame = Frame(stamp=stamp)
         context = Context(
             stamp=stamp,
-            measurements=items,
+            measurements=[*items, *depths],
             predicted=predicted,
             settings=chosen,
             tracker=Followed(self._people, number),
+            others=tuple(Followed(self._people, other) for other in everybody_predicted if other != number),
             predictor=person.predictor,
             motion=person.motion,
             gate=person.gate,
-            memory=Memory(),
+            memory=person.memory,
         )
         for item in items:
-            adapter_of(item).add(frame, item, context)
+            for adapter in _own_adapters(item, chosen):
+                adapter.add(frame, item, context)
         rays = context.rays
         if chosen.agreement > 0.0:
             rays = agreed(rays, predicted=predicted, scale=chosen.agreement)
         add_rays(frame, rays, model=chosen.model)
         return frame
+
+
+def _own_adapters(item: KeypointImage | ColorImage, settings: FrontEndSettings) -> list[Adapter[Any]]:
+    """Adapters of what is one person's: colour regions are everybody's."""
+    return [
+        adapter
+        for adapter in adapters_of(item)
+        if adapter.kind in settings.use and adapter.kind in ("keypoints", "skin")
+    ]
