@@ -10,7 +10,7 @@ use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3, shifted};
 
 /// One looks in so many frames, and in every one in which a leg is in doubt.
-const EVERY: usize = 4;
+const EXCHANGED_EVERY: usize = 4;
 /// What explains a smaller share of what is explained now is not refined: legs that stand right lose more when they are exchanged.
 const WORTH_A_LOOK: f64 = 0.88;
 /// What is followed explains this share at least, and is given up after so many frames.
@@ -80,7 +80,7 @@ impl Exchange {
 
     /// Whether to look in this frame; to be called in every one.
     fn is_due(&mut self, doubtful: bool) -> bool {
-        self.frames = (self.frames + 1) % EVERY;
+        self.frames = (self.frames + 1) % EXCHANGED_EVERY;
         self.frames == 0 || doubtful || self.goes_on()
     }
 
@@ -180,7 +180,7 @@ mod tests {
     fn one_looks_every_so_often_and_at_once_where_a_leg_is_in_doubt() {
         let mut exchange = Exchange::default();
         let due: Vec<bool> = (0..8).map(|_| exchange.is_due(false)).collect();
-        assert_eq!(due.iter().filter(|due| **due).count(), 8 / EVERY);
+        assert_eq!(due.iter().filter(|due| **due).count(), 8 / EXCHANGED_EVERY);
         assert!(exchange.is_due(true));
     }
 }
