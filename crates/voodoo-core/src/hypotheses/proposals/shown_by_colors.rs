@@ -35,29 +35,26 @@ impl Propose for ShownByColors {
         }
         self.find_directions(at, rough);
         let mut best = None;
-        // While an arm was lost its shoulder may have been dragged anywhere: on one at rest as well.
-        let shoulders = &[false, true][..if at.chain().leg { 1 } else { 2 }];
-        for (&(_, upper), &at_rest) in self.kept.iter().flat_map(|kept| shoulders.iter().map(move |rest| (kept, rest)))
-        {
+        for &(_, upper) in &self.kept {
             for twist in TWISTS {
                 for bend in 0..BENDS {
                     let share = (bend as f64 + 0.5) / BENDS as f64;
-                    let change = |poses: &mut [Pose]| set(at, poses, upper, twist, share, at_rest);
+                    let change = |poses: &mut [Pose]| set(at, poses, upper, twist, share);
                     let least = rough.changed(at, change, pool.least, &mut pool.points.poses);
                     if least < pool.least {
                         pool.least = least;
-                        best = Some((upper, twist, share, at_rest));
+                        best = Some((upper, twist, share));
                     }
                 }
             }
         }
-        let Some((mut upper, twist, mut share, at_rest)) = best else { return };
+        let Some((mut upper, twist, mut share)) = best else { return };
         for step in CLOSER {
             for (turn, bend) in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ZERO].into_iter().flat_map(|axis| {
                 [-step, step].map(|angle| (axis * angle, if axis == Vec3::ZERO { angle } else { 0.0 }))
             }) {
                 let tried = (Quat::from_scaled_axis(turn) * upper, (share + bend).clamp(0.0, 1.0));
-                let change = |poses: &mut [Pose]| set(at, poses, tried.0, twist, tried.1, at_rest);
+                let change = |poses: &mut [Pose]| set(at, poses, tried.0, twist, tried.1);
                 let least = rough.changed(at, change, pool.least, &mut pool.points.poses);
                 if least < pool.least {
                     pool.least = least;
@@ -93,7 +90,7 @@ impl ShownByColors {
             let turn = Quat::from_rotation_arc(now, to);
             trial.clear();
             trial.extend_from_slice(poses);
-            set(at, trial, turn, 0.0, 0.0, false);
+            set(at, trial, turn, 0.0, 0.0);
             let broken = limit_strain(body, trial, chain.upper);
             if broken > BROKEN {
                 continue;
@@ -108,22 +105,15 @@ impl ShownByColors {
     }
 }
 
-/// Puts the shoulder `at_rest` or leaves it, turns the upper limb from where it is, then about its own axis, and bends the hinge to a share of what it can.
-fn set(at: Extremity, poses: &mut [Pose], turn: Quat, twist: f64, bend: f64, at_rest: bool) {
+/// Turns the upper limb from where it is, then about its own axis, and bends the hinge to a share of what it can.
+fn set(at: Extremity, poses: &mut [Pose], turn: Quat, twist: f64, bend: f64) {
     let (chain, body) = (at.chain(), &at.context.model.body);
     let (Some((_, ball)), Some((_, hinge))) = (&body.limbs()[chain.upper].parent, &body.limbs()[chain.lower].parent)
     else {
         return;
     };
-    if let Some((shoulder, _)) = &body.limbs()[chain.upper].parent
-        && let Some((trunk, joint)) = &body.limbs()[*shoulder].parent
-        && at_rest
-    {
-        poses[*shoulder] = place(joint, &poses[*trunk], Quat::IDENTITY);
-    }
     let rotation = turn * at.matched.poses[chain.upper].rotation * Quat::from_rotation_z(twist);
-    let root = chain.root(body, poses);
-    poses[chain.upper] = Pose::from_parts(root - rotation * ball.limb_from_joint.translation, rotation);
+    poses[chain.upper] = Pose::from_parts(at.root() - rotation * ball.limb_from_joint.translation, rotation);
     let axis = hinge_axis(hinge);
     let [low, high] = hinge.limits.map_or([0.0, 0.8 * PI], |limits| limits[if axis == Vec3::X { 0 } else { 1 }]);
     let flexion = Quat::from_axis_angle(axis, low + bend * (high - low));
