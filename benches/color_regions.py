@@ -1,6 +1,7 @@
 """Pose from colour regions on recordings of several colour cameras with exact truth, and under disturbances.
 
     python benches/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] [--rounds 9] ...
+    python benches/color_regions.py D/multiview/mv_d2* --grey --picture worst.jpg
 
 Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, mean and spread of the errors of joint
 angles, joints that are more than 10 cm off in the last third of a second, how many of the ends of limbs that are more than 10 cm
@@ -16,12 +17,14 @@ import re
 import time
 from pathlib import Path
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 import voodoo
 from voodoo.evaluation.metrics import angle_error
 from voodoo.measurements import ColorImage
+from voodoo.model.projection import CameraView
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.recordings import open_recording
 
@@ -78,8 +81,6 @@ def number_of(sensor: str) -> int:
 
 def empty_scene(folder: Path, camera: int, grey: bool) -> list[Picture]:
     """Pictures of the scene without anybody."""
-    import cv2
-
     files = sorted((folder / "background").glob(f"cam_{camera}_*.*"))
     return [shown(cv2.imread(str(file)), grey) for file in files]
 
@@ -88,6 +89,40 @@ def called_measured(estimate: voodoo.Estimate) -> list[bool]:
     """Of every joint whether it ends a limb that is called measured."""
     carriers = [f"{joint[0]}_{LIMBS.get(joint[2:], '')}" for joint in JOINTS]
     return [estimate.limb_status.get(carrier) == "measured" for carrier in carriers]
+
+
+BONES = [
+    (f"{side}_{one}", f"{side}_{other}")
+    for side in "lr"
+    for one, other in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+]
+TILE = 300
+MAGENTA, BLUE, ORANGE = (255, 0, 255), (240, 150, 60), (40, 130, 240)
+
+
+def failure(
+    shots: list[ColorImage], pictures: list[Picture], found: npt.NDArray[np.float64], truth: npt.NDArray[np.float64]
+) -> Picture:
+    """What the cameras see of one frame about the person: what was found in blue (left) and orange, the truth in magenta."""
+    tiles = []
+    for item, picture in zip(shots, pictures, strict=True):
+        shown = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
+        view = CameraView(item.camera, item.root_from_sensor, 1.0)
+        seen = [dict(zip(JOINTS, view.project(places)[0], strict=True)) for places in (truth, found)]
+        for places, own in zip(seen, (False, True), strict=True):
+            for bone in BONES:
+                if not all(np.isfinite(places[name]).all() for name in bone):
+                    continue
+                ends = [tuple(np.rint(places[name]).astype(int).tolist()) for name in bone]
+                color = MAGENTA if not own else BLUE if bone[0][0] == "l" else ORANGE
+                cv2.line(shown, *ends, color, 2, cv2.LINE_AA)
+        corners = np.array([place for places in seen for place in places.values() if np.isfinite(place).all()])
+        middle, half = np.mean([corners.min(axis=0), corners.max(axis=0)], axis=0), 0.65 * np.ptp(corners, axis=0).max()
+        half = min(half, 0.5 * min(shown.shape[:2]))
+        row, column = (int(np.clip(middle[axis] - half, 0, shown.shape[1 - axis] - 2 * half)) for axis in (1, 0))
+        part = shown[row : row + int(2 * half), column : column + int(2 * half)]
+        tiles.append(cv2.resize(part, (TILE, TILE), interpolation=cv2.INTER_AREA))
+    return np.asarray(cv2.hconcat(tiles), dtype=np.uint8)
 
 
 def run(
@@ -111,13 +146,13 @@ def run(
     if options.rounds:
         order = (order + order[-2:0:-1]) * options.rounds
     found, errors, measured, seconds = [], [], [], []
+    worst = 0.0
     for step, index in enumerate(order):
         frame = voodoo.Frame(step / 30.0)
         first = frames[index][-1].stamp
-        for item in frames[index]:
-            if number_of(item.sensor) not in chosen:
-                continue
-            picture = shown(disturbed(item.image, rng, options, step), options.grey)
+        shots = [item for item in frames[index] if number_of(item.sensor) in chosen]
+        pictures = [shown(disturbed(item.image, rng, options, step), options.grey) for item in shots]
+        for item, picture in zip(shots, pictures, strict=True):
             frame.add_color(
                 np.ascontiguousarray(picture),
                 camera=item.camera,
@@ -132,6 +167,12 @@ def run(
         found.append(places)
         errors.append(np.linalg.norm(places - truth[index], axis=1))
         measured.append(called_measured(estimate))
+        if options.picture and errors[-1].sum() > worst and step <= options.until:
+            worst = errors[-1].sum()
+            options.picture.parent.mkdir(parents=True, exist_ok=True)
+            drawn = failure(shots, pictures, places, truth[index])
+            cv2.imwrite(str(options.picture), drawn, [cv2.IMWRITE_JPEG_QUALITY, 80])
+            print(f"frame {step}: {options.picture}")
     return np.array(errors), np.array(measured), angle_error(np.array(found), truth[order]), seconds
 
 
@@ -142,6 +183,8 @@ def main() -> None:
     parser.add_argument("--start", type=int, help="joints of the start 3 to 5 cm off, by this seed")
     parser.add_argument("--cameras", default="0,1,2,3")
     parser.add_argument("--rounds", type=int, default=0, help="forwards and backwards so many times")
+    parser.add_argument("--picture", type=Path, help="a .jpg of the worst frame, until the given one")
+    parser.add_argument("--until", type=int, default=10**9, help="last frame that --picture shows")
     parser.add_argument("--config", default="{}", help="JSON of configuration keys")
     for switch in ("noise", "rectangles", "corrupt", "dim", "grey", "background", "default-lengths"):
         parser.add_argument(f"--{switch}", action="store_true")

@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::color_scene;
-use color_scene::{CAMERAS, picture, shoot, standing};
+use color_scene::{CAMERAS, WIDTH, depth_of, depth_picture, picture, shoot, standing, world_from_camera};
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::picture::{ColorImage, ColorPixels};
@@ -154,6 +154,64 @@ fn an_arm_or_leg_that_is_lost_in_colours_is_looked_for_and_found() {
             [true, false].map(|hypotheses| after_a_swing(Config { hypotheses, ..Config::default() }, limbs, turn, 8));
         assert!(with < 0.05 && without > 0.15, "{limbs:?}: {with} m, and {without} m where nothing is looked for");
     }
+}
+
+/// How many edges the first camera finds on the left arm, with a depth camera beside it; before the half of the picture with that
+/// arm, or before the other one, stands a board in the clothes' colour.
+fn edges_beside_depth(body: &Body, before_arm: bool) -> usize {
+    let poses = standing(body);
+    let (mut pixels, mut depth) = (shoot(Some((body, &poses)), 0), depth_of(body, &poses, 0));
+    let arm = ["l_upperarm", "l_forearm"].map(|name| body.limb_index(name).unwrap());
+    let left_half = (world_from_camera(0).inverse() * poses[arm[0]].translation).x < 0.0;
+    for (index, (pixel, depth)) in pixels.iter_mut().zip(&mut depth).enumerate() {
+        if ((index % WIDTH < WIDTH / 2) == left_half) == before_arm {
+            (*pixel, *depth) = ([180, 40, 50], 1.5);
+        }
+    }
+    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    tracker.reset_pose(&poses).unwrap();
+    let (colors, images) = ([picture(&pixels, 0, 0.0)], [depth_picture(&depth, 0)]);
+    tracker.step(&Frame { colors: &colors, images: &images, ..Frame::empty(0.0) }).unwrap();
+    tracker.region_lines(0).filter(|line| arm.contains(&line.limb) && line.sigma.is_finite()).count()
+}
+
+#[test]
+fn what_a_depth_camera_sees_before_the_body_hides_its_edges() {
+    let body = human();
+    let [beside, before] = [false, true].map(|before| edges_beside_depth(&body, before));
+    assert!(beside > 10 && before == 0, "{beside} edges, {before} behind a board");
+}
+
+/// How far an ankle is off, metres, eight frames after both legs of a stride changed places between two frames.
+fn after_a_change_of_step(hypotheses: bool) -> f64 {
+    let body = human();
+    let stride = |left: f64| {
+        let mut poses = standing(&body);
+        for (limbs, turn) in [(["l_thigh", "l_calf", "l_foot"], left), (["r_thigh", "r_calf", "r_foot"], -left)] {
+            let swung = swung(&body, limbs, Quat::from_rotation_y(turn));
+            limbs.map(|name| body.limb_index(name).unwrap()).iter().for_each(|limb| poses[*limb] = swung[*limb]);
+        }
+        poses
+    };
+    let (before, after) = (stride(0.3), stride(-0.3));
+    let mut tracker = Tracker::new(body.clone(), Config { hypotheses, ..Config::default() }).unwrap();
+    tracker.reset_pose(&before).unwrap();
+    let shots = [&before, &after].map(|poses| (0..CAMERAS).map(|n| shoot(Some((&body, poses)), n)).collect::<Vec<_>>());
+    for frame in 0..12 {
+        let stamp = frame as f64 / RATE;
+        let seen = &shots[usize::from(frame >= 4)];
+        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, stamp)).collect();
+        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+    }
+    let calf = body.limb_index("l_calf").unwrap();
+    let ankle = Vec3::Z * body.limbs()[calf].shape.length();
+    (tracker.estimate().world_from_limb[calf] * ankle).distance(after[calf] * ankle)
+}
+
+#[test]
+fn legs_that_change_places_between_two_frames_are_exchanged() {
+    let [with, without] = [true, false].map(after_a_change_of_step);
+    assert!(with < 0.06 && without > 0.15, "{with} m, and {without} m where nothing is tried");
 }
 
 #[test]

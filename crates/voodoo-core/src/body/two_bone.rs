@@ -99,7 +99,8 @@ impl TwoBone {
         poses[self.lower] * (Vec3::Z * self.lengths[1])
     }
 
-    fn put(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
+    /// Puts the chain so that it bends towards one place and ends in the direction of another one; the joints stay closed.
+    pub fn put(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
         let root = self.root(body, poses);
         let (Some((_, ball)), Some((_, hinge))) = (&body.limbs()[self.upper].parent, &body.limbs()[self.lower].parent)
         else {

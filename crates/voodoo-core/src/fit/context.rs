@@ -7,6 +7,9 @@ use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::observer::Observation;
 
+/// A frame that comes later than so many after the last one says nothing of how the body moves now.
+const LATE: f64 = 2.5;
+
 /// One frame of one body. Cheap to copy.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
@@ -29,6 +32,11 @@ impl Context<'_> {
             let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
             arms.flat_map(TwoBone::limbs).any(|own| own == limb)
         }
+    }
+
+    /// Whether the body may have moved as nobody expects: two frames show how it moves, and a long time may change that.
+    pub fn moves_unknown(&self) -> bool {
+        self.time_scale > LATE
     }
 
     /// Whether colours are all that shows the body.

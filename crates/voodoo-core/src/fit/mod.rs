@@ -18,7 +18,7 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::Pose;
-use crate::regions::{Regions, STEPS};
+use crate::regions;
 use crate::solver::{Gate, Problem, Schedule, Solver, WarmStartInput, solver};
 
 /// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
@@ -31,7 +31,9 @@ pub struct Fit {
     assignment: Assignment,
     correspondences: Correspondences,
     contours: Contours,
-    regions: Regions,
+    regions: regions::Regions,
+    /// Edges of colours are looked for far away.
+    far: bool,
     band_weights: Vec<f64>,
     threads: Option<ThreadPool>,
 }
@@ -50,7 +52,8 @@ impl Fit {
             assignment: Assignment::default(),
             correspondences: Correspondences::default(),
             contours: Contours::default(),
-            regions: Regions::default(),
+            regions: regions::Regions::default(),
+            far: false,
             band_weights: Vec::new(),
             threads,
         })
@@ -91,6 +94,7 @@ impl Fit {
     pub fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.warm_start(context, poses);
         let schedule = self.schedule(context.config);
+        let edges = regions::steps(self.far);
         let mut steps = 0;
         let mut before = f64::INFINITY;
         while steps < context.config.max_steps {
@@ -103,12 +107,20 @@ impl Fit {
             self.solve(context, predicted, poses, steps);
             steps += 1;
             let settled = (before - distance).abs() < context.config.min_change;
-            if settled && self.correspondences.regions.is_empty() || steps >= STEPS && context.pictures_alone() {
+            if settled && self.correspondences.regions.is_empty() || steps >= edges && context.pictures_alone() {
                 break;
             }
             before = distance;
         }
         self.match_last(context, poses);
+        steps
+    }
+
+    /// The same where nobody knows how the body moves: edges of colours are looked for farther away at first.
+    pub fn run_far(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
+        self.far = true;
+        let steps = self.run(context, predicted, poses);
+        self.far = false;
         steps
     }
 

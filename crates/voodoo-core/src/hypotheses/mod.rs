@@ -1,10 +1,12 @@
 //! Trying other configurations of arms and legs where the frame speaks against the current ones, and keeping the best by one
 //! score.
 
+mod exchange;
 mod history;
 mod landmark_cost;
 mod persistence;
 mod proposals;
+mod refined;
 mod rough;
 mod score;
 mod suspicion;
@@ -13,17 +15,18 @@ mod unexplained;
 pub use landmark_cost::{APART, body_landmark_cost};
 pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
-use crate::association::correspondence::{Correspondences, RegionSupport};
+use crate::association::correspondence::RegionSupport;
 use crate::body::Model;
 use crate::detect::Detection;
-use crate::fit::{Context, Fit, Matched, Motion};
+use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
-use crate::regions::{Backdrop, Posed};
-use history::{Basis, History};
+use exchange::Exchange;
+use history::History;
 use proposals::{
-    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Proposal, Propose, ShownByColors,
-    TrunkLean, UnexplainedCluster,
+    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
+    UnexplainedCluster,
 };
+use refined::{Outcome, Refined};
 use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
 use unexplained::Unexplained;
@@ -36,16 +39,8 @@ const NEARBY: f64 = 1.15;
 /// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
 /// a single frame may be disturbed.
 const PATIENCE: usize = 2;
-/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
-const SEEN_GAIN: f64 = 10.0;
 /// In pictures, an arm or leg is suspect that explains a smaller share of its area, and no other limb.
 const CLAIMED: f64 = 0.3;
-/// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
-const REFINE: usize = 8;
-/// After so many of them a hypothesis is given up that costs so many patches more than the current pose: of 63 that were taken in the
-/// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
-const GIVE_UP_AFTER: usize = 6;
-const FALLEN_BEHIND: f64 = 15.0;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]
@@ -58,28 +53,8 @@ pub struct Hypotheses {
     lean: TrunkLean,
     shown: ShownByColors,
     pool: Pool,
+    exchange: Exchange,
     refined: Refined,
-}
-
-/// How the look at a hypothesis ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Outcome {
-    /// It explains the frame better.
-    Better,
-    /// It does not, or is as suspect as the current pose.
-    Refused,
-    /// It is so much worse that the next frame will hardly think otherwise.
-    Hopeless,
-}
-
-/// A hypothesis after its ICP steps.
-#[derive(Debug, Default)]
-struct Refined {
-    poses: Vec<Pose>,
-    /// Its correspondences while it is tried; those of the current poses while it is.
-    matched: Correspondences,
-    /// The whole body before what pictures show.
-    backdrop: Backdrop,
 }
 
 impl Hypotheses {
@@ -94,6 +69,7 @@ impl Hypotheses {
         // Room at once, not when the first hard frame comes.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
+        self.exchange.prepare(limbs);
         self.lean.prepare(model);
         self.refined.poses.clear();
         self.refined.poses.reserve(limbs);
@@ -115,6 +91,9 @@ impl Hypotheses {
         self.unexplained.collect(context, fit.matched(poses));
         let mut steps = 0;
         let pictures = context.pictures_alone();
+        if pictures && context.moves_unknown() {
+            steps += self.refined.try_far(context, fit, poses, predicted);
+        }
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
@@ -127,6 +106,10 @@ impl Hypotheses {
                 self.unexplained.collect(context, fit.matched(poses));
             }
             steps += taken;
+        }
+        if pictures {
+            let doubtful = |index: usize| !self.history[index].persistence.is_clear();
+            steps += self.exchange.attempt(context, doubtful, &mut self.refined, fit, poses, predicted);
         }
         if pictures && steps > 0 {
             // What was looked at last was tried.
@@ -234,7 +217,7 @@ impl Hypotheses {
         let present = refined.cost(context, fit, poses);
         let (mut steps, mut hopeless) = (0, true);
         for proposal in pool.found() {
-            let (taken, outcome) = refined.refine(context, index, fit, present, proposal, suspicion);
+            let (taken, outcome) = refined.improves(context, index, fit, present, proposal, suspicion);
             steps += taken;
             hopeless &= outcome == Outcome::Hopeless;
             if outcome != Outcome::Better {
@@ -259,72 +242,12 @@ impl Hypotheses {
     }
 }
 
-impl Refined {
-    /// Refines a hypothesis with the whole body, whose `present` pose costs so much. Returns the ICP steps that took, and whether
-    /// it explains the frame better as a whole: then `fit` holds its matches, else it is as before.
-    fn refine(
-        &mut self,
-        context: Context,
-        index: usize,
-        fit: &mut Fit,
-        present: Cost,
-        hypothesis: &Proposal,
-        suspicion: &mut Suspicion,
-    ) -> (usize, Outcome) {
-        let chain = &context.model.extremities[index];
-        let (basis, last, pictures) = (hypothesis.basis, context.config.max_steps, context.pictures_alone());
-        self.poses.clear();
-        self.poses.extend_from_slice(&hypothesis.poses);
-        fit.exchange(&mut self.matched);
-        for step in 0..REFINE {
-            let at = last.saturating_sub(REFINE - step);
-            fit.match_all(context, &self.poses, at);
-            // What colours alone tell on the way says little.
-            if step == GIVE_UP_AFTER && !pictures && self.own_cost(context, fit).total > present.total + FALLEN_BEHIND {
-                fit.exchange(&mut self.matched);
-                return (step, Outcome::Hopeless);
-            }
-            fit.solve(context, &hypothesis.poses, &mut self.poses, at);
-        }
-        fit.match_last(context, &self.poses);
-        let cost = self.own_cost(context, fit);
-        let matched = fit.matched(&self.poses);
-        let better = cost.total < present.total - GAIN && cost.evidence < present.evidence - SEEN_GAIN;
-        // What is as suspect as before is not worth a jump.
-        let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-        if better && (matches!(basis, Basis::Lean | Basis::Body) || sure(matched)) {
-            return (REFINE, Outcome::Better);
-        }
-        fit.exchange(&mut self.matched);
-        let hopeless = !pictures && cost.total > present.total + FALLEN_BEHIND;
-        (REFINE, if hopeless { Outcome::Hopeless } else { Outcome::Refused })
-    }
-
-    /// What its own poses cost.
-    fn own_cost(&mut self, context: Context, fit: &Fit) -> Cost {
-        let poses = std::mem::take(&mut self.poses);
-        let cost = self.cost(context, fit, &poses);
-        self.poses = poses;
-        cost
-    }
-
-    /// What matched poses cost, by pictures as well where these are all there is.
-    fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
-        let mut cost = overall_cost(context, fit.matched(poses));
-        if context.pictures_alone() {
-            let Context { model, seen, previous, .. } = context;
-            let posed = Posed { body: &model.body, poses, previous, origin: seen.origin() };
-            fit.regions().draw(seen.frame(), posed, |_| true, &mut self.backdrop);
-            let explained = fit.regions().explained(seen.frame(), posed, &self.backdrop);
-            (cost.evidence, cost.total) = (cost.evidence - explained, cost.total - explained);
-        }
-        cost
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
+    use super::history::Basis;
+    use super::proposals::Proposal;
+    use super::refined::REFINE;
     use super::*;
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
@@ -396,7 +319,7 @@ mod tests {
             {
                 let tried = Proposal { found: true, basis, poses: tried.clone() };
                 let arm = first_arm(&model);
-                let (steps, outcome) = refined.refine(context, arm, &mut fit, present, &tried, &mut suspicion);
+                let (steps, outcome) = refined.improves(context, arm, &mut fit, present, &tried, &mut suspicion);
                 assert!(ended(steps, outcome), "{basis:?}: {outcome:?} after {steps}");
             }
             assert_eq!(format!("{:?}", fit.correspondences()), before);

@@ -21,6 +21,8 @@ const ROUGHLY: f64 = 0.08;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub const GAIN: f64 = 25.0;
+/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
+const SEEN_GAIN: f64 = 10.0;
 /// Points looked at when rough poses are compared, at most: costs time in proportion.
 pub const ROUGH_SAMPLE: usize = 400;
 
@@ -31,6 +33,13 @@ pub struct Cost {
     pub evidence: f64,
     /// That, what hides, and the strain of all arms and legs.
     pub total: f64,
+}
+
+impl Cost {
+    /// Whether a hypothesis that costs so much is worth a jump.
+    pub fn is_better_than(&self, current: &Self) -> bool {
+        self.total < current.total - GAIN && self.evidence < current.evidence - SEEN_GAIN
+    }
 }
 
 /// What the matched poses cost.

@@ -4,6 +4,9 @@ use super::labels::{Labels, NOTHING};
 use super::lens::Lens;
 use crate::body::{Body, Limb};
 use crate::math::{Pose, Vec3};
+use crate::observation::depth_view::{DepthView, Pixel};
+use crate::observation::frame::Frame;
+use crate::observation::picture::ColorImage;
 
 /// Points on the rim of an end that no other limb is joined to.
 const RIM: usize = 8;
@@ -35,6 +38,38 @@ pub(super) struct Line {
     /// The limb is seen here and what is outside is none that hides it; and on the other side.
     pub clear: bool,
     pub both: bool,
+    /// Something that is not the body stands before it.
+    pub hidden: bool,
+}
+
+/// A depth camera this near to another camera sees what that one sees, metres.
+const SAME_VIEW: f64 = 0.15;
+/// What is measured this much nearer than a limb hides it, metres: limbs may not have been found yet.
+const BEFORE_BY: f64 = 0.15;
+
+/// A depth camera beside a camera: it sees what stands before the body.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beside<'a> {
+    view: DepthView<'a>,
+    depth_from_camera: Pose,
+}
+
+impl<'a> Beside<'a> {
+    /// That of a picture, if the frame has one.
+    pub(super) fn of(frame: &Frame<'a>, picture: &ColorImage) -> Option<Self> {
+        let place = picture.world_from_sensor.translation;
+        let near = |pose: &Pose| pose.translation.distance(place) < SAME_VIEW;
+        let image = frame.images.iter().find(|image| near(&image.world_from_sensor))?;
+        let working_from_camera = image.world_from_sensor;
+        let view = DepthView { image, background: None, working_from_camera, segmented: false };
+        Some(Self { view, depth_from_camera: working_from_camera.inverse() * picture.world_from_sensor })
+    }
+
+    /// Whether something stands before a point of the camera's frame.
+    fn hides(&self, point: Vec3) -> bool {
+        let point = self.depth_from_camera * point;
+        matches!(self.view.at(point), Pixel::Foreground(depth) if depth < point.z - BEFORE_BY)
+    }
 }
 
 /// Where lines of a limb are looked for.
@@ -44,6 +79,7 @@ pub(super) struct Viewer<'a> {
     pub labels: &'a Labels,
     /// Pixels a unit.
     pub unit: f32,
+    pub beside: Option<Beside<'a>>,
 }
 
 /// What borders a limb at a place of its contour.
@@ -117,6 +153,7 @@ impl Viewer<'_> {
         let (normal, motion) = (n.map(|value| value as f32), self.lens.motion(point, n));
         let border = self.border(limb, place, normal)?;
         let Border { outside, depth, clear } = border;
+        let hidden = self.beside.is_some_and(|beside| beside.hides(point));
         Some(Line {
             limb: limb as u16,
             foot,
@@ -127,8 +164,9 @@ impl Viewer<'_> {
             width: f32::INFINITY,
             outside,
             opposite: NOTHING,
-            clear,
+            clear: clear && !hidden,
             both: false,
+            hidden,
         })
     }
 

@@ -28,13 +28,16 @@ use evidence::Evidence;
 use histogram::Kind;
 use labels::Labels;
 use lens::Lens;
-use lines::{Line, Viewer};
+use lines::{Beside, Line, Viewer};
 use models::ColorModel;
 use scan::{Scanner, Search};
 use scene::Scene;
 
-/// How the edge is looked for in the steps of a frame: farther at first, and less closely.
-const SEARCHES: [Search; 4] = [
+/// How the edge is looked for in the steps of a frame: farther at first, and less closely. The first two where nobody knows how the
+/// body moves.
+const SEARCHES: [Search; 6] = [
+    Search { reach: 10, every: 4.0 },
+    Search { reach: 8, every: 4.0 },
     Search { reach: 8, every: 2.0 },
     Search { reach: 5, every: 2.0 },
     Search { reach: 6, every: 1.0 },
@@ -42,8 +45,7 @@ const SEARCHES: [Search; 4] = [
 ];
 /// How it is looked for where the limb's girth is asked for.
 const OUTLINE: Search = Search { reach: 10, every: 1.0 };
-/// So many steps are enough where nothing but edges is measured.
-pub const STEPS: usize = SEARCHES.len();
+const WIDE_SEARCHES: usize = 2;
 /// Which limb is seen where is drawn in cells of two to this power pixels.
 const CELL_BITS: u32 = 1;
 /// Lines stand about so far apart along a limb, metres, and so many on each side at least and at most.
@@ -70,6 +72,11 @@ struct Camera {
     edges: Vec<Option<scan::Found>>,
     camera_from_limb: Vec<Pose>,
     known: bool,
+}
+
+/// So many steps are enough where nothing but edges is measured, and where nobody knows how the body moves.
+pub fn steps(unknown_motion: bool) -> usize {
+    SEARCHES.len() - if unknown_motion { 0 } else { WIDE_SEARCHES }
 }
 
 /// Colours of the body and its surroundings, camera by camera, and the lines of the last look.
@@ -159,16 +166,16 @@ impl Regions {
         }
     }
 
-    /// The edges of the limbs that are `wanted` in all pictures, in the given step of a frame.
+    /// The edges of the limbs that are `wanted` in all pictures, in a step of a frame after which so many are `left`.
     pub fn find(
         &mut self,
         frame: &Frame,
         posed: Posed,
-        step: usize,
+        left: usize,
         wanted: impl Fn(usize) -> bool,
         found: &mut Correspondences,
     ) {
-        let search = SEARCHES[step.min(STEPS - 1)];
+        let search = SEARCHES[SEARCHES.len() - 1 - left.min(SEARCHES.len() - 1)];
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, search, Some(&wanted), &mut found.regions);
@@ -272,7 +279,7 @@ impl Regions {
         let (body, Camera { lens, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, lens, CELL_BITS, |_| true);
         lines.clear();
-        let viewer = Viewer { body, lens, labels, unit: unit_of(lens) };
+        let viewer = Viewer { body, lens, labels, unit: unit_of(lens), beside: Beside::of(frame, picture) };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
@@ -288,7 +295,7 @@ impl Regions {
         let light = evidence.iter().filter(|evidence| evidence.doubts()).count() > MANY;
         for line in &camera.lines {
             let doubtful = evidence.get(usize::from(line.limb)).is_some_and(Evidence::doubts);
-            if light || !doubtful {
+            if !line.hidden && (light || !doubtful) {
                 scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
             }
         }

@@ -37,7 +37,7 @@ impl Regions {
     /// Learns the body's colours and those about it where it is.
     pub fn learn_at(&mut self, frame: &Frame, posed: Posed) {
         self.begin(frame, posed);
-        self.find(frame, posed, super::STEPS, |_| true, &mut Correspondences::default());
+        self.find(frame, posed, 0, |_| true, &mut Correspondences::default());
         self.learn(frame);
     }
 

@@ -4,11 +4,12 @@
 
 use voodoo_core::Body;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{DepthImage, DepthPixels};
 use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
 
 pub const CAMERAS: usize = 4;
-const WIDTH: usize = 240;
+pub const WIDTH: usize = 240;
 const HEIGHT: usize = 200;
 const INTRINSICS: [f64; 4] = [200.0, 200.0, 119.5, 99.5];
 
@@ -27,14 +28,38 @@ pub fn standing(body: &Body) -> Vec<Pose> {
     body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.0, 0.485 * 1.75), Quat::IDENTITY))
 }
 
-/// What a camera sees of the posed body; of the room alone with `body` none.
-pub fn shoot(body: Option<(&Body, &[Pose])>, camera: usize) -> Vec<[u8; 3]> {
+fn rendered(body: Option<(&Body, &[Pose])>, camera: usize) -> Rendering {
     let world_from_sensor = world_from_camera(camera);
     let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
     let mut rendering = Rendering::default();
     if let Some((body, poses)) = body {
         rendering.render(body, poses, &view, None).unwrap();
     }
+    rendering
+}
+
+/// Depths that a camera would see, metres: the body before a wall.
+pub fn depth_of(body: &Body, poses: &[Pose], camera: usize) -> Vec<f32> {
+    rendered(Some((body, poses)), camera).depth().iter().map(|z| if *z > 0.0 && *z < 5.0 { *z } else { 5.0 }).collect()
+}
+
+pub fn depth_picture(depth: &[f32], camera: usize) -> DepthImage<'_> {
+    DepthImage {
+        pixels: DepthPixels::F32(depth),
+        width: WIDTH,
+        height: HEIGHT,
+        metres_per_unit: 1.0,
+        intrinsics: INTRINSICS,
+        rays: None,
+        world_from_sensor: world_from_camera(camera),
+        weight: 1.0,
+        source: CAMERAS as u16,
+    }
+}
+
+/// What a camera sees of the posed body; of the room alone with `body` none.
+pub fn shoot(body: Option<(&Body, &[Pose])>, camera: usize) -> Vec<[u8; 3]> {
+    let rendering = rendered(body, camera);
     let mut state = 7 + camera as u64;
     let mut noise = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

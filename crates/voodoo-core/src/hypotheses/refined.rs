@@ -1,0 +1,141 @@
+//! A hypothesis after its ICP steps, and what it costs beside the current poses.
+
+use super::history::Basis;
+use super::proposals::Proposal;
+use super::score::{Cost, overall_cost};
+use super::suspicion::Suspicion;
+use crate::association::correspondence::Correspondences;
+use crate::fit::{Context, Fit, Matched};
+use crate::math::Pose;
+use crate::regions::{Backdrop, Posed};
+
+/// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
+pub(super) const REFINE: usize = 8;
+/// After so many of them a hypothesis is given up that costs so many patches more than the current pose: of 63 that were taken in the
+/// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
+const GIVE_UP_AFTER: usize = 6;
+const FALLEN_BEHIND: f64 = 15.0;
+
+/// How the look at a hypothesis ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// It explains the frame better.
+    Better,
+    /// It does not, or is as suspect as the current pose.
+    Refused,
+    /// It is so much worse that the next frame will hardly think otherwise.
+    Hopeless,
+}
+
+/// A hypothesis after its ICP steps.
+#[derive(Debug, Default)]
+pub(super) struct Refined {
+    pub(super) poses: Vec<Pose>,
+    /// Its correspondences while it is tried; those of the current poses while it is.
+    pub(super) matched: Correspondences,
+    /// The whole body before what pictures show.
+    pub(super) backdrop: Backdrop,
+}
+
+impl Refined {
+    /// Refines a hypothesis with the whole body, whose `present` pose costs so much. Returns the ICP steps that took, and whether
+    /// it explains the frame better as a whole: then `fit` holds its matches, else it is as before.
+    pub(super) fn improves(
+        &mut self,
+        context: Context,
+        index: usize,
+        fit: &mut Fit,
+        present: Cost,
+        hypothesis: &Proposal,
+        suspicion: &mut Suspicion,
+    ) -> (usize, Outcome) {
+        let chain = &context.model.extremities[index];
+        let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
+        // What colours alone tell on the way says little.
+        let most = if pictures { f64::INFINITY } else { present.total + FALLEN_BEHIND };
+        let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most);
+        let hopeless = cost.total > most;
+        if steps == REFINE && !hopeless && cost.is_better_than(&present) {
+            let matched = fit.matched(&self.poses);
+            // What is as suspect as before is not worth a jump.
+            let mut sure =
+                |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
+            if matches!(basis, Basis::Lean | Basis::Body) || sure(matched) {
+                return (steps, Outcome::Better);
+            }
+        }
+        fit.exchange(&mut self.matched);
+        (steps, if hopeless { Outcome::Hopeless } else { Outcome::Refused })
+    }
+
+    /// Refines a hypothesis with the whole body; `fit` then holds its matches, and `matched` those of before.
+    pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> Cost {
+        self.refine_up_to(context, fit, hypothesis, f64::INFINITY).1
+    }
+
+    /// The same; it is given up on the way when it costs more than `most`. With the number of ICP steps.
+    fn refine_up_to(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], most: f64) -> (usize, Cost) {
+        self.poses.clear();
+        self.poses.extend_from_slice(hypothesis);
+        fit.exchange(&mut self.matched);
+        let last = context.config.max_steps;
+        for step in 0..REFINE {
+            let at = last.saturating_sub(REFINE - step);
+            fit.match_all(context, &self.poses, at);
+            if step == GIVE_UP_AFTER && most.is_finite() {
+                let cost = self.own_cost(context, fit);
+                if cost.total > most {
+                    return (step, cost);
+                }
+            }
+            fit.solve(context, hypothesis, &mut self.poses, at);
+        }
+        fit.match_last(context, &self.poses);
+        (REFINE, self.own_cost(context, fit))
+    }
+
+    /// What its own poses cost.
+    fn own_cost(&mut self, context: Context, fit: &Fit) -> Cost {
+        let poses = std::mem::take(&mut self.poses);
+        let cost = self.cost(context, fit, &poses);
+        self.poses = poses;
+        cost
+    }
+
+    /// Tries to find a body that may have moved far by edges that are looked for far away. Returns the number of ICP steps.
+    pub(super) fn try_far(
+        &mut self,
+        context: Context,
+        fit: &mut Fit,
+        poses: &mut Vec<Pose>,
+        predicted: &[Pose],
+    ) -> usize {
+        let before = self.cost(context, fit, poses);
+        let mut tried = std::mem::take(&mut self.poses);
+        tried.clear();
+        tried.extend_from_slice(predicted);
+        fit.exchange(&mut self.matched);
+        let steps = fit.run_far(context, predicted, &mut tried);
+        let cost = self.cost(context, fit, &tried);
+        self.poses = tried;
+        if cost.is_better_than(&before) {
+            poses.clone_from(&self.poses);
+        } else {
+            fit.exchange(&mut self.matched);
+        }
+        steps
+    }
+
+    /// What matched poses cost, by pictures as well where these are all there is.
+    pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
+        let mut cost = overall_cost(context, fit.matched(poses));
+        if context.pictures_alone() {
+            let Context { model, seen, previous, .. } = context;
+            let posed = Posed { body: &model.body, poses, previous, origin: seen.origin() };
+            fit.regions().draw(seen.frame(), posed, |_| true, &mut self.backdrop);
+            let explained = fit.regions().explained(seen.frame(), posed, &self.backdrop);
+            (cost.evidence, cost.total) = (cost.evidence - explained, cost.total - explained);
+        }
+        cost
+    }
+}
