@@ -19,6 +19,7 @@ use crate::detect::Detection;
 use crate::fit::{Context, Fit, Matched, Motion};
 use crate::math::{Pose, shifted};
 use crate::regions::{Backdrop, Posed};
+use crate::visibility::NOTABLE;
 use history::{Basis, History};
 use proposals::{
     CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
@@ -38,8 +39,6 @@ const NEARBY: f64 = 1.15;
 const PATIENCE: usize = 2;
 /// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
 const SEEN_GAIN: f64 = 10.0;
-/// In pictures, an arm or leg is suspect that explains a smaller share of its area, and no other limb.
-const CLAIMED: f64 = 0.3;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 const REFINE: usize = 8;
 
@@ -161,7 +160,7 @@ impl Hypotheses {
             let sum =
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
-            let suspect = gained < CLAIMED * area;
+            let suspect = gained < NOTABLE * area;
             return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE));
         }
         let near = &mut self.rough.score.unexplained;

@@ -7,17 +7,15 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
+use crate::visibility::{ALONG_LIMB, EXPLAINED, OVERLAP};
 
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
 /// are soft; a joint may turn by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
-/// How deep (metres) a place of an axis lies in another limb when it is inside: surfaces touch.
-const INSIDE: f64 = 0.01;
 /// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
-const ROUGHLY: f64 = 0.08;
+pub const ROUGHLY: f64 = 2.0 * EXPLAINED;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub const GAIN: f64 = 25.0;
@@ -79,7 +77,7 @@ fn overlap_cost(body: &Body, chain: &TwoBone, poses: &[Pose]) -> f64 {
                 // Most limbs are too far away to hold it.
                 let reach = shape.length() + shape.a0().max(shape.b0()).max(shape.a1()).max(shape.b1());
                 (point - poses[other].translation).length_squared() < reach * reach
-                    && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -INSIDE
+                    && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -OVERLAP
             });
             cost += if within { patches / ALONG_LIMB.len() as f64 } else { 0.0 };
         }

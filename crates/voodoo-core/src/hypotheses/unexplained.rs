@@ -2,7 +2,7 @@
 
 use crate::fit::{Context, Matched};
 use crate::math::{Vec3, WeightedPoints};
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// A larger share of the frame's weight than this unexplained is clutter: a heap of points in it says nothing.
 const CLUTTER: f64 = 0.15;

@@ -22,7 +22,8 @@ const KEPT: usize = 3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seed {
     cost: f64,
-    heading: f64,
+    /// Its number among the directions.
+    heading: usize,
     root: Pose,
     /// Joints as when last tracked, instead of at rest.
     tracked: bool,
@@ -57,11 +58,11 @@ pub(super) fn find_seeds(
     seeds: &mut Vec<Seed>,
 ) {
     let mut all = [const { None::<Seed> }; HEADINGS];
-    for (number, slot) in all.iter_mut().enumerate() {
-        let heading = std::f64::consts::TAU * number as f64 / HEADINGS as f64;
+    for (heading, slot) in all.iter_mut().enumerate() {
+        let angle = std::f64::consts::TAU * heading as f64 / HEADINGS as f64;
         for tracked in [false, true] {
             for height in HEIGHTS {
-                let Some(root) = place(context, known.postures, segment, heading, tracked, height) else { continue };
+                let Some(root) = place(context, known.postures, segment, angle, tracked, height) else { continue };
                 let mut seed = Seed { cost: 0.0, heading, root, tracked };
                 seed.cost = rough_cost(rough, context, known, &seed);
                 if slot.is_none_or(|best| seed.cost < best.cost) {
@@ -78,9 +79,8 @@ pub(super) fn find_seeds(
     });
     seeds.extend(ranked.into_iter().flatten().take(KEPT));
     let Some(best) = seeds.first().copied() else { return };
-    let opposite = |heading: f64| (heading - best.heading).cos() < -0.99;
-    let behind = all.into_iter().flatten().find(|seed| opposite(seed.heading));
-    if let Some(behind) = behind.filter(|_| !seeds.iter().any(|seed| opposite(seed.heading))) {
+    let opposite = (best.heading + HEADINGS / 2) % HEADINGS;
+    if let Some(behind) = all[opposite].filter(|_| !seeds.iter().any(|seed| seed.heading == opposite)) {
         seeds.push(behind);
     }
 }

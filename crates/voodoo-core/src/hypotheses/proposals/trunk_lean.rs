@@ -13,8 +13,8 @@ use crate::hypotheses::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::visibility::evidence::limb_visibility;
 
-/// Leans that are tried after none, radians: coarser or finer ones were no better.
-const LEANS: [f64; 4] = [-0.2, 0.2, -0.4, 0.4];
+/// Leans that are tried after none, this and twice as much either way, radians: coarser or finer ones were no better.
+const LEAN: f64 = 0.2;
 
 /// What leans and what stands, and working memory.
 #[derive(Debug, Default)]
@@ -101,10 +101,11 @@ impl TrunkLean {
         let origin = context.seen.origin();
         let legs = [(&extremities[one], one_end - origin), (&extremities[two], two_end - origin)];
         let (shoulders, axis) = self.shoulders(context, matched);
-        let leans = if axis == Vec3::ZERO { &[] } else { LEANS.as_slice() };
+        let leans = [0.0, -LEAN, LEAN, -2.0 * LEAN, 2.0 * LEAN];
+        let leans = if axis == Vec3::ZERO { &leans[..1] } else { &leans };
         self.explain_what_stays(context, matched, legs);
         let (mut least, mut stance) = (f64::INFINITY, None);
-        for angle in [&0.0].into_iter().chain(leans) {
+        for angle in leans {
             let mut cost = self.lean_trunk(context, matched, shoulders, Quat::from_axis_angle(axis, *angle));
             for leg in legs {
                 cost += self.stand(context, matched, leg);

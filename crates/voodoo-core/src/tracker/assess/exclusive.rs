@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::math::{Points, Pose};
 use crate::observation::candidates::Candidates;
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// Candidates that are looked at, about: costs time in proportion.
 const EXCLUSIVE_SAMPLE: usize = 250;

@@ -29,8 +29,8 @@ use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
 use exclusive::Exclusive;
-use limb_history::{LimbHistory, SUPPORT};
-use two_state::{all, either, said_by};
+use limb_history::LimbHistory;
+use two_state::{EVEN, all, either, said_by};
 
 /// Shares are of this many visible patches at least.
 const LEAST_VISIBLE: f64 = 8.0;
@@ -39,11 +39,9 @@ const FEW: f64 = 5.0;
 /// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
 const FLAT: f64 = 0.2;
 const ROUNDNESS_MEMORY: f64 = 0.9;
-/// Share of the limbs of a tracked body that are measured at least; with fewer than `SOME` measured it is lost, and with fewer
-/// than `HALF` where the root is none of them.
-const TRACKED: f64 = 0.75;
-const HALF: f64 = 0.5;
-const SOME: f64 = 0.25;
+/// Share of the limbs of a tracked body that are not measured at most; with fewer it is lost, and with fewer
+/// than half where the root is none of them.
+const QUARTER: f64 = 0.25;
 /// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
 const AT_JOINT: f64 = 0.03;
 
@@ -161,7 +159,7 @@ impl Assessor {
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
             }
         }
-        let doubtful = self.status == Status::Tracking && measured_share(statuses) < TRACKED;
+        let doubtful = self.status == Status::Tracking && measured_share(statuses) < 1.0 - QUARTER;
         estimate.status = if doubtful { Status::Degraded } else { self.status };
     }
 
@@ -184,7 +182,7 @@ impl Assessor {
                 let past = seen.free_space / seen.front_facing;
                 [exclusive / visible.max(LEAST_VISIBLE), past, visible / seen.front_facing]
             } else {
-                [SUPPORT * exclusive / FEW, 0.0, 0.0]
+                [EVEN * exclusive / FEW, 0.0, 0.0]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
@@ -256,9 +254,9 @@ fn measured_share(limbs: &[LimbStatus]) -> f64 {
 /// Lost without a measured root and half of the limbs; degraded when more than a quarter of the limbs are not measured.
 fn overall(limbs: &[LimbStatus]) -> Status {
     let measured = measured_share(limbs);
-    if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < HALF) {
+    if measured < QUARTER || (limbs[0] != LimbStatus::Measured && measured < 0.5) {
         Status::Lost
-    } else if measured < TRACKED {
+    } else if measured < 1.0 - QUARTER {
         Status::Degraded
     } else {
         Status::Tracking
