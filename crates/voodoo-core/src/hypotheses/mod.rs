@@ -29,16 +29,9 @@ use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
 use unexplained::Unexplained;
 
-/// So many unexplained patches near an arm make it suspect whatever else speaks for it: nothing else than the arm is expected
-/// about an arm.
-const STRIKING: f64 = 40.0;
-/// Unexplained points are near an arm or leg within this many times its length.
-const NEARBY: f64 = 1.15;
 /// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
 /// a single frame may be disturbed.
 const PATIENCE: usize = 2;
-/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
-const SEEN_GAIN: f64 = 10.0;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 const REFINE: usize = 8;
 
@@ -164,10 +157,10 @@ impl Hypotheses {
             return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE));
         }
         let near = &mut self.rough.score.unexplained;
-        self.unexplained.near(at.root(), NEARBY * chain.stretched_length(), near);
+        self.unexplained.near(at.root(), chain.stretched_length(), near);
         let unexplained = near.total();
-        // Furniture stays open beside legs.
-        let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= STRIKING;
+        // Nothing else than the arm is expected about an arm; furniture stays open beside legs.
+        let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= 2.0 * GAIN;
         let suspect = unexplained >= GAIN && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
         self.history[at.index].persistence.observe(patience)
@@ -257,7 +250,8 @@ impl Refined {
         let cost = self.cost(context, fit, &poses);
         self.poses = poses;
         let matched = fit.matched(&self.poses);
-        let better = cost.total < before.total - GAIN && cost.evidence < before.evidence - SEEN_GAIN;
+        // To come out of hiding, or out of another limb, is no reason to jump: half of it has to be seen.
+        let better = cost.total < before.total - GAIN && cost.evidence < before.evidence - 0.5 * GAIN;
         // What is as suspect as before is not worth a jump.
         let pictures = context.pictures_alone();
         let mut sure = |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];

@@ -7,20 +7,15 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
+use crate::solver::LIMIT_SIGMA;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
 use crate::visibility::{ALONG_LIMB, EXPLAINED, OVERLAP};
 
-/// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
-/// are soft; a joint may turn by a third of a right angle between two frames.
-const LIMIT_STRAIN: f64 = 0.1;
-const MOTION_STRAIN: f64 = 0.6;
 /// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
 pub const ROUGHLY: f64 = 2.0 * EXPLAINED;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub const GAIN: f64 = 25.0;
-/// Points looked at when rough poses are compared, at most: costs time in proportion.
-pub const ROUGH_SAMPLE: usize = 400;
 
 /// Cost of a pose in unexplained patches.
 #[derive(Clone, Copy, Debug)]
@@ -55,8 +50,8 @@ pub fn strain(context: Context, matched: Matched, chain: &TwoBone, poses: &[Pose
         cost += limit_strain(body, poses, limb);
         if previous.len() == poses.len() {
             let before = joint_turn(joint, &previous[*parent], &previous[limb]);
-            let moved = (turn * before.inverse()).to_scaled_axis_shortest().length() / MOTION_STRAIN;
-            cost += moved * moved;
+            let moved = (turn * before.inverse()).to_scaled_axis_shortest().length();
+            cost += strained(moved, joint.motion);
         }
     }
     cost + overlap_cost(body, chain, poses) + extremity_landmark_cost(matched, chain, poses)
@@ -91,9 +86,14 @@ pub fn limit_strain(body: &Body, poses: &[Pose], limb: usize) -> f64 {
     let Some(limits) = &joint.limits else { return 0.0 };
     let turn = joint_turn(joint, &poses[*parent], &poses[limb]).to_scaled_axis_shortest();
     let excess = |(axis, [low, high]): (usize, &[f64; 2])| {
-        ((low - turn[axis]).max(turn[axis] - high).max(0.0) / LIMIT_STRAIN).powi(2)
+        strained((low - turn[axis]).max(turn[axis] - high).max(0.0), LIMIT_SIGMA)
     };
     limits.iter().enumerate().map(excess).sum()
+}
+
+/// Cost of what the solver's prior and limits hold to a standard deviation, in unexplained patches: one at two of it.
+fn strained(by: f64, sigma: f64) -> f64 {
+    (by / (2.0 * sigma)).powi(2)
 }
 
 /// Lowers the least distances of points to the limbs of a pose by those to one more limb; `distances` is working memory.

@@ -7,10 +7,6 @@ use crate::math::{Points, Pose, WeightedPoints};
 use crate::visibility::evidence::{Visibility, limb_visibility};
 use crate::visibility::{EXPLAINED, NOTABLE};
 
-/// Either share is of this many patches at least (of those seen past, of the image): few patches flicker.
-const LEAST_SHOWN: f64 = 20.0;
-const LEAST_PAST: f64 = 12.0;
-
 /// What an arm or leg explains now, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct Suspicion {
@@ -50,8 +46,8 @@ impl Suspicion {
         let mut seen = Visibility::default();
         let mut against = |limb: usize, exclusive: f64| {
             seen += limb_visibility(context.seen.views, &body.limbs()[limb], &matched.poses[limb]);
-            exclusive <= NOTABLE * (seen.image.front_facing - seen.image.occluded).max(LEAST_SHOWN)
-                || seen.image.free_space > (NOTABLE * seen.image.front_facing).max(LEAST_PAST)
+            exclusive <= NOTABLE * (seen.image.front_facing - seen.image.occluded).max(GAIN)
+                || seen.image.free_space > (NOTABLE * seen.image.front_facing).max(0.5 * GAIN)
         };
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
@@ -59,7 +55,7 @@ impl Suspicion {
         let lower = against(chain.lower, exclusive(upper));
         let upper = against(chain.upper, exclusive(0));
         let shown = seen.image.front_facing - seen.image.occluded - seen.image.free_space;
-        let past = seen.side.free_space > (NOTABLE * seen.side.front_facing).max(LEAST_SHOWN);
+        let past = seen.side.free_space > (NOTABLE * seen.side.front_facing).max(GAIN);
         let drawn = drawn && (past || shown < GAIN);
         [upper || drawn, lower || drawn]
     }

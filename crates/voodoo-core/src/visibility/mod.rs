@@ -21,6 +21,10 @@ pub const EXPLAINED: f64 = 0.04;
 /// A camera sees past the model's surface when what may be the body lies this much behind it, metres; half as much of what is
 /// known to be the background, since that is not the body.
 pub(crate) const SEEN_PAST: f64 = 2.0 * EXPLAINED;
+/// Points of a frame at which a pose is compared with it, at most or about: costs time in proportion.
+pub(crate) const SAMPLE: usize = 400;
+/// No more patches than this may be stray ones, and say nothing.
+pub(crate) const FEW: f64 = 5.0;
 /// From this share of a limb on what is said of it counts: less flickers.
 pub(crate) const NOTABLE: f64 = 0.3;
 /// Limbs overlap by this at their joints, and where their surfaces touch, metres.

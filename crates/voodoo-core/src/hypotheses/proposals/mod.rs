@@ -20,8 +20,8 @@ use super::history::{Basis, History};
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
-/// Bends of an arm or leg about the line from its root to its end that are tried; twice as many where nothing seen has to agree
-/// with them.
+/// Bends of an arm or leg about the line from its root to its end that are tried, twice as many where nothing seen has to agree
+/// with them, and places where it may end: costs time in proportion.
 const SWIVELS: usize = 6;
 
 /// Looks for one kind of other configuration of an arm or leg.

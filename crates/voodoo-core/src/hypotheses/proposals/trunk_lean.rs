@@ -9,8 +9,9 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
-use crate::hypotheses::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
+use crate::hypotheses::score::{explain, rough_cost, strain};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
+use crate::visibility::SAMPLE;
 use crate::visibility::evidence::limb_visibility;
 
 /// Leans that are tried after none, this and twice as much either way, radians: coarser or finer ones were no better.
@@ -89,7 +90,7 @@ impl TrunkLean {
         let Distances { staying, leaning, tried, scratch } = &mut self.distances;
         for distances in [staying, leaning, tried, scratch] {
             distances.clear();
-            distances.reserve(count.min(ROUGH_SAMPLE));
+            distances.reserve(count.min(SAMPLE));
         }
     }
 
@@ -136,7 +137,7 @@ impl TrunkLean {
         let candidates = context.seen.candidates;
         self.make_room(candidates.len());
         self.sample.assign(&candidates.points, &candidates.weight);
-        self.sample.subsample(ROUGH_SAMPLE);
+        self.sample.subsample(SAMPLE);
         let Self { sample, distances: Distances { staying, scratch, .. }, trunk, .. } = self;
         staying.resize(sample.len(), f32::INFINITY);
         let stands = |limb: usize| legs.iter().any(|(leg, _)| leg.limbs().any(|own| own == limb));

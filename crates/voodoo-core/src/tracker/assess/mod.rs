@@ -28,22 +28,17 @@ use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
+use crate::visibility::{EXPLAINED, FEW};
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
 use two_state::{EVEN, all, either, said_by};
 
-/// Shares are of this many visible patches at least.
-const LEAST_VISIBLE: f64 = 8.0;
-/// Without a depth image, points on a limb that make it measured.
-const FEW: f64 = 5.0;
 /// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
 const FLAT: f64 = 0.2;
 const ROUNDNESS_MEMORY: f64 = 0.9;
 /// Share of the limbs of a tracked body that are not measured at most; with fewer it is lost, and with fewer
 /// than half where the root is none of them.
 const QUARTER: f64 = 0.25;
-/// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
-const AT_JOINT: f64 = 0.03;
 
 /// Assesses every frame, and remembers what past ones said.
 #[derive(Debug, Default)]
@@ -180,7 +175,7 @@ impl Assessor {
             let exclusive = self.exclusive.weight[limb];
             let mut now = if seen.front_facing > 0.0 {
                 let past = seen.free_space / seen.front_facing;
-                [exclusive / visible.max(LEAST_VISIBLE), past, visible / seen.front_facing]
+                [exclusive / visible.max(FEW), past, visible / seen.front_facing]
             } else {
                 [EVEN * exclusive / FEW, 0.0, 0.0]
             };
@@ -237,7 +232,7 @@ impl Assessor {
 fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize> {
     let (parent, joint) = body.limbs()[pair.limb].parent.as_ref()?;
     let centre = poses[pair.limb].transform_point(joint.limb_from_joint.translation);
-    ((pair.x - centre).length() < AT_JOINT).then_some(*parent)
+    ((pair.x - centre).length() < EXPLAINED).then_some(*parent)
 }
 
 /// Hands and feet show too few patches to tell on their own: they have the status of what they hang on.
