@@ -11,7 +11,8 @@ mod suspicion;
 mod unexplained;
 
 pub use landmark_cost::{APART, body_landmark_cost};
-pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
+pub use score::{Cost, GAIN, ROUGHLY, explain, limit_strain, overall_cost, rough_cost};
+pub use unexplained::CLUTTER;
 
 use crate::association::correspondence::{Correspondences, RegionSupport};
 use crate::body::Model;
@@ -21,6 +22,7 @@ use crate::math::{Pose, shifted};
 use crate::regions::{Backdrop, Posed};
 use crate::visibility::NOTABLE;
 use history::{Basis, History};
+use persistence::PATIENCE;
 use proposals::{
     CarriedByParent, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
     UnexplainedCluster,
@@ -29,11 +31,8 @@ use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
 use unexplained::Unexplained;
 
-/// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
-/// a single frame may be disturbed.
-const PATIENCE: usize = 2;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
-const REFINE: usize = 8;
+pub const REFINE: usize = 8;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]

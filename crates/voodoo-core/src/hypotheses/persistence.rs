@@ -1,8 +1,10 @@
 //! How long frames have spoken against an arm or leg, and whether two in a row asked for the same change.
 
-/// After so many refusals in a row a chain is tried in every `REST`th frame only: a hidden arm is refused for seconds.
+/// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
+/// a single frame may be disturbed.
+pub(super) const PATIENCE: usize = 2;
+/// After so many refusals in a row a chain is tried in every fourth frame only: a hidden arm is refused for seconds.
 const TIRED: usize = 30;
-const REST: usize = 4;
 
 /// What past frames said against one arm or leg.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,7 +31,7 @@ impl Persistence {
         self.voted_before = voted_before;
         self.frames += 1;
         self.refused += 1;
-        let rests = self.refused > TIRED && !self.refused.is_multiple_of(REST);
+        let rests = self.refused > TIRED && !self.refused.is_multiple_of(2 * PATIENCE);
         self.frames >= patience && !rests
     }
 
@@ -93,7 +95,7 @@ mod tests {
     #[test]
     fn a_chain_refused_for_long_is_tried_in_every_fourth_frame_until_it_asks() {
         let mut persistence = Persistence::default();
-        let tried: Vec<bool> = (0..TIRED + 10 * REST).map(|_| persistence.observe(Some(1))).collect();
+        let tried: Vec<bool> = (0..TIRED + 10 * (2 * PATIENCE)).map(|_| persistence.observe(Some(1))).collect();
         assert!(tried[..TIRED].iter().all(|due| *due));
         assert_eq!(tried[TIRED..].iter().filter(|due| **due).count(), 10);
         while !persistence.observe(Some(1)) {}

@@ -203,7 +203,7 @@ mod tests {
                 let mut bent = poses.clone();
                 let turn = Quat::from_axis_angle(hinge_axis(joint), least - beyond);
                 bent[chain.lower] = place(joint, &poses[chain.upper], turn);
-                let wanted = (beyond / LIMIT_STRAIN).powi(2);
+                let wanted = (beyond / (2.0 * LIMIT_SIGMA)).powi(2);
                 let (limit, all) = (limit_strain(&model.body, &bent, chain.lower), own(&bent) - own(&poses));
                 assert!((limit - wanted).abs() < 1e-6 && (all - wanted).abs() < 1e-6, "{limit} and {all} for {beyond}");
             }

@@ -19,7 +19,7 @@ const SIGMAS: f64 = 3.5;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
 /// A body that has been lost for so long is gone, seconds.
-const GONE: f64 = 2.0;
+pub(super) const GONE: f64 = 2.0;
 /// Joints that tell where the trunk is and which way round.
 const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 

@@ -1,22 +1,17 @@
 //! Where and which way round a lost body may stand at a segment: rough looks at every direction, at rest and as it was last
 //! tracked.
 
+use super::MOST_TRIED;
 use super::facing::{Known, facing_cost};
 use super::posture::{Place, Postures};
 use crate::fit::Context;
-use crate::hypotheses::explain;
+use crate::hypotheses::{explain, rough_cost as unexplained_roughly};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::observation::segments::Segment;
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
 /// Directions the body is turned to, evenly: costs time in proportion.
 const HEADINGS: usize = 8;
-/// Up to this distance rough looks take a point as explained, metres.
-const EXPLAINED_ROUGHLY: f64 = 0.10;
-/// Depth of a body's middle behind the middle of what a camera sees of it, metres: half a trunk.
-const BEHIND: f64 = 0.08;
-/// Rough looks that are refined, besides the opposite of the best.
-const KEPT: usize = 3;
 
 /// A rough look: its cost and its place.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +72,7 @@ pub(super) fn find_seeds(
         let cost = |slot: &Option<Seed>| slot.map_or(f64::INFINITY, |seed| seed.cost);
         cost(a).total_cmp(&cost(b))
     });
-    seeds.extend(ranked.into_iter().flatten().take(KEPT));
+    seeds.extend(ranked.into_iter().flatten().take(MOST_TRIED));
     let Some(best) = seeds.first().copied() else { return };
     let opposite = (best.heading + HEADINGS / 2) % HEADINGS;
     if let Some(behind) = all[opposite].filter(|_| !seeds.iter().any(|seed| seed.heading == opposite)) {
@@ -104,7 +99,9 @@ fn place(
     let now = ahead.dot(up.cross(axis)).atan2(ahead.dot(axis));
     let turn = Quat::from_axis_angle(up, heading - now) * stand * root.inverse();
     let extent = Extent::of(context, posture, turn, up);
-    let across = segment.centre + BEHIND * postures.level(segment.view) - extent.middle;
+    // A body's middle lies half a trunk behind the middle of what a camera sees of it.
+    let trunk = context.model.body.limbs()[0].shape;
+    let across = segment.centre + trunk.a0().min(trunk.b0()) * postures.level(segment.view) - extent.middle;
     let rise = match height {
         Height::Middle => across.dot(up),
         Height::Top => (segment.low * up).max(segment.high * up).element_sum() - extent.high,
@@ -128,8 +125,7 @@ fn rough_cost(rough: &mut RoughLook, context: Context, known: Known, seed: &Seed
         explain(body, limb, poses, &sample.points, nearest, distances);
         visible += limb_visibility(context.seen.views, part, pose);
     }
-    let unexplained = |(d, w): (&f32, &f64)| w * (f64::from(*d) / EXPLAINED_ROUGHLY).powi(2).min(1.0);
-    let points: f64 = nearest.iter().zip(&sample.weights).map(unexplained).sum();
+    let points = unexplained_roughly(nearest, &sample.weights);
     let stamp = context.seen.frame().stamp;
     points + visible.cost() + facing_cost(known, seed.root.rotation, stamp)
 }
