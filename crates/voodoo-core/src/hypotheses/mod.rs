@@ -11,7 +11,8 @@ mod suspicion;
 mod unexplained;
 
 pub use landmark_cost::{APART, body_landmark_cost};
-pub use score::{Cost, GAIN, ROUGHLY, explain, limit_strain, overall_cost, rough_cost};
+pub use proposals::SWIVELS;
+pub use score::{Cost, GAIN, explain, limit_strain, overall_cost, rough_cost};
 pub use unexplained::CLUTTER;
 
 use crate::association::correspondence::{Correspondences, RegionSupport};

@@ -9,10 +9,8 @@ use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::solver::LIMIT_SIGMA;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
-use crate::visibility::{ALONG_LIMB, EXPLAINED, OVERLAP};
+use crate::visibility::{ALONG_LIMB, OVERLAP, ROUGHLY};
 
-/// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
-pub const ROUGHLY: f64 = 2.0 * EXPLAINED;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub const GAIN: f64 = 25.0;

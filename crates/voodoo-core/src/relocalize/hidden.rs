@@ -1,14 +1,13 @@
 //! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
 
 use super::doubt::GONE;
+use super::watch::LOST_PATIENCE;
 use crate::math::Vec3;
 use crate::observation::frame::Frame;
 use crate::visibility::NOTABLE;
 
 /// What is so much nearer to a camera than a joint or a body hides it, metres: more than half of a body is thick.
 const IN_FRONT: f64 = 0.3;
-/// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
-const SEEN_FRAMES: usize = 10;
 
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
@@ -37,7 +36,7 @@ impl Hidden {
         let Some(root) = root else { return };
         if f64::from(hidden) >= NOTABLE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
-            self.last = (self.seen >= SEEN_FRAMES).then_some((frame.stamp, place));
+            self.last = (self.seen >= LOST_PATIENCE).then_some((frame.stamp, place));
             return;
         }
         self.seen += usize::from(seen);
@@ -76,7 +75,7 @@ mod tests {
             })
         };
         assert_eq!(after(&covered, -2.0, false), [false; 3], "it was never seen");
-        for frame in 0..SEEN_FRAMES {
+        for frame in 0..LOST_PATIENCE {
             assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing stands before it");
         }
         assert_eq!(after(&covered, 0.2, true), [false, false, true]);

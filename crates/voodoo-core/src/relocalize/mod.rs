@@ -31,13 +31,11 @@ use facing::Known;
 use people::People;
 pub(crate) use people::sized;
 use posture::{Place, Postures};
-use segment_motion::SegmentMotion;
+use segment_motion::{MARGIN, SegmentMotion};
 use trials::Trials;
 pub use watch::Sighting;
 use watch::Watch;
 
-/// A segment's box is enlarged by this, metres: returns at its edges are missing.
-const MARGIN: f64 = 0.20;
 /// Segments that are tried, the largest first, and of each as many rough looks: costs time in proportion.
 const MOST_TRIED: usize = 2;
 

@@ -1,12 +1,13 @@
 //! How the largest thing that may be the body moves: a person who walks faces where he goes.
 
 use super::belief::SAME_PERSON;
+use super::doubt::YOUNG;
 use crate::math::Vec3;
 
-/// For so long evidence of which way a body faces is waited for, seconds.
-pub(super) const WAIT: f64 = 0.7;
-/// A segment that moves by more than this meanwhile, metres, walks.
-const WALKED: f64 = 0.2;
+/// How far a segment's box and middle may be off, metres: returns at its edges are missing.
+pub(super) const MARGIN: f64 = 0.20;
+/// For so long evidence of which way a body faces is waited for, seconds: a segment that moves meanwhile walks.
+pub(super) const WAIT: f64 = 0.5 * YOUNG;
 
 /// Where it was a while ago and last; world frame.
 #[derive(Debug, Default)]
@@ -44,7 +45,7 @@ impl SegmentMotion {
         let (_, first) = self.first?;
         let way = self.last - first;
         let way = way - up * way.dot(up);
-        let walks = way.length() > WALKED;
+        let walks = way.length() > MARGIN;
         walks.then(|| way.normalize_or_zero())
     }
 }

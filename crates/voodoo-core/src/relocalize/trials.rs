@@ -6,10 +6,10 @@ use super::seeds::{RoughLook, Seed, find_seeds, put};
 use super::segment_motion::WAIT;
 use crate::body::Model;
 use crate::fit::{Context, Fit};
-use crate::hypotheses::{CLUTTER, GAIN, REFINE, ROUGHLY, body_landmark_cost, explain, limit_strain, overall_cost};
+use crate::hypotheses::{CLUTTER, GAIN, REFINE, body_landmark_cost, explain, limit_strain, overall_cost};
 use crate::math::{Pose, Vec3};
 use crate::observation::segments::Segment;
-use crate::visibility::SAMPLE;
+use crate::visibility::{ROUGHLY, SAMPLE};
 
 /// What cameras have against a place counts at most this many times the weight of its points: so much says that it is wrong.
 const MOST_COST: f64 = 4.0;

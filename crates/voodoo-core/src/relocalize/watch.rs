@@ -3,8 +3,8 @@
 use super::hidden::Hidden;
 
 /// The body is searched from this many frames on in which it was lost: a blurred frame is no loss. After it was found, every so
-/// manyth frame is searched again.
-const LOST_PATIENCE: usize = 3;
+/// manyth frame is searched again, and a detector looks at one that is lost or young.
+pub(super) const LOST_PATIENCE: usize = 3;
 /// That goes on for so long, seconds, or until it was seen to walk: another facing may prove better.
 const WATCH: f64 = 5.0;
 

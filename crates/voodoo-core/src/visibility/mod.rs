@@ -11,7 +11,7 @@ pub mod roundness;
 /// Places along a limb, and as many across it, at which its surface is compared with images: costs time in proportion.
 const PLACES: usize = 5;
 /// The outermost ones across, in shares of its radius from the middle; nearer to the rim, a pixel shows what lies beside it.
-const RIM: f64 = 0.7;
+const RIM: f64 = 0.6;
 /// Where along a limb, in shares of its length: evenly, and not at the ends, which belong to the neighbours as well.
 pub(crate) const ALONG_LIMB: [f64; PLACES] = along();
 /// Where across a limb, in shares of its radius from the middle.
@@ -27,6 +27,8 @@ pub(crate) const SAMPLE: usize = 400;
 pub(crate) const FEW: f64 = 5.0;
 /// From this share of a limb on what is said of it counts: less flickers.
 pub(crate) const NOTABLE: f64 = 0.3;
+/// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
+pub(crate) const ROUGHLY: f64 = SEEN_PAST;
 /// Limbs overlap by this at their joints, and where their surfaces touch, metres.
 pub(crate) const OVERLAP: f64 = 0.01;
 

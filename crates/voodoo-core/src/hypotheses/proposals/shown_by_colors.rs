@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Pool, Propose, SWIVELS};
+use super::{Pool, Propose, SWIVELS, TURN, TURNS};
 use crate::body::kinematics::{hinge_axis, place};
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
@@ -13,10 +13,6 @@ use crate::math::{Pose, Quat, Vec3, on_spiral};
 const DIRECTIONS: usize = 128;
 /// How many of them with a lower limb.
 const UPPER_LIMBS: usize = 2 * SWIVELS;
-/// Turns of the upper limb about its own axis that are tried after none: this and twice as much either way, radians.
-const TWIST: f64 = 0.5;
-/// Steps of the last look about the best, this and then half of it: turns, radians.
-const CLOSER: f64 = 0.15;
 
 /// Looks in all directions; working memory.
 #[derive(Debug, Default)]
@@ -34,7 +30,7 @@ impl Propose for ShownByColors {
         self.find_directions(at, rough);
         let mut best = None;
         for &(_, upper) in &self.kept {
-            for twist in [0.0, TWIST, -TWIST, 2.0 * TWIST, -2.0 * TWIST] {
+            for twist in TURNS.map(|turn| 2.0 * turn) {
                 for bend in 0..SWIVELS {
                     let share = (bend as f64 + 0.5) / SWIVELS as f64;
                     let change = |poses: &mut [Pose]| set(at, poses, upper, twist, share);
@@ -47,7 +43,7 @@ impl Propose for ShownByColors {
             }
         }
         let Some((mut upper, twist, mut share)) = best else { return };
-        for step in [CLOSER, 0.5 * CLOSER] {
+        for step in [TURN, 0.5 * TURN] {
             for (turn, bend) in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ZERO].into_iter().flat_map(|axis| {
                 [-step, step].map(|angle| (axis * angle, if axis == Vec3::ZERO { angle } else { 0.0 }))
             }) {

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Pool, Propose, SWIVELS};
+use super::{Pool, Propose, SWIVELS, TURNS};
 use crate::body::Model;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
@@ -13,9 +13,6 @@ use crate::hypotheses::score::{explain, rough_cost, strain};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::visibility::SAMPLE;
 use crate::visibility::evidence::limb_visibility;
-
-/// Leans that are tried after none, this and twice as much either way, radians: coarser or finer ones were no better.
-const LEAN: f64 = 0.2;
 
 /// What leans and what stands, and working memory.
 #[derive(Debug, Default)]
@@ -102,8 +99,7 @@ impl TrunkLean {
         let origin = context.seen.origin();
         let legs = [(&extremities[one], one_end - origin), (&extremities[two], two_end - origin)];
         let (shoulders, axis) = self.shoulders(context, matched);
-        let leans = [0.0, -LEAN, LEAN, -2.0 * LEAN, 2.0 * LEAN];
-        let leans = if axis == Vec3::ZERO { &leans[..1] } else { &leans };
+        let leans = if axis == Vec3::ZERO { &TURNS[..1] } else { &TURNS };
         self.explain_what_stays(context, matched, legs);
         let (mut least, mut stance) = (f64::INFINITY, None);
         for angle in leans {

@@ -3,9 +3,8 @@
 use super::{Pool, Propose, SWIVELS};
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
-use crate::hypotheses::score::ROUGHLY;
 use crate::math::{Vec3, WeightedPoints};
-use crate::visibility::FEW;
+use crate::visibility::{FEW, ROUGHLY};
 
 /// The end at the clusters that are farthest from the root and from each other.
 #[derive(Debug, Default)]

@@ -28,14 +28,11 @@ use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
-use crate::visibility::{EXPLAINED, FEW};
+use crate::visibility::{EXPLAINED, FEW, NOTABLE};
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
-use two_state::{EVEN, all, either, said_by};
+use two_state::{CHANGES, EVEN, all, either, said_by};
 
-/// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
-const FLAT: f64 = 0.2;
-const ROUNDNESS_MEMORY: f64 = 0.9;
 /// Share of the limbs of a tracked body that are not measured at most; with fewer it is lost, and with fewer
 /// than half where the root is none of them.
 const QUARTER: f64 = 0.25;
@@ -126,10 +123,11 @@ impl Assessor {
         }
         inherit_status(extremities, internal);
         if let Some(now) = roundness(context.seen.views, &context.model.body, matched.poses) {
-            let mixed = |before: f64| ROUNDNESS_MEMORY * before + (1.0 - ROUNDNESS_MEMORY) * now;
+            // A blurred frame is no cupboard.
+            let mixed = |before: f64| before + CHANGES * (now - before);
             self.round = Some(self.round.map_or(now, mixed));
         }
-        if self.round.is_some_and(|round| round < FLAT) {
+        if self.round.is_some_and(|round| round < NOTABLE) {
             self.give_up();
         }
     }
