@@ -13,7 +13,7 @@ use crate::visibility::{ALONG_LIMB, OVERLAP, ROUGHLY};
 
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
-pub const GAIN: f64 = 25.0;
+pub const GAIN: f64 = 20.0;
 
 /// Cost of a pose in unexplained patches.
 #[derive(Clone, Copy, Debug)]

@@ -9,6 +9,8 @@ use crate::hypotheses::{SWIVELS, explain, rough_cost as unexplained_roughly};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::observation::segments::Segment;
 use crate::visibility::evidence::{Visibility, limb_visibility};
+/// Directions the body is turned to, evenly: costs time in proportion.
+const HEADINGS: usize = 2 * SWIVELS;
 
 /// A rough look: its cost and its place.
 #[derive(Clone, Copy, Debug)]
@@ -49,9 +51,9 @@ pub(super) fn find_seeds(
     segment: &Segment,
     seeds: &mut Vec<Seed>,
 ) {
-    let mut all = [const { None::<Seed> }; SWIVELS];
+    let mut all = [const { None::<Seed> }; HEADINGS];
     for (heading, slot) in all.iter_mut().enumerate() {
-        let angle = std::f64::consts::TAU * heading as f64 / SWIVELS as f64;
+        let angle = std::f64::consts::TAU * heading as f64 / HEADINGS as f64;
         for tracked in [false, true] {
             for height in HEIGHTS {
                 let Some(root) = place(context, known.postures, segment, angle, tracked, height) else { continue };
@@ -71,7 +73,7 @@ pub(super) fn find_seeds(
     });
     seeds.extend(ranked.into_iter().flatten().take(MOST_TRIED));
     let Some(best) = seeds.first().copied() else { return };
-    let opposite = (best.heading + SWIVELS / 2) % SWIVELS;
+    let opposite = (best.heading + HEADINGS / 2) % HEADINGS;
     if let Some(behind) = all[opposite].filter(|_| !seeds.iter().any(|seed| seed.heading == opposite)) {
         seeds.push(behind);
     }

@@ -8,10 +8,12 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, EXPLAINED, SEEN_PAST};
+use crate::visibility::{ALONG_LIMB, EXPLAINED, RIM, SEEN_PAST};
 
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
+/// Where across a limb patches are looked at, in shares of its radius from the middle.
+const PATCHES_ACROSS: [f64; 3] = [-RIM, 0.0, RIM];
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,10 +84,10 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
             let (a, b) = (section.a, section.b);
             // A limb seen aslant covers so much less of the image, as the points seen on it do.
             let aslant = facing.across.length() / (camera_from_limb * section.centre()).length();
-            for s in ACROSS_LIMB {
+            for s in PATCHES_ACROSS {
                 let point = camera_from_limb * facing.point(s);
                 let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
-                    / (REFERENCE_PATCH * (ALONG_LIMB.len() * ACROSS_LIMB.len()) as f64);
+                    / (REFERENCE_PATCH * (ALONG_LIMB.len() * PATCHES_ACROSS.len()) as f64);
                 let Some(sight) = sight(&view, point) else { continue };
                 for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
                     match sight {

@@ -26,7 +26,7 @@ pub(crate) const SAMPLE: usize = 400;
 /// No more patches than this may be stray ones, and say nothing.
 pub(crate) const FEW: f64 = 5.0;
 /// From this share of a limb on what is said of it counts: less flickers.
-pub(crate) const NOTABLE: f64 = 0.3;
+pub(crate) const NOTABLE: f64 = 0.25;
 /// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
 pub(crate) const ROUGHLY: f64 = SEEN_PAST;
 /// Limbs overlap by this at their joints, and where their surfaces touch, metres.

@@ -123,8 +123,8 @@ impl Assessor {
         }
         inherit_status(extremities, internal);
         if let Some(now) = roundness(context.seen.views, &context.model.body, matched.poses) {
-            // A blurred frame is no cupboard.
-            let mixed = |before: f64| before + CHANGES * (now - before);
+            // A blurred frame is no cupboard: what is known of two states that change so often fades at this rate.
+            let mixed = |before: f64| before + 2.0 * CHANGES * (now - before);
             self.round = Some(self.round.map_or(now, mixed));
         }
         if self.round.is_some_and(|round| round < NOTABLE) {
