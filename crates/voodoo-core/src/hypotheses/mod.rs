@@ -32,6 +32,8 @@ use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
 use unexplained::Unexplained;
 
+/// Unexplained points are near an arm or leg within this many times its length.
+const NEARBY: f64 = 1.15;
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 pub const REFINE: usize = 8;
 
@@ -157,7 +159,7 @@ impl Hypotheses {
             return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE));
         }
         let near = &mut self.rough.score.unexplained;
-        self.unexplained.near(at.root(), chain.stretched_length(), near);
+        self.unexplained.near(at.root(), NEARBY * chain.stretched_length(), near);
         let unexplained = near.total();
         // Nothing else than the arm is expected about an arm; furniture stays open beside legs.
         let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= 2.0 * GAIN;
