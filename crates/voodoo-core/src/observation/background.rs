@@ -37,6 +37,8 @@ pub struct Background {
 #[derive(Clone, Debug, Default)]
 pub struct Backgrounds {
     pub(super) images: Vec<Background>,
+    /// Of the points of each cloud whether another person explains them; nobody does where there is none.
+    others: Vec<Vec<bool>>,
 }
 
 /// How far apart two poses are: metres, and radians.
@@ -112,6 +114,20 @@ impl Backgrounds {
     pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
         let known = self.images.iter_mut().find(|background| background.fits(image));
         known.map(|background| background.depth.as_mut_slice())
+    }
+
+    /// Whether another person explains a point of a cloud, by their numbers.
+    pub(super) fn is_others(&self, cloud: usize, point: usize) -> bool {
+        self.others.get(cloud).is_some_and(|others| others.get(point).copied().unwrap_or(false))
+    }
+
+    /// Notes which points of clouds another person explains: those of whose owner `is_others` holds.
+    pub(super) fn share_clouds(&mut self, owners: &[Vec<u16>], is_others: impl Fn(u16) -> bool) {
+        self.others.resize_with(owners.len(), Vec::new);
+        for (others, owners) in self.others.iter_mut().zip(owners) {
+            others.clear();
+            others.extend(owners.iter().map(|owner| is_others(*owner)));
+        }
     }
 
     /// Takes up what is known of another's images, and `change`s it.

@@ -6,7 +6,7 @@ use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, widest};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::clusters::Clusters;
 use crate::observation::depth_view::NEAREST_SEEN;
-use crate::observation::frame::{Cloud, DepthImage, Frame, PointSlice, Scope};
+use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
 use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
 
 /// Mark of a point that may belong to any limb.
@@ -72,8 +72,8 @@ impl Candidates {
             self.gather_image(image, background, origin, bounds, &gate, config.max_points);
             self.cameras.push((self.points.len() as u32, image.world_from_sensor.translation - origin));
         }
-        for cloud in frame.clouds {
-            self.gather_cloud(cloud, origin, &gate);
+        for (number, cloud) in frame.clouds.iter().enumerate() {
+            self.gather_cloud(cloud, origin, &gate, |point| backgrounds.is_others(number, point));
         }
         self.leave_out(frame.excluded, origin);
         self.clusters.arrange(&self.points);
@@ -115,22 +115,19 @@ impl Candidates {
         self.source.truncate(kept);
     }
 
-    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &PointGate) {
+    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, gate: &PointGate, others: impl Fn(usize) -> bool) {
         let working_from_sensor = shifted(&cloud.world_from_sensor, origin);
         let (rotation, shift) = (Mat3::from_quat(working_from_sensor.rotation), working_from_sensor.translation);
         let limb = match cloud.scope {
             Scope::Limb(limb) => limb as u16,
             Scope::Free | Scope::Body => ANY_LIMB,
         };
-        let mut visit = |point: Vec3| {
-            let point = (rotation * point + shift).to_array().map(|value| value as f32);
-            if cloud.scope != Scope::Free || gate.passes(point) {
+        for index in 0..cloud.points.len() {
+            let point = rotation * cloud.points.get(index) + shift;
+            let point = point.to_array().map(|value| value as f32);
+            if cloud.scope != Scope::Free || gate.passes(point) && !others(index) {
                 self.push(point, cloud.weight as f32, limb, cloud.source);
             }
-        };
-        match cloud.points {
-            PointSlice::F32(points) => points.iter().for_each(|p| visit(Vec3::from_array(p.map(f64::from)))),
-            PointSlice::F64(points) => points.iter().for_each(|p| visit(Vec3::from_array(*p))),
         }
     }
 
@@ -222,7 +219,7 @@ fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
 mod tests {
     use super::*;
     use crate::math::Quat;
-    use crate::observation::frame::Ground;
+    use crate::observation::frame::{Ground, PointSlice};
     use crate::testing::image;
 
     #[test]

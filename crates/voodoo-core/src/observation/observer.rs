@@ -100,6 +100,7 @@ impl Observer {
                 *depth = if share.is_others(*owner) { OTHERS } else { *depth };
             }
         });
+        self.backgrounds.share_clouds(share.cloud_owners, |owner| share.is_others(owner));
         self.gather(frame, expected.origin, &bounds, config);
     }
 

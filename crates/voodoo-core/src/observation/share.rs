@@ -10,6 +10,8 @@ pub const NOBODY: u16 = u16::MAX;
 pub struct Share<'a> {
     /// Image after image, who explains each pixel: the number of a person, or [`NOBODY`].
     pub owners: &'a [Vec<u16>],
+    /// Cloud after cloud, the same of each point.
+    pub cloud_owners: &'a [Vec<u16>],
     /// The number of the person.
     pub own: u16,
     /// The still scene, as it was learnt where nobody was.

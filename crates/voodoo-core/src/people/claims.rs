@@ -1,11 +1,11 @@
-//! Whose surface explains each pixel of a frame.
+//! Whose surface explains each pixel and each free point of a frame.
 
 use crate::body::Body;
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::{body_box, image_window};
-use crate::observation::frame::{DepthImage, DepthPixels, Frame};
-use crate::observation::share::NOBODY;
+use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, Scope};
+use crate::observation::share::{NOBODY, Share};
 
 /// A surface explains what lies within this of where it is expected, metres: as far as candidates are looked for.
 const REACH: f32 = 0.20;
@@ -24,10 +24,11 @@ pub(super) struct Claimant<'a> {
     pub(super) poses: &'a [Pose],
 }
 
-/// The owners of all pixels, and working memory.
+/// The owners of all pixels and points, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct Claims {
     owners: Vec<Vec<u16>>,
+    cloud_owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
     /// Of every pixel of an image its depth, metres, and whether something returned that is no scene.
     depth: Vec<f32>,
@@ -47,7 +48,18 @@ impl Claims {
         &self.owners
     }
 
-    /// Gives every pixel that is no scene to the body whose surface is nearest, within reach.
+    /// The share of a person in the frame.
+    pub(super) fn share<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> Share<'a> {
+        Share { owners: &self.owners, cloud_owners: &self.cloud_owners, own: number as u16, scene }
+    }
+
+    /// How many pixels and free points somebody explains.
+    pub(super) fn explained(&self, number: usize) -> usize {
+        let owners = self.owners.iter().chain(&self.cloud_owners).flatten();
+        owners.filter(|owner| usize::from(**owner) == number).count()
+    }
+
+    /// Gives every pixel that is no scene, and every free point, to the body whose surface is nearest, within reach.
     pub(super) fn settle<'a>(
         &mut self,
         frame: &Frame,
@@ -56,23 +68,48 @@ impl Claims {
     ) {
         self.owners.resize_with(frame.images.len(), Vec::new);
         for (number, image) in frame.images.iter().enumerate() {
-            self.owners[number].clear();
-            self.owners[number].resize(image.pixels.len(), NOBODY);
-            self.distances.clear();
-            self.distances.resize(image.pixels.len(), REACH);
+            let mut owners = self.unclaimed(number, image.pixels.len(), |claims| &mut claims.owners);
             let background = scene.of(image).map_or(&[][..], Background::depth);
             self.measure(image, background);
-            for claimant in bodies.clone() {
-                self.claim(number, image, claimant);
+            for Claimant { number, body, poses } in bodies.clone() {
+                if let Some(origin) = poses.first().map(|root| root.translation) {
+                    self.gather(image, origin, &body_box(body, poses, f64::from(REACH)));
+                    self.claim(number, body, poses, origin, &mut owners);
+                }
             }
+            self.owners[number] = owners;
+        }
+        self.cloud_owners.resize_with(frame.clouds.len(), Vec::new);
+        for (number, cloud) in frame.clouds.iter().enumerate() {
+            let free = if cloud.scope == Scope::Free { cloud.points.len() } else { 0 };
+            let mut owners = self.unclaimed(number, free, |claims| &mut claims.cloud_owners);
+            if free == 0 {
+                self.cloud_owners[number] = owners;
+                continue;
+            }
+            for Claimant { number, body, poses } in bodies.clone() {
+                if let Some(origin) = poses.first().map(|root| root.translation) {
+                    self.gather_cloud(cloud, origin, &body_box(body, poses, f64::from(REACH)));
+                    self.claim(number, body, poses, origin, &mut owners);
+                }
+            }
+            self.cloud_owners[number] = owners;
         }
     }
 
-    fn claim(&mut self, number: usize, image: &DepthImage, claimant: Claimant) {
-        let Claimant { body, poses, .. } = claimant;
-        let Some(origin) = poses.first().map(|root| root.translation) else { return };
-        self.gather(image, origin, &body_box(body, poses, f64::from(REACH)));
-        let Self { owners, distances, queries, pixels, nearest, limb, .. } = self;
+    /// Owners of so many pixels or points who are nobody yet, in the memory of earlier ones.
+    fn unclaimed(&mut self, number: usize, count: usize, of: impl Fn(&mut Self) -> &mut Vec<Vec<u16>>) -> Vec<u16> {
+        self.distances.clear();
+        self.distances.resize(count, REACH);
+        let mut owners = std::mem::take(&mut of(self)[number]);
+        owners.clear();
+        owners.resize(count, NOBODY);
+        owners
+    }
+
+    /// Gives a body what was gathered about `origin` and no other body is nearer to.
+    fn claim(&mut self, number: u16, body: &Body, poses: &[Pose], origin: Vec3, owners: &mut [u16]) {
+        let Self { distances, queries, pixels, nearest, limb, .. } = self;
         nearest.clear();
         nearest.resize(queries.len(), REACH);
         for (own, pose) in body.limbs().iter().zip(poses) {
@@ -81,10 +118,23 @@ impl Claims {
         }
         for ((pixel, run), distance) in pixels.iter().zip(nearest.iter()) {
             let pixel = *pixel as usize..(*pixel + *run) as usize;
-            for (before, owner) in distances[pixel.clone()].iter_mut().zip(&mut owners[number][pixel]) {
+            for (before, owner) in distances[pixel.clone()].iter_mut().zip(&mut owners[pixel]) {
                 if *distance < *before {
-                    (*before, *owner) = (*distance, claimant.number);
+                    (*before, *owner) = (*distance, number);
                 }
+            }
+        }
+    }
+
+    /// The points within a box of the world, about `origin`.
+    fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, bounds: &Aabb) {
+        self.queries.clear();
+        self.pixels.clear();
+        for index in 0..cloud.points.len() {
+            let point = cloud.world_from_sensor * cloud.points.get(index);
+            if bounds.contains_local_point(point) {
+                self.queries.push((point - origin).to_array().map(|value| value as f32));
+                self.pixels.push((index as u32, 1));
             }
         }
     }

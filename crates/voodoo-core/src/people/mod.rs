@@ -18,7 +18,7 @@ use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
-use crate::observation::share::{NOBODY, Share};
+use crate::observation::share::NOBODY;
 use crate::relocalize::sized;
 use crate::tracker::Tracker;
 use claims::{Claimant, Claims};
@@ -140,7 +140,7 @@ impl People {
         Ok(())
     }
 
-    /// Gives every pixel to whose surface explains it.
+    /// Gives every pixel and free point to whose surface explains it.
     fn share_out(&mut self, frame: &Frame) {
         for person in self.persons.iter_mut().filter(|person| person.there) {
             person.tracker.expect(frame.stamp, &mut person.expected);
@@ -155,10 +155,10 @@ impl People {
 
     /// Every tracker by its share.
     fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
-        let (owners, scene) = (self.claims.owners(), self.scene.known());
+        let (claims, scene) = (&self.claims, self.scene.known());
         let work = |(number, person): (usize, &mut Person)| {
             if person.there {
-                let share = Share { owners, own: number as u16, scene };
+                let share = claims.share(number, scene);
                 let of = own.iter().find(|(id, _)| *id == person.id).map_or(frame, |(_, frame)| frame);
                 person.tracker.step_among(of, share);
                 person.note(frame, share);
@@ -171,14 +171,19 @@ impl People {
         }
     }
 
-    /// Of two on one body the younger goes; who leaves the region goes, and who is not wanted.
+    /// Of two on one body the one that explains less of it goes, or the younger; who leaves the region goes, and who is not wanted.
     fn part(&mut self) {
         for younger in 0..self.persons.len() {
             let place = self.persons[younger].place;
-            let same = |older: &Person| older.tracked() && older.place.distance(place) < ONE_BODY;
-            let twice = self.persons[younger].tracked() && self.persons[..younger].iter().any(same);
+            for older in 0..younger {
+                let [a, b] = [older, younger].map(|number| &self.persons[number]);
+                if a.tracked() && b.tracked() && a.place.distance(place) < ONE_BODY {
+                    let more = self.claims.explained(younger) > self.claims.explained(older);
+                    self.persons[if more { older } else { younger }].there = false;
+                }
+            }
             let wanted = self.options.allows(place) && self.options.wants(self.persons[younger].id);
-            self.persons[younger].there &= wanted && !twice;
+            self.persons[younger].there &= wanted;
         }
     }
 
@@ -300,13 +305,12 @@ impl People {
     /// Starts a person's tracker where a stranger is seen; whether they are there.
     fn take_up(&mut self, frame: &Frame, stranger: &Stranger, number: usize) -> bool {
         self.scene.release(frame, stranger.image, &stranger.pixels);
-        let (owners, scene) = (self.claims.owners(), self.scene.known());
         let person = &mut self.persons[number];
         if !self.options.wants(person.id) {
             return false;
         }
         let known = person.born < frame.stamp;
-        let share = Share { owners, own: number as u16, scene };
+        let share = self.claims.share(number, self.scene.known());
         let came = person.tracker.begin(frame, share, &stranger.detection, known);
         if came {
             person.there = true;

@@ -126,6 +126,7 @@ impl Relocalizer {
     pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
         if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
+            self.people.leave_out_beyond(root, SAME_PERSON);
         } else {
             self.people.forget();
         }

@@ -47,6 +47,14 @@ impl People {
         (self.seen, self.verdict) = (None, None);
     }
 
+    /// Forgets who was seen farther than this from a place, metres: somebody else.
+    pub(super) fn leave_out_beyond(&mut self, place: Vec3, distance: f64) {
+        let near = |seen: &Detection| {
+            seen.joint("humanoid_root").is_some_and(|root| root.position.distance(place) <= distance)
+        };
+        self.seen = self.seen.take().filter(near);
+    }
+
     /// Looks at all depth images of a frame, or at its share of them; keeps and returns the surest person.
     pub(super) fn look(&mut self, frame: &Frame, share: Option<Share>, wanted: Wanted) -> Option<&Detection> {
         self.forget();
