@@ -8,12 +8,12 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ALONG_LIMB, EXPLAINED, RIM, SEEN_PAST};
+use crate::visibility::{ALONG_LIMB, EXPLAINED, OUTERMOST, SEEN_PAST};
 
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
 /// Where across a limb patches are looked at, in shares of its radius from the middle.
-const PATCHES_ACROSS: [f64; 3] = [-RIM, 0.0, RIM];
+const PATCHES_ACROSS: [f64; 3] = [-OUTERMOST, 0.0, OUTERMOST];
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

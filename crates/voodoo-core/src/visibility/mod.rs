@@ -11,7 +11,7 @@ pub mod roundness;
 /// Places along a limb, and as many across it, at which its surface is compared with images: costs time in proportion.
 const PLACES: usize = 5;
 /// The outermost ones across, in shares of its radius from the middle; nearer to the rim, a pixel shows what lies beside it.
-const RIM: f64 = 0.6;
+const OUTERMOST: f64 = 0.6;
 /// Where along a limb, in shares of its length: evenly, and not at the ends, which belong to the neighbours as well.
 pub(crate) const ALONG_LIMB: [f64; PLACES] = along();
 /// Where across a limb, in shares of its radius from the middle.
@@ -46,7 +46,7 @@ const fn along() -> [f64; PLACES] {
 const fn across() -> [f64; PLACES] {
     let (mut places, mut index) = ([0.0; PLACES], 0);
     while index < PLACES {
-        places[index] = RIM * ((2 * index) as f64 / (PLACES - 1) as f64 - 1.0);
+        places[index] = OUTERMOST * ((2 * index) as f64 / (PLACES - 1) as f64 - 1.0);
         index += 1;
     }
     places
