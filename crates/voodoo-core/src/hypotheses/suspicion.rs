@@ -5,7 +5,7 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
 use crate::visibility::evidence::{Visibility, limb_visibility};
-use crate::visibility::{EXPLAINED, NOTABLE};
+use crate::visibility::{EXPLAINED, NOTABLE, QUARTER};
 
 /// What an arm or leg explains now, and working memory.
 #[derive(Debug, Default)]
@@ -47,7 +47,7 @@ impl Suspicion {
         let mut against = |limb: usize, exclusive: f64| {
             seen += limb_visibility(context.seen.views, &body.limbs()[limb], &matched.poses[limb]);
             exclusive <= NOTABLE * (seen.image.front_facing - seen.image.occluded).max(GAIN)
-                || seen.image.free_space > (NOTABLE * seen.image.front_facing).max(0.5 * GAIN)
+                || seen.image.free_space > (QUARTER * seen.image.front_facing).max(0.5 * GAIN)
         };
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
@@ -55,7 +55,7 @@ impl Suspicion {
         let lower = against(chain.lower, exclusive(upper));
         let upper = against(chain.upper, exclusive(0));
         let shown = seen.image.front_facing - seen.image.occluded - seen.image.free_space;
-        let past = seen.side.free_space > (NOTABLE * seen.side.front_facing).max(GAIN);
+        let past = seen.side.free_space > (QUARTER * seen.side.front_facing).max(GAIN);
         let drawn = drawn && (past || shown < GAIN);
         [upper || drawn, lower || drawn]
     }

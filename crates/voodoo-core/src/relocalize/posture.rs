@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::{REFERENCE_PATCH, body_box};
 use crate::observation::segments::Segment;
-use crate::visibility::NOTABLE;
+use crate::visibility::{NOTABLE, QUARTER};
 
 /// A segment of a body is no longer than this many times the body's height at rest: arms are held up or out.
 const LONGEST: f64 = 1.5;
@@ -67,7 +67,7 @@ impl Postures {
         let wide = (extents - self.up.abs() * tall).max_element();
         let longest = tall.max(wide);
         // The rest may be hidden.
-        segment.patches > NOTABLE * self.patches && longest > NOTABLE * self.height && longest < LONGEST * self.height
+        segment.patches > QUARTER * self.patches && longest > NOTABLE * self.height && longest < LONGEST * self.height
     }
 }
 

@@ -26,9 +26,12 @@ pub(crate) const SAMPLE: usize = 400;
 /// No more patches than this may be stray ones, and say nothing.
 pub(crate) const FEW: f64 = 5.0;
 /// From this share of a limb on what is said of it counts: less flickers.
-pub(crate) const NOTABLE: f64 = 0.25;
+pub(crate) const NOTABLE: f64 = 0.3;
 /// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
 pub(crate) const ROUGHLY: f64 = SEEN_PAST;
+/// A quarter of a whole: cameras that see past as much of an arm or leg refute it, a body of which as much shows is there, and
+/// one of whose limbs as many are not measured is tracked at most.
+pub(crate) const QUARTER: f64 = 0.25;
 /// Limbs overlap by this at their joints, and where their surfaces touch, metres.
 pub(crate) const OVERLAP: f64 = 0.01;
 

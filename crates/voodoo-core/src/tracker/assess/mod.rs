@@ -28,14 +28,10 @@ use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
-use crate::visibility::{EXPLAINED, FEW, NOTABLE};
+use crate::visibility::{EXPLAINED, FEW, NOTABLE, QUARTER};
 use exclusive::Exclusive;
-use limb_history::LimbHistory;
-use two_state::{CHANGES, EVEN, all, either, said_by};
-
-/// Share of the limbs of a tracked body that are not measured at most; with fewer it is lost, and with fewer
-/// than half where the root is none of them.
-const QUARTER: f64 = 0.25;
+use limb_history::{LimbHistory, SUPPORT};
+use two_state::{CHANGES, all, either, said_by};
 
 /// Assesses every frame, and remembers what past ones said.
 #[derive(Debug, Default)]
@@ -175,7 +171,7 @@ impl Assessor {
                 let past = seen.free_space / seen.front_facing;
                 [exclusive / visible.max(FEW), past, visible / seen.front_facing]
             } else {
-                [EVEN * exclusive / FEW, 0.0, 0.0]
+                [SUPPORT * exclusive / FEW, 0.0, 0.0]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
