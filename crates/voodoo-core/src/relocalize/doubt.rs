@@ -1,7 +1,6 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
 use super::belief::ENOUGH_ODDS;
-use super::watch::LOST_PATIENCE;
 use crate::body::Body;
 use crate::detect::Detection;
 use crate::hypotheses::APART;
@@ -9,8 +8,10 @@ use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 pub(super) const YOUNG: f64 = 1.0;
-/// Frames from one look at a track with a limb in doubt to the next: a look costs as much as five frames. A young or lost one is
-/// looked at more often.
+/// The body is searched from this many frames on in which it was lost: a blurred frame is no loss. In every so manyth frame it is
+/// looked at again after it was found, a detector looks at one that is young or lost; and who was seen in as many may be hidden.
+pub(super) const LOST_PATIENCE: usize = 3;
+/// Frames from one look at a track with a limb in doubt to the next: a look costs as much as five frames.
 const EVERY: usize = 15;
 /// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips
 /// and ankles 10 cm from where a detector tells them.

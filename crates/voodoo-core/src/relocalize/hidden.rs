@@ -1,7 +1,6 @@
 //! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
 
-use super::doubt::GONE;
-use super::watch::LOST_PATIENCE;
+use super::doubt::{GONE, LOST_PATIENCE};
 use crate::math::Vec3;
 use crate::observation::frame::Frame;
 use crate::visibility::NOTABLE;

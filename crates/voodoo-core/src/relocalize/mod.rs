@@ -31,13 +31,11 @@ use facing::Known;
 use people::People;
 pub(crate) use people::sized;
 use posture::{Place, Postures};
+use seeds::MOST_TRIED;
 use segment_motion::{MARGIN, SegmentMotion};
 use trials::Trials;
 pub use watch::Sighting;
 use watch::Watch;
-
-/// Segments that are tried, the largest first, and of each as many rough looks: costs time in proportion.
-const MOST_TRIED: usize = 2;
 
 /// Searches a lost body. Remembers how it stood, and how what may be it moves.
 #[derive(Debug, Default)]

@@ -1,7 +1,6 @@
 //! Where and which way round a lost body may stand at a segment: rough looks at every direction, at rest and as it was last
 //! tracked.
 
-use super::MOST_TRIED;
 use super::facing::{Known, facing_cost};
 use super::posture::{Place, Postures};
 use crate::fit::Context;
@@ -9,6 +8,10 @@ use crate::hypotheses::{SWIVELS, explain, rough_cost as unexplained_roughly};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::observation::segments::Segment;
 use crate::visibility::evidence::{Visibility, limb_visibility};
+
+/// Segments that are tried, the largest first, and of each as many rough looks and the opposite of the best: costs time in
+/// proportion.
+pub(super) const MOST_TRIED: usize = 2;
 /// Directions the body is turned to, evenly: costs time in proportion.
 const HEADINGS: usize = 2 * SWIVELS;
 

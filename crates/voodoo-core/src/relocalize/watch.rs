@@ -1,11 +1,9 @@
 //! When a body is searched: after some frames in which it was lost, and for a while after it was found.
 
+use super::doubt::LOST_PATIENCE;
 use super::hidden::Hidden;
 
-/// The body is searched from this many frames on in which it was lost: a blurred frame is no loss. After it was found, every so
-/// manyth frame is searched again, and a detector looks at one that is lost or young.
-pub(super) const LOST_PATIENCE: usize = 3;
-/// That goes on for so long, seconds, or until it was seen to walk: another facing may prove better.
+/// After it was found it is searched again for so long, seconds, or until it was seen to walk: another facing may prove better.
 const WATCH: f64 = 5.0;
 
 /// What a frame said of the body.
