@@ -5,7 +5,7 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
 use crate::visibility::evidence::{Visibility, limb_visibility};
-use crate::visibility::{EXPLAINED, NOTABLE, QUARTER};
+use crate::visibility::{EXPLAINED, QUARTER};
 
 /// What an arm or leg explains now, and working memory.
 #[derive(Debug, Default)]
@@ -46,7 +46,7 @@ impl Suspicion {
         let mut seen = Visibility::default();
         let mut against = |limb: usize, exclusive: f64| {
             seen += limb_visibility(context.seen.views, &body.limbs()[limb], &matched.poses[limb]);
-            exclusive <= NOTABLE * (seen.image.front_facing - seen.image.occluded).max(GAIN)
+            exclusive <= QUARTER * (seen.image.front_facing - seen.image.occluded).max(GAIN)
                 || seen.image.free_space > (QUARTER * seen.image.front_facing).max(0.5 * GAIN)
         };
         chain.ends.iter().for_each(|end| {
