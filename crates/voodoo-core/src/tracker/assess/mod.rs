@@ -30,8 +30,8 @@ use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
 use crate::visibility::{EXPLAINED, FEW, NOTABLE, QUARTER};
 use exclusive::Exclusive;
-use limb_history::{LimbHistory, SUPPORT};
-use two_state::{CHANGES, all, either, said_by};
+use limb_history::LimbHistory;
+use two_state::{CHANGES, EVEN, all, either, said_by};
 
 /// Assesses every frame, and remembers what past ones said.
 #[derive(Debug, Default)]
@@ -171,7 +171,7 @@ impl Assessor {
                 let past = seen.free_space / seen.front_facing;
                 [exclusive / visible.max(FEW), past, visible / seen.front_facing]
             } else {
-                [SUPPORT * exclusive / FEW, 0.0, 0.0]
+                [EVEN * exclusive / FEW, 0.0, 0.0]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
