@@ -2,7 +2,6 @@
 //!
 //! By then sizes have followed the wrong ones: exchanged legs that explain as much are followed beside the body for some frames.
 
-use super::persistence::PATIENCE;
 use super::refined::{REFINE, Refined};
 use super::score::{Cost, GAIN};
 use crate::body::Body;
@@ -11,14 +10,14 @@ use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3, shifted};
 
 /// One looks in so many frames, and in every one in which a leg is in doubt.
-const EXCHANGED_EVERY: usize = 2 * PATIENCE;
+const EXCHANGED_EVERY: usize = 4;
 /// What explains a smaller share of what is explained now is not refined: legs that stand right lose more when they are exchanged.
 const WORTH_A_LOOK: f64 = 0.88;
 /// What is followed explains this share at least, and is given up after so many frames.
 const WORTH_FOLLOWING: f64 = 0.96;
-const FOLLOWED: usize = 2 * EXCHANGED_EVERY;
+const FOLLOWED: usize = 8;
 /// What has to be gained in all, patches, and what one frame counts for at most: it may be disturbed.
-const GAINED: f64 = 2.0 * MOST_GAINED;
+const GAINED: f64 = 4.0 * GAIN;
 const MOST_GAINED: f64 = 2.0 * GAIN;
 /// A pelvis that turns by more than this, radians, is another body's: the legs alone were exchanged.
 const MOST_TURNED: f64 = 0.5;
