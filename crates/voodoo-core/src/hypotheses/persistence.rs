@@ -1,12 +1,9 @@
 //! How long frames have spoken against an arm or leg, and whether two in a row asked for the same change.
 
-/// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
-/// a single frame may be disturbed.
-pub(super) const PATIENCE: usize = 2;
 /// A chain is tried in every `REST`th frame only after so many refusals in a row, since a hidden arm is refused for seconds, and
 /// once where nothing came near to what the frame shows.
 const TIRED: usize = 30;
-const REST: usize = 2 * PATIENCE;
+const REST: usize = 4;
 
 /// What past frames said against one arm or leg.
 #[derive(Clone, Copy, Debug, Default)]

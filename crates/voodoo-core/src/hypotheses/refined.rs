@@ -2,7 +2,7 @@
 
 use super::history::Basis;
 use super::proposals::Proposal;
-use super::score::{Cost, GAIN, overall_cost};
+use super::score::{Cost, overall_cost};
 use super::suspicion::Suspicion;
 use crate::association::correspondence::Correspondences;
 use crate::fit::{Context, Fit, Matched};
@@ -10,10 +10,11 @@ use crate::math::Pose;
 use crate::regions::{Backdrop, Posed};
 
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
-pub const REFINE: usize = 8;
-/// After so many of them a hypothesis is given up that is as much worse than the current pose as it has to be better: of 63 that were
-/// taken in the rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
-const GIVE_UP_AFTER: usize = REFINE - 2;
+pub(super) const REFINE: usize = 8;
+/// After so many of them a hypothesis is given up that costs so many patches more than the current pose: of 63 that were taken in the
+/// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
+const GIVE_UP_AFTER: usize = 6;
+const FALLEN_BEHIND: f64 = 15.0;
 
 /// How the look at a hypothesis ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +52,7 @@ impl Refined {
         let chain = &context.model.extremities[index];
         let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
         // What colours alone tell on the way says little.
-        let most = if pictures { f64::INFINITY } else { present.total + GAIN };
+        let most = if pictures { f64::INFINITY } else { present.total + FALLEN_BEHIND };
         let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most);
         let hopeless = cost.total > most;
         if steps == REFINE && !hopeless && cost.is_better_than(&present) {

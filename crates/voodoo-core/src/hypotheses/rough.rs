@@ -2,13 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use super::score::{explain, rough_cost, strain};
+use super::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
 use super::suspicion::distances_to_others;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Pose, Vec3, WeightedPoints};
 use crate::regions::{Backdrop, Claim, Posed, Regions};
-use crate::visibility::SAMPLE;
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
 /// The arm or leg that is looked at, and where everything else is.
@@ -95,7 +94,7 @@ impl RoughScore {
         sample.clear();
         sample.extend(unexplained);
         sample.extend(own);
-        sample.subsample(SAMPLE);
+        sample.subsample(ROUGH_SAMPLE);
         distances_to_others(at.context, at.matched.poses, at.chain(), &sample.points, others, distances);
     }
 

@@ -7,13 +7,24 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::solver::LIMIT_SIGMA;
+use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
-use crate::visibility::{ALONG_LIMB, OVERLAP, ROUGHLY};
 
+/// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
+/// are soft; a joint may turn by a third of a right angle between two frames.
+const LIMIT_STRAIN: f64 = 0.1;
+const MOTION_STRAIN: f64 = 0.6;
+/// How deep (metres) a place of an axis lies in another limb when it is inside: surfaces touch.
+const INSIDE: f64 = 0.01;
+/// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
+const ROUGHLY: f64 = 0.08;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
-pub const GAIN: f64 = 20.0;
+pub const GAIN: f64 = 25.0;
+/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
+const SEEN_GAIN: f64 = 10.0;
+/// Points looked at when rough poses are compared, at most: costs time in proportion.
+pub const ROUGH_SAMPLE: usize = 400;
 
 /// Cost of a pose in unexplained patches.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +38,7 @@ pub struct Cost {
 impl Cost {
     /// Whether a hypothesis that costs so much is worth a jump.
     pub fn is_better_than(&self, current: &Self) -> bool {
-        self.total < current.total - GAIN && self.evidence < current.evidence - 0.5 * GAIN
+        self.total < current.total - GAIN && self.evidence < current.evidence - SEEN_GAIN
     }
 }
 
@@ -55,8 +66,8 @@ pub fn strain(context: Context, matched: Matched, chain: &TwoBone, poses: &[Pose
         cost += limit_strain(body, poses, limb);
         if previous.len() == poses.len() {
             let before = joint_turn(joint, &previous[*parent], &previous[limb]);
-            let moved = (turn * before.inverse()).to_scaled_axis_shortest().length();
-            cost += strained(moved, joint.motion);
+            let moved = (turn * before.inverse()).to_scaled_axis_shortest().length() / MOTION_STRAIN;
+            cost += moved * moved;
         }
     }
     cost + overlap_cost(body, chain, poses) + extremity_landmark_cost(matched, chain, poses)
@@ -77,7 +88,7 @@ fn overlap_cost(body: &Body, chain: &TwoBone, poses: &[Pose]) -> f64 {
                 // Most limbs are too far away to hold it.
                 let reach = shape.length() + shape.a0().max(shape.b0()).max(shape.a1()).max(shape.b1());
                 (point - poses[other].translation).length_squared() < reach * reach
-                    && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -OVERLAP
+                    && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -INSIDE
             });
             cost += if within { patches / ALONG_LIMB.len() as f64 } else { 0.0 };
         }
@@ -91,14 +102,9 @@ pub fn limit_strain(body: &Body, poses: &[Pose], limb: usize) -> f64 {
     let Some(limits) = &joint.limits else { return 0.0 };
     let turn = joint_turn(joint, &poses[*parent], &poses[limb]).to_scaled_axis_shortest();
     let excess = |(axis, [low, high]): (usize, &[f64; 2])| {
-        strained((low - turn[axis]).max(turn[axis] - high).max(0.0), LIMIT_SIGMA)
+        ((low - turn[axis]).max(turn[axis] - high).max(0.0) / LIMIT_STRAIN).powi(2)
     };
     limits.iter().enumerate().map(excess).sum()
-}
-
-/// Cost of what the solver's prior and limits hold to a standard deviation, in unexplained patches: one at two of it.
-fn strained(by: f64, sigma: f64) -> f64 {
-    (by / (2.0 * sigma)).powi(2)
 }
 
 /// Lowers the least distances of points to the limbs of a pose by those to one more limb; `distances` is working memory.
@@ -208,7 +214,7 @@ mod tests {
                 let mut bent = poses.clone();
                 let turn = Quat::from_axis_angle(hinge_axis(joint), least - beyond);
                 bent[chain.lower] = place(joint, &poses[chain.upper], turn);
-                let wanted = (beyond / (2.0 * LIMIT_SIGMA)).powi(2);
+                let wanted = (beyond / LIMIT_STRAIN).powi(2);
                 let (limit, all) = (limit_strain(&model.body, &bent, chain.lower), own(&bent) - own(&poses));
                 assert!((limit - wanted).abs() < 1e-6 && (all - wanted).abs() < 1e-6, "{limit} and {all} for {beyond}");
             }

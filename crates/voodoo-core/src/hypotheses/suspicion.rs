@@ -4,8 +4,15 @@ use super::score::{GAIN, explain};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
-use crate::visibility::evidence::{Visibility, limb_visibility};
-use crate::visibility::{EXPLAINED, QUARTER};
+use crate::visibility::evidence::{EXPLAINED, Visibility, limb_visibility};
+
+/// It is idle when the patches that it alone explains are a smaller share of those it shows.
+const IDLE: f64 = 0.3;
+/// It is refuted when cameras see past a larger share of it.
+const REFUTED: f64 = 0.2;
+/// Either share is of this many patches at least (of those seen past, of the image): few patches flicker.
+const LEAST_SHOWN: f64 = 20.0;
+const LEAST_PAST: f64 = 12.0;
 
 /// What an arm or leg explains now, and working memory.
 #[derive(Debug, Default)]
@@ -28,8 +35,7 @@ impl Suspicion {
         }
     }
 
-    /// Whether the frame speaks against all of an arm or leg, and against what lies beyond its hinge: it explains alone little of
-    /// what shows of it, or cameras see past a good part of it.
+    /// Whether the frame speaks against all of an arm or leg, and against what lies beyond its hinge.
     ///
     /// What cameras see past counts by its area in the image. Where unexplained points have drawn it there (`drawn`), it counts
     /// as if seen from the side, too: a thing that appears draws a calf along the ray, where nothing of it is seen. And it has
@@ -46,8 +52,8 @@ impl Suspicion {
         let mut seen = Visibility::default();
         let mut against = |limb: usize, exclusive: f64| {
             seen += limb_visibility(context.seen.views, &body.limbs()[limb], &matched.poses[limb]);
-            exclusive <= QUARTER * (seen.image.front_facing - seen.image.occluded).max(GAIN)
-                || seen.image.free_space > (QUARTER * seen.image.front_facing).max(0.5 * GAIN)
+            exclusive <= IDLE * (seen.image.front_facing - seen.image.occluded).max(LEAST_SHOWN)
+                || seen.image.free_space > (REFUTED * seen.image.front_facing).max(LEAST_PAST)
         };
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
@@ -55,7 +61,7 @@ impl Suspicion {
         let lower = against(chain.lower, exclusive(upper));
         let upper = against(chain.upper, exclusive(0));
         let shown = seen.image.front_facing - seen.image.occluded - seen.image.free_space;
-        let past = seen.side.free_space > (QUARTER * seen.side.front_facing).max(GAIN);
+        let past = seen.side.free_space > (REFUTED * seen.side.front_facing).max(LEAST_SHOWN);
         let drawn = drawn && (past || shown < GAIN);
         [upper || drawn, lower || drawn]
     }

@@ -2,10 +2,10 @@
 
 use crate::fit::{Context, Matched};
 use crate::math::{Vec3, WeightedPoints};
-use crate::visibility::EXPLAINED;
+use crate::visibility::evidence::EXPLAINED;
 
 /// A larger share of the frame's weight than this unexplained is clutter: a heap of points in it says nothing.
-pub const CLUTTER: f64 = 0.15;
+const CLUTTER: f64 = 0.15;
 
 /// What the current matches leave unexplained.
 #[derive(Debug, Default)]

@@ -7,8 +7,6 @@
 //! * a transform is named `a_from_b` and maps coordinates in `b` to coordinates in `a`;
 //! * a twist is `(omega, v)`, radians and metres, and perturbs on the left: `T' = exp(xi) T`.
 
-use std::f64::consts::{PI, TAU};
-
 pub use parry3d_f64::bounding_volume::Aabb;
 pub use parry3d_f64::glamx::{DMat3 as Mat3, DPose3 as Pose, DQuat as Quat, DVec3 as Vec3};
 
@@ -102,14 +100,6 @@ impl ShortestAxis for Quat {
         let sine = v.length();
         if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
     }
-}
-
-/// One of so many unit directions, spread over the sphere as evenly as a spiral goes whose turn is the golden angle.
-pub fn on_spiral(index: usize, count: usize) -> Vec3 {
-    let height = 1.0 - (2 * index + 1) as f64 / count as f64;
-    let (s, c) = f64::sin_cos(PI * (3.0 - f64::sqrt(5.0)) * index as f64 % TAU);
-    let around = (1.0 - height * height).max(0.0).sqrt();
-    Vec3::new(around * c, around * s, height)
 }
 
 /// The transform into the working frame, whose origin is `origin` in the world.

@@ -3,25 +3,23 @@
 use super::belief::ENOUGH_ODDS;
 use crate::body::Body;
 use crate::detect::Detection;
-use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
-pub(super) const YOUNG: f64 = 1.0;
-/// The body is searched from this many frames on in which it was lost: a blurred frame is no loss. In every so manyth frame it is
-/// looked at again after it was found, a detector looks at one that is young or lost; and who was seen in as many may be hidden.
-pub(super) const LOST_PATIENCE: usize = 3;
-/// Frames from one look at a track with a limb in doubt to the next: a look costs as much as five frames.
-const EVERY: usize = 15;
+const YOUNG: f64 = 1.0;
+/// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
+const EVERY: [usize; 2] = [3, 15];
 /// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips
 /// and ankles 10 cm from where a detector tells them.
 const ELSEWHERE: f64 = 0.15;
+/// The same of arms.
+const ARMS_ELSEWHERE: f64 = 0.10;
 /// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
 pub(super) const SIGMAS: f64 = 3.5;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
 /// A body that has been lost for so long is gone, seconds.
-pub(super) const GONE: f64 = 2.0 * YOUNG;
+const GONE: f64 = 2.0;
 /// Joints that tell where the trunk is and which way round.
 const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 
@@ -84,7 +82,7 @@ impl Doubt {
         let young = self.young(stamp) || lost;
         self.since = self.since.or(Some(stamp));
         self.waited = self.waited.map(|frames| frames + 1);
-        let every = if young { LOST_PATIENCE } else { EVERY };
+        let every = if young { EVERY[0] } else { EVERY[1] };
         let due = (young || doubtful) && self.waited.is_none_or(|frames| frames >= every);
         if due {
             self.waited = Some(0);
@@ -108,7 +106,7 @@ impl Doubt {
             apart > least && apart > sigmas * spread
         };
         let limbs = young || among;
-        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, APART));
+        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, ARMS_ELSEWHERE));
         if elsewhere(&TRUNK, ELSEWHERE) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
         } else {

@@ -1,12 +1,18 @@
 //! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
 
-use super::doubt::{GONE, LOST_PATIENCE};
 use crate::math::Vec3;
 use crate::observation::frame::Frame;
-use crate::visibility::NOTABLE;
 
-/// What is so much nearer to a camera than a joint or a body hides it, metres: more than half of a body is thick.
-const IN_FRONT: f64 = 0.3;
+/// What is measured so much nearer than a joint hides it, metres: more than half of a body is thick.
+const COVERS: f64 = 0.3;
+/// A body is hidden when this share of its joints is: its own arms hide less of it, and who stands before it may be slimmer.
+const HIDDEN_SHARE: f64 = 0.33;
+/// What stands before a hidden body is at least so much nearer to a camera, metres.
+const IN_FRONT: f64 = 0.4;
+/// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
+const SEEN_FRAMES: usize = 10;
+/// Who was hidden is waited for so long, seconds.
+const WAITS: f64 = 2.0;
 
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
@@ -28,18 +34,18 @@ impl Hidden {
         let (mut hidden, mut all, mut root) = (0, 0, None);
         for joint in joints {
             let mut measured = frame.images.iter().filter_map(|image| image.measured(joint));
-            hidden += i32::from(measured.any(|[z, own]| z > 0.0 && z < own - IN_FRONT));
+            hidden += i32::from(measured.any(|[z, own]| z > 0.0 && z < own - COVERS));
             all += 1;
             root = root.or(Some(joint));
         }
         let Some(root) = root else { return };
-        if f64::from(hidden) >= NOTABLE * f64::from(all) {
+        if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
-            self.last = (self.seen >= LOST_PATIENCE).then_some((frame.stamp, place));
+            self.last = (self.seen >= SEEN_FRAMES).then_some((frame.stamp, place));
             return;
         }
         self.seen += usize::from(seen);
-        let last = self.last.filter(|(last, _)| frame.stamp - last < GONE);
+        let last = self.last.filter(|(last, _)| frame.stamp - last < WAITS);
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
 
@@ -74,7 +80,7 @@ mod tests {
             })
         };
         assert_eq!(after(&covered, -2.0, false), [false; 3], "it was never seen");
-        for frame in 0..LOST_PATIENCE {
+        for frame in 0..SEEN_FRAMES {
             assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing stands before it");
         }
         assert_eq!(after(&covered, 0.2, true), [false, false, true]);
@@ -85,7 +91,7 @@ mod tests {
                 "it may come back"
             );
         }
-        assert_eq!(after(&open, 0.3 + GONE, true), [false; 3], "long ago");
+        assert_eq!(after(&open, 0.3 + WAITS, true), [false; 3], "long ago");
         // Its own depth hides no body.
         let near = before_wall(&model.body, &moved(&poses, -0.15 * Vec3::Z));
         assert_eq!(after(&near, 3.0, true), [false; 3]);

@@ -17,7 +17,7 @@ mod watch;
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Model};
 use crate::detect::{Detection, Wanted};
-use crate::fit::{Context, Fit, UNKNOWN_MOTION};
+use crate::fit::{Context, Fit};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::{Frame, Ground};
@@ -31,11 +31,17 @@ use facing::Known;
 use people::People;
 pub(crate) use people::sized;
 use posture::{Place, Postures};
-use seeds::MOST_TRIED;
-use segment_motion::{MARGIN, SegmentMotion};
+use segment_motion::SegmentMotion;
 use trials::Trials;
 pub use watch::Sighting;
 use watch::Watch;
+
+/// A segment's box is enlarged by this, metres: returns at its edges are missing.
+const MARGIN: f64 = 0.20;
+/// Segments that are tried, the largest first: costs time in proportion.
+const MOST_SEGMENTS: usize = 2;
+/// While the body is searched its motion is so many times freer than between two frames.
+const FREEDOM: f64 = 6.0;
 
 /// Searches a lost body. Remembers how it stood, and how what may be it moves.
 #[derive(Debug, Default)]
@@ -208,7 +214,7 @@ impl Relocalizer {
         fit.exchange(&mut self.matched);
         self.candidates.gather(context.seen.frame(), origin, &bounds, context.seen.views.backgrounds, context.config);
         let seen = context.seen.with(&self.candidates);
-        let at = Context { seen, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
+        let at = Context { seen, previous: &[], time_scale: FREEDOM, ..context };
         let better = self.trials.at_detection(at, fit, present, &place);
         fit.exchange(&mut self.matched);
         better.then(|| self.trials.best().as_slice())
@@ -250,12 +256,12 @@ impl Relocalizer {
         let mut found: Option<f64> = None;
         let apart = |segment: &&Segment| !self.watch.hidden.by(frame, segment.centre + origin);
         let fitting = self.segments.found().iter().filter(|segment| self.postures.fits(segment)).filter(apart);
-        for segment in fitting.take(MOST_TRIED) {
+        for segment in fitting.take(MOST_SEGMENTS) {
             let bounds = Aabb::new(segment.low - Vec3::splat(MARGIN), segment.high + Vec3::splat(MARGIN));
             self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);
             // Nothing is known of the motion.
             let seen = context.seen.with(&self.candidates);
-            let at = Context { seen, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
+            let at = Context { seen, previous: &[], time_scale: FREEDOM, ..context };
             let known = Known { postures: &self.postures, motion: &self.motion, lost: self.watch.lost() };
             let outcome = self.trials.at_segment(at, known, fit, present, segment);
             self.watch.explained = Some(outcome.explained || self.watch.explained == Some(true));
@@ -273,7 +279,7 @@ impl Relocalizer {
     /// Takes note of how the search ended, with the body at `poses`; whether it is to be given up: what a lost tracker slid onto
     /// is no body as long as it leaves much of every segment unexplained.
     pub fn conclude(&mut self, found: bool, sighting: Sighting, poses: &[Pose]) -> bool {
-        let walked = self.motion.walks(self.postures.up);
+        let walked = self.motion.walks(self.postures.up, sighting.stamp);
         let ahead = walked.is_some_and(|walked| (poses[0].rotation * Vec3::X).dot(walked) > 0.5);
         self.watch.conclude(found, sighting, ahead)
     }

@@ -4,10 +4,11 @@ use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::{REFERENCE_PATCH, body_box};
 use crate::observation::segments::Segment;
-use crate::visibility::{NOTABLE, QUARTER};
 
-/// A segment of a body is no longer than this many times the body's height at rest: arms are held up or out.
-const LONGEST: f64 = 1.5;
+/// A segment shows at least this share of the surface that a camera can see of the body: the rest may be hidden.
+const LEAST_SURFACE: f64 = 0.25;
+/// Its extents as shares of the body's height at rest: the longer one at least, the upright one and the others at most.
+const EXTENTS: [f64; 3] = [0.35, 1.4, 1.5];
 
 /// Poses of the whole body, working frame.
 pub(super) type Place = Vec<Pose>;
@@ -63,11 +64,10 @@ impl Postures {
     /// Whether a segment may be the body.
     pub(super) fn fits(&self, segment: &Segment) -> bool {
         let extents = segment.high - segment.low;
+        let [least, upright, across] = EXTENTS.map(|share| share * self.height);
         let tall = extents.dot(self.up.abs());
         let wide = (extents - self.up.abs() * tall).max_element();
-        let longest = tall.max(wide);
-        // The rest may be hidden.
-        segment.patches > QUARTER * self.patches && longest > NOTABLE * self.height && longest < LONGEST * self.height
+        segment.patches > LEAST_SURFACE * self.patches && tall.max(wide) > least && tall < upright && wide < across
     }
 }
 

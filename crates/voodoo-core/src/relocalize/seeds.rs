@@ -4,23 +4,25 @@
 use super::facing::{Known, facing_cost};
 use super::posture::{Place, Postures};
 use crate::fit::Context;
-use crate::hypotheses::{SWIVELS, explain, rough_cost as unexplained_roughly};
+use crate::hypotheses::explain;
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::observation::segments::Segment;
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
-/// Segments that are tried, the largest first, and of each as many rough looks and the opposite of the best: costs time in
-/// proportion.
-pub(super) const MOST_TRIED: usize = 2;
 /// Directions the body is turned to, evenly: costs time in proportion.
-const HEADINGS: usize = 2 * SWIVELS;
+const HEADINGS: usize = 8;
+/// Up to this distance rough looks take a point as explained, metres.
+const EXPLAINED_ROUGHLY: f64 = 0.10;
+/// Depth of a body's middle behind the middle of what a camera sees of it, metres: half a trunk.
+const BEHIND: f64 = 0.08;
+/// Rough looks that are refined, besides the opposite of the best.
+const KEPT: usize = 3;
 
 /// A rough look: its cost and its place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seed {
     cost: f64,
-    /// Its number among the directions.
-    heading: usize,
+    heading: f64,
     root: Pose,
     /// Joints as when last tracked, instead of at rest.
     tracked: bool,
@@ -55,11 +57,11 @@ pub(super) fn find_seeds(
     seeds: &mut Vec<Seed>,
 ) {
     let mut all = [const { None::<Seed> }; HEADINGS];
-    for (heading, slot) in all.iter_mut().enumerate() {
-        let angle = std::f64::consts::TAU * heading as f64 / HEADINGS as f64;
+    for (number, slot) in all.iter_mut().enumerate() {
+        let heading = std::f64::consts::TAU * number as f64 / HEADINGS as f64;
         for tracked in [false, true] {
             for height in HEIGHTS {
-                let Some(root) = place(context, known.postures, segment, angle, tracked, height) else { continue };
+                let Some(root) = place(context, known.postures, segment, heading, tracked, height) else { continue };
                 let mut seed = Seed { cost: 0.0, heading, root, tracked };
                 seed.cost = rough_cost(rough, context, known, &seed);
                 if slot.is_none_or(|best| seed.cost < best.cost) {
@@ -74,10 +76,11 @@ pub(super) fn find_seeds(
         let cost = |slot: &Option<Seed>| slot.map_or(f64::INFINITY, |seed| seed.cost);
         cost(a).total_cmp(&cost(b))
     });
-    seeds.extend(ranked.into_iter().flatten().take(MOST_TRIED));
+    seeds.extend(ranked.into_iter().flatten().take(KEPT));
     let Some(best) = seeds.first().copied() else { return };
-    let opposite = (best.heading + HEADINGS / 2) % HEADINGS;
-    if let Some(behind) = all[opposite].filter(|_| !seeds.iter().any(|seed| seed.heading == opposite)) {
+    let opposite = |heading: f64| (heading - best.heading).cos() < -0.99;
+    let behind = all.into_iter().flatten().find(|seed| opposite(seed.heading));
+    if let Some(behind) = behind.filter(|_| !seeds.iter().any(|seed| opposite(seed.heading))) {
         seeds.push(behind);
     }
 }
@@ -101,9 +104,7 @@ fn place(
     let now = ahead.dot(up.cross(axis)).atan2(ahead.dot(axis));
     let turn = Quat::from_axis_angle(up, heading - now) * stand * root.inverse();
     let extent = Extent::of(context, posture, turn, up);
-    // A body's middle lies half a trunk behind the middle of what a camera sees of it.
-    let trunk = context.model.body.limbs()[0].shape;
-    let across = segment.centre + trunk.a0().min(trunk.b0()) * postures.level(segment.view) - extent.middle;
+    let across = segment.centre + BEHIND * postures.level(segment.view) - extent.middle;
     let rise = match height {
         Height::Middle => across.dot(up),
         Height::Top => (segment.low * up).max(segment.high * up).element_sum() - extent.high,
@@ -127,7 +128,8 @@ fn rough_cost(rough: &mut RoughLook, context: Context, known: Known, seed: &Seed
         explain(body, limb, poses, &sample.points, nearest, distances);
         visible += limb_visibility(context.seen.views, part, pose);
     }
-    let points = unexplained_roughly(nearest, &sample.weights);
+    let unexplained = |(d, w): (&f32, &f64)| w * (f64::from(*d) / EXPLAINED_ROUGHLY).powi(2).min(1.0);
+    let points: f64 = nearest.iter().zip(&sample.weights).map(unexplained).sum();
     let stamp = context.seen.frame().stamp;
     points + visible.cost() + facing_cost(known, seed.root.rotation, stamp)
 }

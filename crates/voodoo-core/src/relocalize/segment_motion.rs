@@ -1,13 +1,13 @@
 //! How the largest thing that may be the body moves: a person who walks faces where he goes.
 
-use super::belief::SAME_PERSON;
-use super::doubt::YOUNG;
 use crate::math::Vec3;
 
-/// How far a segment's box and middle may be off, metres: returns at its edges are missing.
-pub(super) const MARGIN: f64 = 0.20;
-/// For so long evidence of which way a body faces is waited for, seconds: a segment that moves meanwhile walks.
-pub(super) const WAIT: f64 = 0.5 * YOUNG;
+/// A segment that moves faster than this (m/s), and by more than this (m), walks; seen over so many seconds.
+const WALKING_SPEED: f64 = 0.3;
+const WALKING_DISTANCE: f64 = 0.2;
+const WALKING_TIME: f64 = 0.7;
+/// A segment farther than this from where it was in the frame before is another one, metres.
+const JUMP: f64 = 0.4;
 
 /// Where it was a while ago and last; world frame.
 #[derive(Debug, Default)]
@@ -30,22 +30,22 @@ impl SegmentMotion {
             self.first = None;
             return;
         };
-        let jumped = (place - self.last).length() > SAME_PERSON;
+        let jumped = (place - self.last).length() > JUMP;
         if self.first.is_none() || jumped {
             self.seen_since = stamp;
         }
-        if jumped || self.first.is_none_or(|(since, _)| stamp - since > WAIT) {
+        if jumped || self.first.is_none_or(|(since, _)| stamp - since > WALKING_TIME) {
             self.first = Some((stamp, place));
         }
         self.last = place;
     }
 
     /// The level direction in which it walks, if it does.
-    pub(super) fn walks(&self, up: Vec3) -> Option<Vec3> {
-        let (_, first) = self.first?;
+    pub(super) fn walks(&self, up: Vec3, stamp: f64) -> Option<Vec3> {
+        let (since, first) = self.first?;
         let way = self.last - first;
         let way = way - up * way.dot(up);
-        let walks = way.length() > MARGIN;
+        let walks = way.length() > WALKING_DISTANCE.max(WALKING_SPEED * (stamp - since));
         walks.then(|| way.normalize_or_zero())
     }
 }
@@ -65,17 +65,17 @@ mod tests {
 
     #[test]
     fn who_walks_has_a_direction_and_who_sways_has_none() {
-        let walks = seen(1.0).walks(Vec3::Z).unwrap();
+        let walks = seen(1.0).walks(Vec3::Z, 0.5).unwrap();
         assert!(walks.distance(Vec3::X) < 1e-9);
-        assert_eq!(seen(0.2).walks(Vec3::Z), None);
+        assert_eq!(seen(0.2).walks(Vec3::Z, 0.5), None);
     }
 
     #[test]
     fn another_segment_starts_anew() {
         let mut motion = seen(1.0);
         motion.observe(Some(Vec3::new(-3.0, 0.0, 1.0)), 0.6);
-        assert_eq!((motion.walks(Vec3::Z), motion.seen_since), (None, 0.6));
+        assert_eq!((motion.walks(Vec3::Z, 0.6), motion.seen_since), (None, 0.6));
         motion.observe(None, 0.7);
-        assert_eq!(motion.walks(Vec3::Z), None);
+        assert_eq!(motion.walks(Vec3::Z, 0.7), None);
     }
 }

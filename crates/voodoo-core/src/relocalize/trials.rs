@@ -1,16 +1,26 @@
 //! Whether a lost body stands at a segment: the best rough looks are refined and scored.
 
-use super::facing::{Known, TURNED, facing_cost};
+use super::facing::{Known, facing_cost};
 use super::posture::Place;
 use super::seeds::{RoughLook, Seed, find_seeds, put};
-use super::segment_motion::WAIT;
 use crate::body::Model;
 use crate::fit::{Context, Fit};
-use crate::hypotheses::{CLUTTER, GAIN, REFINE, body_landmark_cost, explain, limit_strain, overall_cost};
+use crate::hypotheses::{body_landmark_cost, explain, limit_strain, overall_cost};
 use crate::math::{Pose, Vec3};
 use crate::observation::segments::Segment;
-use crate::visibility::{ROUGHLY, SAMPLE};
 
+/// The opposite facing explains a frame worse by this, in patches, or it is waited for so long for evidence, seconds.
+const DECIDED: f64 = 100.0;
+const WAIT: f64 = 0.5;
+/// Points that rough looks are taken at: costs time in proportion.
+const SEED_SAMPLE: usize = 300;
+/// ICP steps that refine a rough look.
+const STEPS: usize = 10;
+/// A segment of which a larger share lies farther than this (m) from the body is none.
+const MOST_STRAY: f64 = 0.15;
+const STRAY_DISTANCE: f64 = 0.07;
+/// Patches by which a place must be better than the present pose: an area of eight by eight centimetres.
+const PLACE_GAIN: f64 = 40.0;
 /// What cameras have against a place counts at most this many times the weight of its points: so much says that it is wrong.
 const MOST_COST: f64 = 4.0;
 
@@ -52,7 +62,7 @@ impl Trials {
         let total = self.take_sample(context);
         fit.match_all(context, present, context.config.max_steps);
         let mut present_score = place_score(context, known, fit, present, total);
-        let explained = stray_share(&mut self.rough, context, present) < CLUTTER;
+        let explained = stray_share(&mut self.rough, context, present) < MOST_STRAY;
         if explained {
             // Refined as the others are: a body that is 2 cm off shall not be turned about for that.
             self.poses.clear();
@@ -61,7 +71,7 @@ impl Trials {
             present_score = present_score.min(place_score(context, known, fit, &self.poses, total));
         }
         find_seeds(&mut self.rough, context, known, segment, &mut self.seeds);
-        let mut least = present_score - GAIN;
+        let mut least = present_score - PLACE_GAIN;
         let mut found = false;
         let mut opposite = f64::INFINITY;
         let stood = present[0].rotation * Vec3::X;
@@ -75,7 +85,7 @@ impl Trials {
             let stray = stray_share(&mut self.rough, context, &self.poses);
             // A body that is where it should be may only turn out to face the other way.
             let allowed = !explained && known.lost || faces.dot(stood) < 0.0;
-            if allowed && score < least && stray < CLUTTER {
+            if allowed && score < least && stray < MOST_STRAY {
                 if turned {
                     opposite = least;
                 }
@@ -88,7 +98,7 @@ impl Trials {
             }
         }
         let waited = context.seen.frame().stamp - known.motion.seen_since > WAIT;
-        let decided = opposite - least > TURNED || waited;
+        let decided = opposite - least > DECIDED || waited;
         Outcome { gain: (found && decided).then_some(present_score - least), explained }
     }
 
@@ -104,8 +114,8 @@ impl Trials {
         let stray = stray_share(&mut self.rough, context, &self.poses);
         // Depth hardly tells a person's front from the back; the detector does.
         let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
-        let allowed = present_score + if turned { TURNED } else { 0.0 };
-        let found = pose_score(context, fit, &self.poses, total) < allowed && stray < CLUTTER;
+        let allowed = present_score + if turned { DECIDED } else { 0.0 };
+        let found = pose_score(context, fit, &self.poses, total) < allowed && stray < MOST_STRAY;
         if found {
             self.best.clone_from(&self.poses);
         }
@@ -116,7 +126,7 @@ impl Trials {
     fn take_sample(&mut self, context: Context) -> f64 {
         let candidates = context.seen.candidates;
         self.rough.sample.assign(&candidates.points, &candidates.weight);
-        self.rough.sample.subsample(SAMPLE);
+        self.rough.sample.subsample(SEED_SAMPLE);
         candidates.weight.iter().map(|weight| f64::from(*weight)).sum()
     }
 
@@ -124,14 +134,14 @@ impl Trials {
     fn refine(&mut self, context: Context, fit: &mut Fit) {
         let Self { poses, predicted, .. } = self;
         predicted.clone_from(poses);
-        for step in 0..REFINE {
+        for step in 0..STEPS {
             fit.step(context, predicted, poses, step);
         }
         fit.match_all(context, poses, context.config.max_steps);
     }
 }
 
-/// Share of the points at the segment that lie farther than `ROUGHLY` from the body.
+/// Share of the points at the segment that lie farther than `STRAY_DISTANCE` from the body.
 fn stray_share(rough: &mut RoughLook, context: Context, poses: &[Pose]) -> f64 {
     let RoughLook { sample, nearest, distances, .. } = rough;
     nearest.clear();
@@ -139,7 +149,7 @@ fn stray_share(rough: &mut RoughLook, context: Context, poses: &[Pose]) -> f64 {
     for limb in 0..poses.len() {
         explain(&context.model.body, limb, poses, &sample.points, nearest, distances);
     }
-    let stray = nearest.iter().zip(&sample.weights).filter(|(distance, _)| f64::from(**distance) > ROUGHLY);
+    let stray = nearest.iter().zip(&sample.weights).filter(|(distance, _)| f64::from(**distance) > STRAY_DISTANCE);
     stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
 }
 

@@ -1,10 +1,13 @@
 //! When a body is searched: after some frames in which it was lost, and for a while after it was found.
 
-use super::doubt::LOST_PATIENCE;
 use super::hidden::Hidden;
 
-/// After it was found it is searched again for so long, seconds, or until it was seen to walk: another facing may prove better.
+/// The body is searched from this many frames on in which it was lost: a blurred frame is no loss.
+const LOST_PATIENCE: usize = 3;
+/// After it was found, every so manyth frame is searched again for so long, seconds, or until it was seen to walk: another
+/// facing may prove better.
 const WATCH: f64 = 5.0;
+const WATCHED: usize = 5;
 
 /// What a frame said of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +67,7 @@ impl Watch {
         }
         self.until = self.until.filter(|until| sighting.stamp < *until);
         self.frames += 1;
-        self.lost >= LOST_PATIENCE || (self.open() && self.frames.is_multiple_of(LOST_PATIENCE))
+        self.lost >= LOST_PATIENCE || (self.open() && self.frames.is_multiple_of(WATCHED))
     }
 
     /// Ends the search of a frame; `ahead`: it walks where it faces. Whether the pose is to be given up.
@@ -118,7 +121,7 @@ mod tests {
         });
         assert!(!watch.conclude(true, sighting(2.0, false), false) && watch.open());
         let again = (1..=10).filter(|frame| watch.due(sighting(2.0 + 0.1 * f64::from(*frame), false))).count();
-        assert_eq!(again, 3, "every third frame");
+        assert_eq!(again, 2, "every fifth frame");
         assert!(!watch.conclude(false, sighting(3.0, false), true) && !watch.open());
         watch.conclude(true, sighting(3.0, false), false);
         assert!(!watch.due(sighting(3.0 + WATCH, false)) && !watch.open());

@@ -26,7 +26,7 @@ use crate::math::Pose;
 /// Largest turn of a joint or limb in one step, radians: linearised rows hold no farther.
 const LARGEST_TURN: f64 = 0.5;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
-pub const LIMIT_SIGMA: f64 = 0.05;
+const LIMIT_SIGMA: f64 = 0.05;
 /// Relative damping of the normal matrix: what hardly anything measures stays where it is.
 const DAMPING: f64 = 1e-3;
 

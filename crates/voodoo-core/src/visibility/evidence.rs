@@ -8,12 +8,16 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ALONG_LIMB, EXPLAINED, OUTERMOST, SEEN_PAST};
+use crate::visibility::{ALONG_LIMB, SEEN_PAST};
 
+/// A point this far from the model's surface is not explained by it, metres.
+pub const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
-/// Where across a limb patches are looked at, in shares of its radius from the middle.
-const PATCHES_ACROSS: [f64; 3] = [-OUTERMOST, 0.0, OUTERMOST];
+/// Where across a limb patches are looked at, in shares of its radius from the middle; nearer to the rim it was worse.
+const PATCHES_ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
+/// A camera nearer to a limb's axis than this, metres, looks along it and sees no patch of its side.
+const END_ON: f64 = 1e-6;
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,8 +81,7 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
         for t in ALONG_LIMB {
             let section = shape.section(t);
             let Some(facing) = section.facing(&camera_from_limb) else { continue };
-            // A camera on a limb's axis sees no patch of its side.
-            if facing.across.length() < f64::EPSILON {
+            if facing.across.length() < END_ON {
                 continue;
             }
             let (a, b) = (section.a, section.b);

@@ -10,15 +10,21 @@ use crate::body::two_bone::TwoBone;
 use crate::math::Pose;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
+use crate::visibility::evidence::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, EXPLAINED, OVERLAP, SEEN_PAST};
+use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, SEEN_PAST};
+
+/// The outer part of a limb begins at this share of its length.
+const OUTER: f64 = 0.6;
+/// A limb stands before a place when it is nearer to the camera by this, metres: limbs overlap at their joints.
+const BEFORE: f64 = 0.01;
 
 /// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
 /// of each.
 ///
 /// First of the whole limb, each place weighted with its distance from the proximal joint: that is the lever with which it
 /// holds the distal joint, and a place at the proximal joint says nothing of where the limb points. Then of the places in the
-/// outer half alone: what hides in the trunk from the middle on may end anywhere in it.
+/// outer two fifths alone: what hides in the trunk from the middle on may end anywhere in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LimbSupport {
     /// Seen where they are, and explained by no limb of another arm, leg or the trunk.
@@ -77,12 +83,12 @@ fn support_seen_by(
 ) -> LimbSupport {
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
-    let outer_sections = ALONG_LIMB.iter().filter(|t| **t > 0.5).count();
+    let outer_sections = ALONG_LIMB.iter().filter(|t| **t > OUTER).count();
     for t in ALONG_LIMB {
         let Some(facing) = shape.section(t).facing(&camera_from_limb) else { continue };
         // The weights of all places add up to one, in the whole and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);
-        let outer = if t > 0.5 { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
+        let outer = if t > OUTER { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
         let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
         for s in ACROSS_LIMB {
             let point = camera_from_limb * facing.point(s);
@@ -93,7 +99,7 @@ fn support_seen_by(
             support.known = true;
             let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
             let others = || raycasters.iter().enumerate().filter(|(other, _)| *other != limb);
-            if others().any(|(_, other)| depth(other) < point.z - OVERLAP) {
+            if others().any(|(_, other)| depth(other) < point.z - BEFORE) {
                 continue;
             }
             match pixel {

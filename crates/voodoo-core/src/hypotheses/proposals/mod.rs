@@ -22,14 +22,9 @@ use super::history::{Basis, History};
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
-/// Bends of an arm or leg about the line from its root to its end that are tried, twice as many where nothing seen has to agree
-/// with them, and places where it may end: costs time in proportion.
-pub const SWIVELS: usize = 6;
-
-/// Step of turns that are tried, radians: coarser or finer ones were no better.
-const TURN: f64 = 0.2;
-/// Turns that are tried, the smallest first.
-const TURNS: [f64; 5] = [0.0, -TURN, TURN, -2.0 * TURN, 2.0 * TURN];
+/// Bends of an arm or leg about the line from its root to its end that are tried; twice as many where nothing seen has to agree
+/// with them.
+const SWIVELS: usize = 6;
 
 /// Looks for one kind of other configuration of an arm or leg.
 pub(super) trait Propose {

@@ -3,16 +3,18 @@
 
 use std::f64::consts::TAU;
 
-use super::{Pool, Propose, SWIVELS, TURNS};
+use super::{Pool, Propose, SWIVELS};
 use crate::body::Model;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
-use crate::hypotheses::score::{explain, rough_cost, strain};
+use crate::hypotheses::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
-use crate::visibility::SAMPLE;
 use crate::visibility::evidence::limb_visibility;
+
+/// Leans that are tried after none, radians: coarser or finer ones were no better.
+const LEANS: [f64; 4] = [-0.2, 0.2, -0.4, 0.4];
 
 /// What leans and what stands, and working memory.
 #[derive(Debug, Default)]
@@ -87,7 +89,7 @@ impl TrunkLean {
         let Distances { staying, leaning, tried, scratch } = &mut self.distances;
         for distances in [staying, leaning, tried, scratch] {
             distances.clear();
-            distances.reserve(count.min(SAMPLE));
+            distances.reserve(count.min(ROUGH_SAMPLE));
         }
     }
 
@@ -99,10 +101,10 @@ impl TrunkLean {
         let origin = context.seen.origin();
         let legs = [(&extremities[one], one_end - origin), (&extremities[two], two_end - origin)];
         let (shoulders, axis) = self.shoulders(context, matched);
-        let leans = if axis == Vec3::ZERO { &TURNS[..1] } else { &TURNS };
+        let leans = if axis == Vec3::ZERO { &[] } else { LEANS.as_slice() };
         self.explain_what_stays(context, matched, legs);
         let (mut least, mut stance) = (f64::INFINITY, None);
-        for angle in leans {
+        for angle in [&0.0].into_iter().chain(leans) {
             let mut cost = self.lean_trunk(context, matched, shoulders, Quat::from_axis_angle(axis, *angle));
             for leg in legs {
                 cost += self.stand(context, matched, leg);
@@ -133,7 +135,7 @@ impl TrunkLean {
         let candidates = context.seen.candidates;
         self.make_room(candidates.len());
         self.sample.assign(&candidates.points, &candidates.weight);
-        self.sample.subsample(SAMPLE);
+        self.sample.subsample(ROUGH_SAMPLE);
         let Self { sample, distances: Distances { staying, scratch, .. }, trunk, .. } = self;
         staying.resize(sample.len(), f32::INFINITY);
         let stands = |limb: usize| legs.iter().any(|(leg, _)| leg.limbs().any(|own| own == limb));

@@ -4,7 +4,13 @@ use super::{Pool, Propose, SWIVELS};
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
-use crate::visibility::{FEW, ROUGHLY};
+
+/// Places where the end is tried, at most: costs time in proportion.
+const MOST_ENDS: usize = 5;
+/// Size of what stands for one cluster, metres: a hand.
+const CLUSTER_RADIUS: f64 = 0.08;
+/// Patches of a cluster that may be stray: a few stray points are no hand.
+const STRAY_PATCHES: f64 = 3.0;
 
 /// The end at the clusters that are farthest from the root and from each other.
 #[derive(Debug, Default)]
@@ -34,15 +40,15 @@ impl Propose for UnexplainedCluster {
 }
 
 /// Where the end may be: middles of clusters, each as far as can be from the root and the others.
-fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; SWIVELS] {
+fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; MOST_ENDS] {
     let WeightedPoints { points, weights } = cluster;
     apart.clear();
     apart.extend((0..points.len()).map(|index| (points.get(index) - root).length() as f32));
-    let (mut ends, mut found) = ([None; SWIVELS], 0);
-    while found < SWIVELS {
+    let (mut ends, mut found) = ([None; MOST_ENDS], 0);
+    while found < MOST_ENDS {
         let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
         let place = points.get(next);
-        if f64::from(apart[next]) < ROUGHLY {
+        if f64::from(apart[next]) < CLUSTER_RADIUS {
             break;
         }
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
@@ -50,12 +56,12 @@ fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> 
             let point = points.get(index);
             let distance = (point - place).length();
             *apart = apart.min(distance as f32);
-            if distance < ROUGHLY {
+            if distance < CLUSTER_RADIUS {
                 sum += weights[index] * point;
                 total += weights[index];
             }
         }
-        if total > FEW {
+        if total > STRAY_PATCHES {
             ends[found] = Some(sum / total);
             found += 1;
         }
@@ -89,8 +95,8 @@ mod tests {
     #[test]
     fn nothing_is_proposed_without_points_or_beside_the_root() {
         let mut points = WeightedPoints::default();
-        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; SWIVELS]);
+        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; MOST_ENDS]);
         cluster(&mut points, Vec3::new(0.02, 0.0, 0.0), 30);
-        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; SWIVELS]);
+        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; MOST_ENDS]);
     }
 }

@@ -1,28 +1,41 @@
 //! What is known about one limb, over a few frames: evidence flickers.
 
-use super::two_state::{TwoState, said_by};
+use super::two_state::TwoState;
 use crate::tracker::estimate::LimbStatus;
-use crate::visibility::NOTABLE;
 
-/// What frames said about a limb.
+/// Share of the visible patches that a measured limb alone explains at least.
+pub(super) const SUPPORT: f64 = 0.15;
+/// Share of the patches facing a camera that it may see past.
+const CONTRADICTED: f64 = 0.3;
+/// A limb of which a smaller share shows is hidden.
+const SHOWN: f64 = 0.35;
+/// Share of the past frames in what is known of a limb's support.
+const MEMORY: f64 = 0.6;
+
+/// Running means of what frames said about a limb.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LimbHistory {
-    /// That what it alone explains proves it.
-    supported: TwoState,
-    /// Shares of the facing patches that cameras see past, and that are not hidden, in the last frame.
+    /// Share of the visible patches explained by this limb alone.
+    exclusive: f64,
+    /// Share of the facing patches that cameras see past.
     contradicted: f64,
+    /// Share of the facing patches not hidden.
     shown: f64,
     /// That images show this limb, and no other, where it is, and so that of its far end; of limbs of which an image says
     /// something.
     shows: Option<[TwoState; 2]>,
+    frames: usize,
 }
 
 impl LimbHistory {
     /// Takes a frame's shares: explained by it alone, seen past, not hidden.
-    pub(super) fn update(&mut self, [exclusive, contradicted, shown]: [f64; 3]) {
-        (self.contradicted, self.shown) = (contradicted, shown);
-        let explained = if contradicted > NOTABLE { 0.0 } else { exclusive };
-        self.supported.observe(said_by(explained), 0.0);
+    pub(super) fn update(&mut self, now: [f64; 3]) {
+        let keep = if self.frames == 0 { 0.0 } else { MEMORY };
+        let shares = [&mut self.exclusive, &mut self.contradicted, &mut self.shown];
+        for (value, now) in shares.into_iter().zip(now) {
+            *value = keep * *value + (1.0 - keep) * now;
+        }
+        self.frames += 1;
     }
 
     /// Takes what a frame's images say of the limb and of its far end, log odds, after it moved by so many metres.
@@ -39,9 +52,9 @@ impl LimbHistory {
 
     /// The status by what the limb alone explains.
     pub(super) fn supported(&self) -> LimbStatus {
-        if self.supported.holds() {
+        if self.exclusive >= SUPPORT && self.contradicted <= CONTRADICTED {
             LimbStatus::Measured
-        } else if self.shown < NOTABLE && self.contradicted < NOTABLE {
+        } else if self.shown < SHOWN && self.contradicted <= CONTRADICTED {
             LimbStatus::Inferred
         } else {
             LimbStatus::Lost
@@ -53,7 +66,7 @@ impl LimbHistory {
         match self.shows {
             None => supported,
             Some([whole, _]) if whole.holds() => LimbStatus::Measured,
-            Some(_) if self.contradicted > NOTABLE => LimbStatus::Lost,
+            Some(_) if self.contradicted > CONTRADICTED => LimbStatus::Lost,
             Some(_) => LimbStatus::Inferred,
         }
     }

@@ -28,10 +28,24 @@ use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
-use crate::visibility::{EXPLAINED, FEW, NOTABLE, QUARTER};
 use exclusive::Exclusive;
-use limb_history::LimbHistory;
-use two_state::{CHANGES, EVEN, all, either, said_by};
+use limb_history::{LimbHistory, SUPPORT};
+use two_state::{all, either, said_by};
+
+/// Shares are of this many visible patches at least.
+const LEAST_VISIBLE: f64 = 8.0;
+/// Without a depth image, points on a limb that make it measured.
+const FEW: f64 = 5.0;
+/// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
+const FLAT: f64 = 0.2;
+const ROUNDNESS_MEMORY: f64 = 0.9;
+/// Share of the limbs of a tracked body that are measured at least; with fewer than `SOME` measured it is lost, and with fewer
+/// than `HALF` where the root is none of them.
+const TRACKED: f64 = 0.75;
+const HALF: f64 = 0.5;
+const SOME: f64 = 0.25;
+/// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
+const AT_JOINT: f64 = 0.03;
 
 /// Assesses every frame, and remembers what past ones said.
 #[derive(Debug, Default)]
@@ -119,11 +133,10 @@ impl Assessor {
         }
         inherit_status(extremities, internal);
         if let Some(now) = roundness(context.seen.views, &context.model.body, matched.poses) {
-            // A blurred frame is no cupboard: what is known of two states that change so often fades at this rate.
-            let mixed = |before: f64| before + 2.0 * CHANGES * (now - before);
+            let mixed = |before: f64| ROUNDNESS_MEMORY * before + (1.0 - ROUNDNESS_MEMORY) * now;
             self.round = Some(self.round.map_or(now, mixed));
         }
-        if self.round.is_some_and(|round| round < NOTABLE) {
+        if self.round.is_some_and(|round| round < FLAT) {
             self.give_up();
         }
     }
@@ -148,7 +161,7 @@ impl Assessor {
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
             }
         }
-        let doubtful = self.status == Status::Tracking && measured_share(statuses) < 1.0 - QUARTER;
+        let doubtful = self.status == Status::Tracking && measured_share(statuses) < TRACKED;
         estimate.status = if doubtful { Status::Degraded } else { self.status };
     }
 
@@ -169,9 +182,9 @@ impl Assessor {
             let exclusive = self.exclusive.weight[limb];
             let mut now = if seen.front_facing > 0.0 {
                 let past = seen.free_space / seen.front_facing;
-                [exclusive / visible.max(FEW), past, visible / seen.front_facing]
+                [exclusive / visible.max(LEAST_VISIBLE), past, visible / seen.front_facing]
             } else {
-                [EVEN * exclusive / FEW, 0.0, 0.0]
+                [SUPPORT * exclusive / FEW, 0.0, 0.0]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
@@ -226,7 +239,7 @@ impl Assessor {
 fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize> {
     let (parent, joint) = body.limbs()[pair.limb].parent.as_ref()?;
     let centre = poses[pair.limb].transform_point(joint.limb_from_joint.translation);
-    ((pair.x - centre).length() < EXPLAINED).then_some(*parent)
+    ((pair.x - centre).length() < AT_JOINT).then_some(*parent)
 }
 
 /// Hands and feet show too few patches to tell on their own: they have the status of what they hang on.
@@ -243,9 +256,9 @@ fn measured_share(limbs: &[LimbStatus]) -> f64 {
 /// Lost without a measured root and half of the limbs; degraded when more than a quarter of the limbs are not measured.
 fn overall(limbs: &[LimbStatus]) -> Status {
     let measured = measured_share(limbs);
-    if measured < QUARTER || (limbs[0] != LimbStatus::Measured && measured < 0.5) {
+    if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < HALF) {
         Status::Lost
-    } else if measured < 1.0 - QUARTER {
+    } else if measured < TRACKED {
         Status::Degraded
     } else {
         Status::Tracking

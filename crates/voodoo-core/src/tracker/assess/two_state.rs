@@ -6,10 +6,10 @@
 
 /// What speaks for a limb less what speaks against it, as a share, is weighed by this: here the odds are even, and every time as
 /// much again makes them e times greater.
-pub(super) const EVEN: f64 = 0.075;
+const EVEN: f64 = 0.075;
 /// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
 /// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
-pub(super) const CHANGES: f64 = 0.05;
+const CHANGES: f64 = 0.05;
 /// A limb whose far end moved by so much between two frames, metres, is wrong before it is seen there, and with the square of
 /// a shorter way the likelier: what was predicted is off by a share of it.
 const FAR: f64 = 0.33;
