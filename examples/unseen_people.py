@@ -1,6 +1,6 @@
 """The first pose, what follows from it, and the sizes: recordings with exact truth, tracked by depth alone with `--init auto`.
 
-    python -m training.unseen /tmp/unseen && python examples/unseen_people.py /tmp/unseen/report
+    python -m training.unseen OUT && python examples/unseen_people.py OUT/report
     python examples/unseen_people.py D/rendered/dev_*
 
 A row a recording:
