@@ -21,6 +21,8 @@ pub(super) struct Hidden {
     seen: usize,
     /// When it was hidden the last time, seconds, and where it stood before or was tracked since, world frame.
     last: Option<(f64, Vec3)>,
+    /// Where it is thought to be now: hidden, it may go on.
+    now: Vec3,
 }
 
 impl Hidden {
@@ -39,6 +41,7 @@ impl Hidden {
             root = root.or(Some(joint));
         }
         let Some(root) = root else { return };
+        self.now = root;
         if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
             self.last = (self.seen >= SEEN_FRAMES).then_some((frame.stamp, place));
@@ -49,12 +52,12 @@ impl Hidden {
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
 
-    /// Whether what is seen at a place of the world stands before the hidden body.
+    /// Whether what is seen at a place of the world stands before the hidden body, or before where that went.
     pub(super) fn by(&self, frame: &Frame, place: Vec3) -> bool {
         let Some((_, own)) = self.last else { return false };
         frame.images.iter().any(|image| {
-            let sensor_from_world = image.world_from_sensor.inverse();
-            (sensor_from_world * place).z < (sensor_from_world * own).z - IN_FRONT
+            let depth = |place: Vec3| (image.world_from_sensor.inverse() * place).z;
+            depth(place) < depth(own).max(depth(self.now)) - IN_FRONT
         })
     }
 }
@@ -92,6 +95,15 @@ mod tests {
             );
         }
         assert_eq!(after(&open, 0.3 + WAITS, true), [false; 3], "long ago");
+        // Where it goes on to while it is hidden counts as well.
+        let beyond = moved(&poses, 0.3 * Vec3::Z);
+        with_frame(&covered, 2.6, |frame| {
+            let mut hidden = Hidden { seen: SEEN_FRAMES, ..Hidden::default() };
+            for poses in [&poses, &beyond] {
+                hidden.observe(frame, poses.iter().map(|pose| pose.translation), true, true);
+                assert_eq!(hidden.by(frame, root - 0.2 * Vec3::Z), *poses == beyond);
+            }
+        });
         // Its own depth hides no body.
         let near = before_wall(&model.body, &moved(&poses, -0.15 * Vec3::Z));
         assert_eq!(after(&near, 3.0, true), [false; 3]);

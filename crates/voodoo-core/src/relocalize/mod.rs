@@ -138,6 +138,8 @@ impl Relocalizer {
         let often = lost || self.watch.open();
         if self.doubt.due(frame.stamp, doubtful, often) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+            // What stands before a hidden body is somebody else.
+            self.people.leave_out(|place| self.watch.hidden.by(frame, place));
         } else {
             self.people.forget();
         }
@@ -147,7 +149,7 @@ impl Relocalizer {
     pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
         if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
-            self.people.leave_out_beyond(root, SAME_PERSON);
+            self.people.leave_out(|place| place.distance(root) > SAME_PERSON);
         } else {
             self.people.forget();
         }
@@ -156,12 +158,6 @@ impl Relocalizer {
     /// What a detector saw in this frame counts for nothing.
     pub fn forget(&mut self) {
         self.people.forget();
-    }
-
-    /// Whether what a detector saw stands before the body, which is hidden.
-    pub fn hides(&self, frame: &Frame) -> bool {
-        let place = self.people.seen().and_then(|seen| seen.joint("humanoid_root"));
-        place.is_some_and(|root| self.watch.hidden.by(frame, root.position))
     }
 
     /// What a detector saw in this frame, if it looked.

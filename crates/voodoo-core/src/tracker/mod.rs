@@ -258,7 +258,7 @@ impl Tracker {
             let joints = self.motion.world_from_limb().map(|limb| limb.translation);
             self.relocalizer.look_out(frame, joints, self.assessor.status() == Status::Tracking, lost);
         }
-        if known && self.relocalizer.detection().is_some() && !self.relocalizer.hides(frame) {
+        if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             let young = self.relocalizer.young(frame.stamp);
             if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, young, among)
