@@ -20,6 +20,7 @@ use crate::detect::{Detection, Wanted};
 use crate::fit::{Context, Fit};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
+use crate::observation::depth_view::DepthViews;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::segments::{Segment, Segments};
@@ -171,8 +172,8 @@ impl Relocalizer {
     }
 
     /// Notes what a frame shows where the body's joints are, the root's first, world frame: what hides the body is somebody else.
-    pub fn look_out(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
-        self.watch.hidden.observe(frame, joints, tracked, !lost);
+    pub fn look_out(&mut self, views: DepthViews, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
+        self.watch.hidden.observe(views, joints, tracked, !lost);
     }
 
     /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; of a `young` track
