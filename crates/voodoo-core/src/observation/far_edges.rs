@@ -6,16 +6,16 @@ use crate::math::widest;
 
 /// Distances from a pixel to its neighbours, and to those a knight's move away, shares of 2^16; by chamfers of 1, 1.4 and 2.1969
 /// (Borgefors, "Distance transformations in digital images", 1986), as OpenCV has them.
-const STEPS: [i32; 3] = [65_536, 91_750, 143_976];
+const CHAMFERS: [i32; 3] = [65_536, 91_750, 143_976];
 /// No measured pixel is so far.
-const FARTHEST: i32 = i32::MAX >> 2;
+const NOTHING: i32 = i32::MAX >> 2;
 /// Columns and rows around a picture that neighbours of its pixels may be in.
-const MARGIN: usize = 2;
+const BORDER: usize = 2;
 /// Neighbours of a pixel in rows before it, in the order that decides between equals: rows back, columns on, and which step.
-const BEFORE: [(usize, usize, usize); 7] =
+const NEIGHBOURS_BEFORE: [(usize, usize, usize); 7] =
     [(2, 1, 2), (2, 3, 2), (1, 0, 2), (1, 1, 1), (1, 2, 0), (1, 3, 1), (1, 4, 2)];
 
-/// Rows of distances to the nearest measured pixel, and of its depth, with a margin of [`MARGIN`] pixels on all sides.
+/// Rows of distances to the nearest measured pixel, and of its depth, with a margin of [`BORDER`] pixels on all sides.
 struct Nearest {
     stride: usize,
     away: Vec<i32>,
@@ -32,9 +32,9 @@ pub fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -> Vec<b
         return edges;
     }
     let rows = depth.len() / width;
-    let stride = width + 2 * MARGIN;
-    let cells = (rows + 2 * MARGIN) * stride;
-    let mut filled = Nearest { stride, away: vec![FARTHEST; cells], depth: vec![0.0; cells] };
+    let stride = width + 2 * BORDER;
+    let cells = (rows + 2 * BORDER) * stride;
+    let mut filled = Nearest { stride, away: vec![NOTHING; cells], depth: vec![0.0; cells] };
     // What matters to these pixels, and their neighbours, is on the way from the nearest measured one: no farther than seven fifths
     // of the rows or columns between, by the chamfers.
     let far = (7 * (reach + 1)).div_ceil(5);
@@ -88,24 +88,24 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// What `N` pixels have from neighbours in these rows, which start at places and are a step away.
+    /// What `COUNT` pixels have from neighbours in these rows, which start at places and are a step away.
     #[inline(always)]
-    fn nearer<const N: usize>(&self, starts: &[(usize, i32); 7], at: usize, away: &mut [i32], depth: &mut [f32]) {
-        let (mut least, mut found) = ([FARTHEST; N], [0.0; N]);
-        least.copy_from_slice(&away[at..at + N]);
-        found.copy_from_slice(&depth[at..at + N]);
+    fn nearer<const COUNT: usize>(&self, starts: &[(usize, i32); 7], at: usize, away: &mut [i32], depth: &mut [f32]) {
+        let (mut least, mut found) = ([NOTHING; COUNT], [0.0; COUNT]);
+        least.copy_from_slice(&away[at..at + COUNT]);
+        found.copy_from_slice(&depth[at..at + COUNT]);
         for (start, step) in starts {
             let from = start + self.first + at;
-            let (others, depths) = (&self.away[from..from + N], &self.depth[from..from + N]);
-            for lane in 0..N {
+            let (others, depths) = (&self.away[from..from + COUNT], &self.depth[from..from + COUNT]);
+            for lane in 0..COUNT {
                 let through = others[lane] + step;
                 let nearer = through < least[lane];
                 least[lane] = if nearer { through } else { least[lane] };
                 found[lane] = if nearer { depths[lane] } else { found[lane] };
             }
         }
-        away[at..at + N].copy_from_slice(&least);
-        depth[at..at + N].copy_from_slice(&found);
+        away[at..at + COUNT].copy_from_slice(&least);
+        depth[at..at + COUNT].copy_from_slice(&found);
     }
 }
 
@@ -114,7 +114,7 @@ impl Nearest {
     #[inline(always)]
     fn pass_on<const BACK: bool>(&mut self, row: usize, span: &Range<usize>) {
         let stride = self.stride;
-        let row = row + MARGIN;
+        let row = row + BORDER;
         let split = if BACK { (row + 1) * stride } else { row * stride };
         let (above, below) = self.away.split_at_mut(split);
         let (depths_above, depths_below) = self.depth.split_at_mut(split);
@@ -123,12 +123,12 @@ impl Nearest {
         } else {
             (&mut below[..stride], &mut depths_below[..stride], &*above, &*depths_above)
         };
-        let (away, depth) = (&mut away[MARGIN..][span.clone()], &mut depth[MARGIN..][span.clone()]);
+        let (away, depth) = (&mut away[BORDER..][span.clone()], &mut depth[BORDER..][span.clone()]);
         // Blocks of neighbours stay in registers; the last one begins among those that are done, which changes nothing.
         let rows = Rows { away: others, depth: other_depths, first: span.start };
-        let starts = BEFORE.map(|(back, on, step)| {
-            let start = if BACK { (back - 1) * stride + 2 * MARGIN - on } else { (row - back) * stride + on };
-            (start, STEPS[step])
+        let starts = NEIGHBOURS_BEFORE.map(|(back, on, step)| {
+            let start = if BACK { (back - 1) * stride + 2 * BORDER - on } else { (row - back) * stride + on };
+            (start, CHAMFERS[step])
         });
         match away.len().checked_sub(BLOCK) {
             Some(last) => {
@@ -143,7 +143,7 @@ impl Nearest {
     /// Measured pixels are their own.
     #[inline(always)]
     fn measure(&mut self, row: usize, span: &Range<usize>, measured: &[f32]) {
-        let start = (row + MARGIN) * self.stride + MARGIN;
+        let start = (row + BORDER) * self.stride + BORDER;
         let (away, depth) = (&mut self.away[start..][span.clone()], &mut self.depth[start..][span.clone()]);
         for ((away, depth), measured) in away.iter_mut().zip(depth.iter_mut()).zip(measured) {
             let known = measured.is_finite();
@@ -162,7 +162,7 @@ impl Nearest {
         far: usize,
         copy: &mut (Vec<i32>, Vec<f32>),
     ) {
-        let start = (row + MARGIN) * self.stride + MARGIN;
+        let start = (row + BORDER) * self.stride + BORDER;
         let (away, depth) = (&mut self.away[start..][span.clone()], &mut self.depth[start..][span.clone()]);
         let (mut done, mut shift) = (0, 1);
         while done < far && shift < span.len() {
@@ -172,7 +172,7 @@ impl Nearest {
             others.copy_from_slice(&away[from..from + rest]);
             depths.copy_from_slice(&depth[from..from + rest]);
             let (away, depth) = (&mut away[to..to + rest], &mut depth[to..to + rest]);
-            let step = STEPS[0] * shift as i32;
+            let step = CHAMFERS[0] * shift as i32;
             for (((away, depth), other), other_depth) in away.iter_mut().zip(depth).zip(others).zip(depths) {
                 let through = *other + step;
                 let nearer = through < *away;
@@ -188,7 +188,7 @@ impl Nearest {
     fn edges(&self, rows: usize, width: usize, apart: f32, edges: &mut [bool], spans: &[Range<usize>]) {
         let lesser = |a: f32, b: f32| if a < b { a } else { b };
         let line = |row: usize, span: &Range<usize>| {
-            &self.depth[(row.min(rows - 1) + MARGIN) * self.stride + MARGIN..][span.clone()]
+            &self.depth[(row.min(rows - 1) + BORDER) * self.stride + BORDER..][span.clone()]
         };
         let mut least = vec![0.0; width];
         for ((row, edges), span) in edges.chunks_exact_mut(width).enumerate().zip(spans) {

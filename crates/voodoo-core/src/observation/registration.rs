@@ -184,7 +184,7 @@ impl ProjectedPoints {
 }
 
 /// Surfaces that differ by more than this in depth, metres, do not touch.
-const EDGE: f32 = 0.1;
+const SURFACES_APART: f32 = 0.1;
 
 impl ProjectedPoints {
     /// Where something was seen within `reach` pixels, or a camera does not look (`beyond`, 1 there), and of the marked points the
@@ -211,7 +211,7 @@ impl ProjectedPoints {
         let mut seen = grow(&self.seen);
         let mut before = (!self.marked.is_empty()).then(|| grow(&self.marked));
         let count = self.columns.len();
-        let edges = far_edges(&self.nearest, count, EDGE, reach);
+        let edges = far_edges(&self.nearest, count, SURFACES_APART, reach);
         let mut mask = beyond.to_vec();
         mask.iter_mut().zip(&seen).for_each(|(pixel, seen)| *pixel |= *seen != 0);
         for (row, edges) in self.rows.clone().zip(edges.chunks_exact(count.max(1))) {
