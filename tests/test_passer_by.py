@@ -79,3 +79,11 @@ def test_only_exact_truth_can_be_passed_by():
     without = open_recording(sample_path(), bare=True)
     with pytest.raises(RecordingError, match="expected exact truth"):
         WithPasserBy(without)
+
+
+def test_whoever_is_hidden_in_a_cartwheel_is_not_taken_for_the_one_in_front(voodoo_data):
+    """Everything that could lead there did once: the search, the detector's place, and hypotheses of limbs where it saw them."""
+    example = load_example("passer_by")
+    passed = WithPasserBy(open_recording(voodoo_data / "rendered" / "dev_06_cartwheel"), speed=0.6)
+    told = example.passed(passed, example.alone(passed))
+    assert told.frames > 80 and told.wrong == 0

@@ -68,9 +68,18 @@ impl DepthView<'_> {
     /// known by the pixel, not the pixel by the ray.
     #[inline(always)]
     pub fn at(&self, point: Vec3) -> Pixel {
+        if self.image.rays.is_some() {
+            return Pixel::Unknown;
+        }
+        self.about(point)
+    }
+
+    /// The same; a lens's distortion is left out.
+    #[inline(always)]
+    pub fn about(&self, point: Vec3) -> Pixel {
         let image = self.image;
         let [fx, fy, cx, cy] = image.intrinsics;
-        if point.z < NEAREST_SEEN || image.rays.is_some() {
+        if point.z < NEAREST_SEEN {
             return Pixel::Unknown;
         }
         let near = 1.0 / point.z;

@@ -1,6 +1,7 @@
 //! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
 
 use crate::math::Vec3;
+use crate::observation::depth_view::{DepthViews, Pixel};
 use crate::observation::frame::Frame;
 
 /// What is measured so much nearer than a joint hides it, metres: more than half of a body is thick.
@@ -21,6 +22,8 @@ pub(super) struct Hidden {
     seen: usize,
     /// When it was hidden the last time, seconds, and where it stood before or was tracked since, world frame.
     last: Option<(f64, Vec3)>,
+    /// Where it is thought to be now: hidden, it may go on.
+    now: Vec3,
 }
 
 impl Hidden {
@@ -30,31 +33,36 @@ impl Hidden {
     }
 
     /// Notes what a frame shows where a body's joints are, the root's first, world frame; whether it is `tracked`, or at least seen.
-    pub(super) fn observe(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, seen: bool) {
+    /// Furniture hides it, too, but nobody would take that for the body.
+    pub(super) fn observe(&mut self, views: DepthViews, joints: impl Iterator<Item = Vec3>, tracked: bool, seen: bool) {
         let (mut hidden, mut all, mut root) = (0, 0, None);
         for joint in joints {
-            let mut measured = frame.images.iter().filter_map(|image| image.measured(joint));
-            hidden += i32::from(measured.any(|[z, own]| z > 0.0 && z < own - COVERS));
+            hidden += i32::from(views.iter().any(|view| {
+                let place = view.working_from_camera.inverse_transform_point(joint - views.origin);
+                matches!(view.about(place), Pixel::Foreground(z) if z < place.z - COVERS)
+            }));
             all += 1;
             root = root.or(Some(joint));
         }
+        let stamp = views.frame.stamp;
         let Some(root) = root else { return };
+        self.now = root;
         if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
-            self.last = (self.seen >= SEEN_FRAMES).then_some((frame.stamp, place));
+            self.last = (self.seen >= SEEN_FRAMES).then_some((stamp, place));
             return;
         }
         self.seen += usize::from(seen);
-        let last = self.last.filter(|(last, _)| frame.stamp - last < WAITS);
+        let last = self.last.filter(|(last, _)| stamp - last < WAITS);
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
 
-    /// Whether what is seen at a place of the world stands before the hidden body.
+    /// Whether what is seen at a place of the world stands before the hidden body, or before where that went.
     pub(super) fn by(&self, frame: &Frame, place: Vec3) -> bool {
         let Some((_, own)) = self.last else { return false };
         frame.images.iter().any(|image| {
-            let sensor_from_world = image.world_from_sensor.inverse();
-            (sensor_from_world * place).z < (sensor_from_world * own).z - IN_FRONT
+            let depth = |place: Vec3| (image.world_from_sensor.inverse() * place).z;
+            depth(place) < depth(own).max(depth(self.now)) - IN_FRONT
         })
     }
 }
@@ -62,7 +70,12 @@ impl Hidden {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::observation::background::Backgrounds;
     use crate::testing::{before_wall, moved, put_board, standing, with_frame};
+
+    fn views<'a>(frame: &'a Frame<'a>, backgrounds: &'a Backgrounds) -> DepthViews<'a> {
+        DepthViews { frame, backgrounds, segmented: &[false], origin: Vec3::ZERO }
+    }
 
     #[test]
     fn what_stands_before_a_body_that_was_tracked_hides_it_and_for_a_while_after_that() {
@@ -72,10 +85,11 @@ mod tests {
         let mut covered = open.clone();
         put_board(&mut covered, root - 0.8 * Vec3::Z, [0.3, 0.9]);
         let mut hidden = Hidden::default();
+        let (nothing, mut scene) = (Backgrounds::default(), Backgrounds::default());
         // At which places somebody hides the body after a frame: beside it, behind it, before it.
         let mut after = |pixels: &[u16], stamp: f64, tracked: bool| {
             with_frame(pixels, stamp, |frame| {
-                hidden.observe(frame, poses.iter().map(|pose| pose.translation), tracked, tracked);
+                hidden.observe(views(frame, &nothing), poses.iter().map(|pose| pose.translation), tracked, tracked);
                 [0.6 * Vec3::X, 0.6 * Vec3::Z, -0.6 * Vec3::Z].map(|off| hidden.by(frame, root + off))
             })
         };
@@ -92,6 +106,18 @@ mod tests {
             );
         }
         assert_eq!(after(&open, 0.3 + WAITS, true), [false; 3], "long ago");
+        // Where it goes on to while it is hidden counts as well, and furniture does not.
+        let beyond = moved(&poses, 0.3 * Vec3::Z);
+        with_frame(&covered, 2.6, |frame| {
+            scene.start(frame, |_, _| {});
+            for (backgrounds, poses, by) in
+                [(&nothing, &poses, false), (&nothing, &beyond, true), (&scene, &beyond, false)]
+            {
+                let mut hidden = Hidden { seen: SEEN_FRAMES, ..Hidden::default() };
+                hidden.observe(views(frame, backgrounds), poses.iter().map(|pose| pose.translation), true, true);
+                assert_eq!(hidden.by(frame, root - 0.2 * Vec3::Z), by);
+            }
+        });
         // Its own depth hides no body.
         let near = before_wall(&model.body, &moved(&poses, -0.15 * Vec3::Z));
         assert_eq!(after(&near, 3.0, true), [false; 3]);

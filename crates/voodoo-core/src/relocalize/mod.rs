@@ -20,6 +20,7 @@ use crate::detect::{Detection, Wanted};
 use crate::fit::{Context, Fit};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
+use crate::observation::depth_view::DepthViews;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::segments::{Segment, Segments};
@@ -138,6 +139,8 @@ impl Relocalizer {
         let often = lost || self.watch.open();
         if self.doubt.due(frame.stamp, doubtful, often) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+            // What stands before a hidden body is somebody else.
+            self.people.leave_out(|place| self.watch.hidden.by(frame, place));
         } else {
             self.people.forget();
         }
@@ -147,7 +150,7 @@ impl Relocalizer {
     pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
         if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
-            self.people.leave_out_beyond(root, SAME_PERSON);
+            self.people.leave_out(|place| place.distance(root) > SAME_PERSON);
         } else {
             self.people.forget();
         }
@@ -156,12 +159,6 @@ impl Relocalizer {
     /// What a detector saw in this frame counts for nothing.
     pub fn forget(&mut self) {
         self.people.forget();
-    }
-
-    /// Whether what a detector saw stands before the body, which is hidden.
-    pub fn hides(&self, frame: &Frame) -> bool {
-        let place = self.people.seen().and_then(|seen| seen.joint("humanoid_root"));
-        place.is_some_and(|root| self.watch.hidden.by(frame, root.position))
     }
 
     /// What a detector saw in this frame, if it looked.
@@ -175,8 +172,8 @@ impl Relocalizer {
     }
 
     /// Notes what a frame shows where the body's joints are, the root's first, world frame: what hides the body is somebody else.
-    pub fn look_out(&mut self, frame: &Frame, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
-        self.watch.hidden.observe(frame, joints, tracked, !lost);
+    pub fn look_out(&mut self, views: DepthViews, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
+        self.watch.hidden.observe(views, joints, tracked, !lost);
     }
 
     /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; of a `young` track

@@ -69,12 +69,10 @@ impl People {
         (self.seen, self.verdict) = (None, None);
     }
 
-    /// Forgets who was seen farther than this from a place, metres: somebody else.
-    pub(super) fn leave_out_beyond(&mut self, place: Vec3, distance: f64) {
-        let near = |seen: &Detection| {
-            seen.joint("humanoid_root").is_some_and(|root| root.position.distance(place) <= distance)
-        };
-        self.seen = self.seen.take().filter(near);
+    /// Forgets who was seen where it is not the person: the place of its root, world frame.
+    pub(super) fn leave_out(&mut self, not_there: impl Fn(Vec3) -> bool) {
+        let there = |seen: &Detection| seen.joint("humanoid_root").is_some_and(|root| !not_there(root.position));
+        self.seen = self.seen.take().filter(there);
     }
 
     /// Looks at all depth images of a frame, or at its share of them; keeps and returns the surest person.

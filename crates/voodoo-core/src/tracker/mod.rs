@@ -256,9 +256,10 @@ impl Tracker {
         let lost = self.assessor.status() == Status::Lost;
         if !among {
             let joints = self.motion.world_from_limb().map(|limb| limb.translation);
-            self.relocalizer.look_out(frame, joints, self.assessor.status() == Status::Tracking, lost);
+            let views = self.observer.seen(frame, self.motion.origin).views;
+            self.relocalizer.look_out(views, joints, self.assessor.status() == Status::Tracking, lost);
         }
-        if known && self.relocalizer.detection().is_some() && !self.relocalizer.hides(frame) {
+        if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             let young = self.relocalizer.young(frame.stamp);
             if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, young, among)
