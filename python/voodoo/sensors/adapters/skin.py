@@ -10,14 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
-from voodoo.measurements import ColorImage, DepthImage
+from voodoo.measurements import ColorImage
 from voodoo.people import Followed
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
 from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.skin.tracker import SkinTracker
-from voodoo.tracker import Tracker
 
 SKIN = (80, 255, 255)
 """Colour in overlays, BGR."""
@@ -42,13 +41,9 @@ class SkinAdapter(Adapter[ColorImage]):
         skin = context.memory.get(self.kind, item.sensor, lambda: SkinTracker(context.settings.skin))
         # The picture is older or newer than the frame: the ray is moved along with its site.
         then = context.predictor.predict(item.stamp)
+        view = _body_view(item, then, context)
+        sites = skin.settings.sites if view is not None else ()
         tracker, status = context.tracker, context.tracker.estimate.limb_status
-        depth = next(iter(context.depth_images), None)
-        sites = skin.settings.sites if depth is not None else ()
-        lost = _hands(status, sites, "forearm", measured=False)
-        if depth is not None and not lost and _keeps_arms(tracker) and skin.enough(item.stamp, then):
-            return
-        view = None if depth is None else _body_view(item, depth, then, context)
         rays = skin.observe(
             item.image,
             item.camera,
@@ -58,7 +53,7 @@ class SkinAdapter(Adapter[ColorImage]):
             body=view,
             surface=lambda places: dict(zip(status, tracker.limb_distances(places), strict=True)),
             strangers=partial(_distance, context.others) if context.others else None,
-            arm_lost=lost,
+            arm_lost=_hands(status, sites, "forearm", measured=False),
             upper_arm_visible=_hands(status, sites, "upperarm", measured=True),
             head_visible=_heads(status, sites),
             source=item.sensor,
@@ -68,7 +63,7 @@ class SkinAdapter(Adapter[ColorImage]):
     def learn(self, item: ColorImage, estimate: Estimate, memory: Memory, *, vouched: bool) -> None:
         """Colours and background of the picture."""
         skin = memory.all(self.kind).get(item.sensor)
-        if skin is not None and skin.looked_at(item.image):
+        if skin is not None:
             # The first frame shows the pose that was set; without it a colour camera alone would never begin.
             skin.learn(item.image, item.camera, item.root_from_sensor, estimate, vouched=vouched)
 
@@ -83,7 +78,7 @@ class SkinAdapter(Adapter[ColorImage]):
     def draw(self, item: ColorImage, canvas: Canvas, memory: Memory) -> None:
         """Outlines of all skin regions; candidates are dots, the assigned ones are named."""
         skin = memory.all(self.kind).get(item.sensor)
-        if skin is not None and skin.mask is not None and skin.looked_at(item.image):
+        if skin is not None and skin.mask is not None:
             canvas.regions(
                 item,
                 skin.mask,
@@ -98,13 +93,16 @@ class SkinAdapter(Adapter[ColorImage]):
         log.send(f"{path}/picture", rr.Image(item.image, color_model="BGR").compress(jpeg_quality=80))
         log.outlines(path, item)
         skin = memory.all(self.kind).get(item.sensor)
-        if skin is not None and skin.looked_at(item.image):
+        if skin is not None:
             places = [candidate.pixel for candidate in skin.candidates]
             log.send(f"{path}/picture/skin", rr.Points2D(places, radii=3.0, colors=(0, 255, 255)))
 
 
-def _body_view(item: ColorImage, depth: DepthImage, then: dict[str, FloatArray], context: Context) -> BodyView:
-    """What a depth camera sees of the body, in this picture."""
+def _body_view(item: ColorImage, then: dict[str, FloatArray], context: Context) -> BodyView | None:
+    """What the frame's first depth camera sees of the body, in this picture; None without one."""
+    depth = next(iter(context.depth_images), None)
+    if depth is None:
+        return None
     return body_view(
         depth.image,
         depth_camera=depth.camera,
@@ -116,11 +114,6 @@ def _body_view(item: ColorImage, depth: DepthImage, then: dict[str, FloatArray],
         step=max(depth.camera.width // 200, 1),
         scene=context.memory.get(SCENE, depth.sensor, StillDepth),
     )
-
-
-def _keeps_arms(tracker: object) -> bool:
-    """Whether depth alone seldom loses an arm: one person, and limbs that stay joined."""
-    return isinstance(tracker, Tracker) and tracker.config.solver != "limbwise"
 
 
 def _hands(status: Mapping[str, str], sites: Iterable[str], limb: str, *, measured: bool) -> set[str]:

@@ -30,9 +30,6 @@ class SkinSettings:
         static_seconds: what has skin's colour for so long away from head and hands is background [s].
         settled_frames: pictures to learn from before the cue is used.
         learn_every: of the pictures after those, every n-th is learnt from.
-        interval: while a depth camera shows both forearms, a picture that comes so soon after the last that was looked at [s] is
-            left out;
-        moved: unless a site has moved by so much since [m].
         each: with several persons, of each of them; it costs about as much for everybody as for one.
 
     Raises:
@@ -53,8 +50,6 @@ class SkinSettings:
     static_seconds: float = 1.0
     settled_frames: int = 1
     learn_every: int = 3
-    interval: float = 0.1
-    moved: float = 0.06
     each: bool = False
 
     def __post_init__(self) -> None:
@@ -62,7 +57,6 @@ class SkinSettings:
         numbers = {"gate": self.gate, "lost_gate": self.lost_gate, "static_seconds": self.static_seconds, **self.sites}
         numbers |= {f"shown_bias {site}": bias for site, bias in self.shown_bias.items()}
         numbers |= {"gate_growth": self.gate_growth, "widest_gate": self.widest_gate, "unexplained": self.unexplained}
-        numbers |= {"interval": self.interval, "moved": self.moved}
         numbers["learn_every"] = float(self.learn_every)
         for name, value in numbers.items():
             if not (math.isfinite(value) and value > 0.0):

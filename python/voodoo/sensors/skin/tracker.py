@@ -71,7 +71,6 @@ class SkinTracker:
         self._before: Mask | None = None
         self._static: npt.NDArray[np.float32] | None = None
         self._learnt = 0
-        self._expected: dict[str, FloatArray] = {}
 
     def __copy__(self) -> SkinTracker:
         """As it is, for what `observe` changes; what `learn` changes is shared."""
@@ -84,19 +83,6 @@ class SkinTracker:
     def settled(self) -> bool:
         """True when enough pictures were learnt from."""
         return self._learnt >= self.settings.settled_frames
-
-    def enough(self, stamp: float, predicted: Mapping[str, FloatArray]) -> bool:
-        """Whether a picture of that time [s] comes so soon after the last, and sites (3,) [m] have moved so little since, that a
-        depth camera alone will do for it."""
-        chosen = self.settings
-        if not (self.settled and 0.0 < stamp - self._stamp < chosen.interval):
-            return False
-        known = self._expected
-        return all(math.dist(predicted[site], known[site]) < chosen.moved for site in chosen.sites if site in known)
-
-    def looked_at(self, image: ByteImage) -> bool:
-        """Whether it is the last picture that was looked at."""
-        return self._colours is not None and self._colours[0] is image
 
     @property
     def mask(self) -> Mask | None:
@@ -150,7 +136,6 @@ class SkinTracker:
         self.candidates, self.assigned = [], {}
         stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
         self._stamp = stamp
-        self._expected = {site: predicted[site] for site in self.settings.sites if site in predicted}
         if not places or not self.settled:
             return []
         self.candidates, labels = candidates(self._skin, palm_px=palm_px)
