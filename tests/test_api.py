@@ -388,6 +388,9 @@ def test_distance_is_signed(tracker, cloud):
     assert np.abs(tracker.distance(cloud)).mean() < 0.01
     torso = tracker.estimate.world_from_limb["torso"]
     inside, outside = torso[:3, 3] + 0.2 * torso[:3, 2], torso[:3, 3] + [5.0, 0.0, 0.0]
+    around = np.random.default_rng(2).normal(np.mean(cloud, axis=0), 0.6, (2000, 3))
+    np.testing.assert_array_equal(tracker.distance(around), tracker.limb_distances(around).min(axis=0))
+    assert (tracker.distance(around) < -0.02).sum() > 20
     distances = tracker.distance(np.stack([inside, outside]))
     assert distances[0] < -0.05 and distances[1] == pytest.approx(5.0, abs=0.5)
 

@@ -65,21 +65,93 @@ def test_a_window_that_does_not_fit_is_refused(changes):
         within(noisy(), **changes)
 
 
-def test_points_fall_into_pixels_and_the_nearest_counts():
-    pixels = np.array([[2.4, 1.0], [1.6, 0.6], [5.0, 3.0], [np.nan, 1.0], [-0.6, 1.0], [7.6, 2.0], [-0.4, 2.5]])
-    points = np.column_stack([np.zeros((7, 2)), [2.0, 1.5, 3.0, 1.0, 1.0, 1.0, 4.0]])
-    marks = np.array([False, False, True, True, True, True, False])
-    seen, marked, inside, corner, nearest = _core.splat(pixels, points, marks, height=4, width=8)
-    assert inside.tolist() == [0, 1, 2, 6]
-    assert np.argwhere(seen).tolist() == [[1, 2], [2, 0], [3, 5]]
-    assert np.argwhere(marked).tolist() == [[3, 5]]
-    expected = np.full((4, 8), np.inf, np.float32)
-    expected[1, 2], expected[2, 0], expected[3, 5] = 1.5, 4.0, 3.0  # a half goes to the even pixel
-    assert corner == (1, 0)
-    np.testing.assert_array_equal(nearest, expected[1:, :6])
-    assert _core.splat(pixels, points, None, height=4, width=8)[1] is None
-    nothing = _core.splat(np.full((2, 2), np.nan), np.ones((2, 3)), None, height=4, width=8)
-    assert not nothing[0].any() and nothing[4].size == 0
+def far_side(nearest):
+    """A line on the far side of edges between surfaces, filled and eroded by OpenCV."""
+    unknown = np.isinf(nearest)
+    _, labels = cv2.distanceTransformWithLabels(
+        unknown.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    z = np.concatenate([np.zeros(1, np.float32), nearest[~unknown]]).take(labels)
+    return z > cv2.erode(z, np.ones((3, 3), np.uint8)) + 0.1
+
+
+def drawn(pixels, depths, chosen, height, width):
+    """A mask of points, and the least depth in each pixel."""
+    mask, nearest = np.zeros((height, width), np.uint8), np.full((height, width), np.inf, np.float32)
+    u, v = np.rint(pixels[chosen]).astype(int).T
+    mask[v, u] = 1
+    np.minimum.at(nearest, (v, u), depths[chosen].astype(np.float32))
+    return mask, nearest
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_what_is_shown_is_what_opencv_makes_of_it(seed):
+    chance = np.random.default_rng(seed)
+    height, width, reach = (int(number) for number in chance.integers((1, 1, 0), (60, 90, 6)))
+    count = int(chance.integers(0, height * width // 3 + 2))
+    pixels = chance.uniform(-3.0, 3.0 + np.array([width, height]), (count, 2))
+    pixels[chance.random(count) < 0.05] = np.nan
+    points = np.zeros((count, 3))
+    points[:, 2] = chance.choice([1.0, 1.05, 1.5, 2.3], count) + chance.normal(0.0, 0.02, count)
+    marks, beyond = chance.random(count) < 0.2, chance.random((height, width)) < 0.05
+    mask, before, inside = _core.shown(pixels, points, marks, beyond=beyond, reach=reach)
+    rounded = np.nan_to_num(np.rint(pixels), nan=-9.0)
+    there = ((rounded >= 0.0) & (rounded < (width, height))).all(axis=1)
+    np.testing.assert_array_equal(inside, np.flatnonzero(there))
+    seen, nearest = drawn(pixels, points[:, 2], there, height, width)
+    around = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+    grown = cv2.dilate(seen, around).view(bool)
+    edges = np.zeros_like(grown)
+    if there.any():
+        rows, columns = (slice(places.min(), places.max() + 1) for places in np.nonzero(seen))
+        edges[rows, columns] = far_side(nearest[rows, columns].copy())
+    np.testing.assert_array_equal(mask, np.where(grown, ~edges, beyond))
+    marked = cv2.dilate(drawn(pixels, points[:, 2], there & marks, height, width)[0], around).view(bool)
+    np.testing.assert_array_equal(before, marked & ~edges)
+    assert _core.shown(pixels, points, None, beyond=beyond, reach=reach)[1] is None
+
+
+def filled(mask, palm):
+    """Gaps closed between regions whose boxes are no longer than three palms, by OpenCV."""
+    x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
+    if not w:
+        return mask
+    window = (slice(y, y + h), slice(x, x + w))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask[window].view(np.uint8), connectivity=8)
+    small = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) <= 3.0 * palm
+    small[0] = False
+    result = mask.copy()
+    result[window] |= cv2.morphologyEx(small[labels].view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3))).view(bool)
+    return result
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_masks_and_regions_are_those_of_opencv(seed):
+    chance = np.random.default_rng(seed)
+    height, width = (int(number) for number in chance.integers(1, (60, 90)))
+    grain, palm = chance.uniform(0.3, 2.0), chance.uniform(1.0, 8.0)
+    mask = cv2.GaussianBlur(chance.random((height, width)), (0, 0), grain) > chance.uniform(0.4, 0.6)
+    _, expected, stats, centres = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    labels, regions = _core.mask_regions(mask)
+    np.testing.assert_array_equal(labels, expected)
+    told = [[x0, y0, x1 - x0, y1 - y0, area] for (y0, y1), (x0, x1), area, _ in regions]
+    assert (told, [middle for *_, middle in regions]) == (stats[1:].tolist(), [tuple(row) for row in centres[1:]])
+    np.testing.assert_array_equal(_core.joined_mask(mask, longest=3.0 * palm), filled(mask, palm))
+
+    # The same of a picture, with all that may rule skin out.
+    bins = np.where(mask, 5, chance.integers(0, 65536, mask.shape)).astype(np.uint16)
+    table = chance.random(32768) < chance.uniform(0.3, 0.8)
+    table[5] = True
+    body, before = chance.random((2, height, width)) < [[[0.9]], [[0.5]]]
+    always = chance.uniform(0.0, 0.6, mask.shape).astype(np.float32)
+    seen, skin = _core.skin_mask(bins, table, longest=3.0 * palm, body=body, always=always, before=before)
+    found = cv2.medianBlur(_core.bins_among(bins, table), 3).view(bool)
+    np.testing.assert_array_equal(seen, found)
+    found = found & body & ((always < 0.5) | before)
+    opened = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)).view(bool)
+    np.testing.assert_array_equal(skin, filled(opened, palm) & body)
+    with pytest.raises(MeasurementError, match="skin: expected"):
+        _core.skin_mask(bins, table, longest=1.0, body=np.ones((height, width + 1), bool))
 
 
 def test_the_nearest_surface_around_a_place():
@@ -142,12 +214,12 @@ def test_bins_are_those_of_opencv():
 
 
 def test_arrays_that_do_not_belong_together_are_refused():
-    pixels, points = np.zeros((4, 2)), np.zeros((4, 3))
+    pixels, points, beyond = np.zeros((4, 2)), np.zeros((4, 3)), np.zeros((4, 8), bool)
     with pytest.raises(MeasurementError, match="points: expected"):
-        _core.splat(pixels, points[:3], None, height=4, width=8)
+        _core.shown(pixels, points[:3], None, beyond=beyond, reach=1)
     with pytest.raises(MeasurementError, match="marks"):
-        _core.splat(pixels, points, np.zeros(3, bool), height=4, width=8)
+        _core.shown(pixels, points, np.zeros(3, bool), beyond=beyond, reach=1)
     with pytest.raises(MeasurementError, match=r"pixels: expected shape \(N, 2\), found \(4, 3\)"):
-        _core.splat(points, points, None, height=4, width=8)
+        _core.shown(points, points, None, beyond=beyond, reach=1)
     with pytest.raises(MeasurementError, match="depths: expected"):
         _core.nearest_surface(pixels, np.zeros(3), None, pixel=(0.0, 0.0), radius=1.0)

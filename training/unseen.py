@@ -46,12 +46,17 @@ TILT = 30.0
 WHOLE, CUT = (0.97, 1.01), (0.6, 0.93)
 """Shares of the joints inside the image, the mean over a recording, of people who are whole and of those who are cut."""
 TRIES = 400
+ATTEMPTS = 10
 HIDDEN = (0.1, 0.4)
 """Share of the pixels of somebody behind furniture that it hides, in any frame that is looked at."""
 MATCHED, BASELINE = 848, 0.055
 """Columns in which a stereo camera matches, and the distance of its eyes [m]."""
 GIRTHS = {"upperarm": ("shoulder", "elbow", "upper"), "forearm": ("elbow", "wrist", "fore"),
           "thigh": ("hip", "knee", "thigh"), "calf": ("knee", "ankle", "shank")}  # fmt: skip
+
+
+class NotToBeHadError(Exception):
+    """A motion cannot be seen as it should be."""
 
 
 @dataclass(frozen=True)
@@ -92,11 +97,19 @@ def main() -> None:
     plans = {half: _plan(np.random.default_rng([a.seed, which]), a.count) for which, half in enumerate(HALVES)}
     clips, still = clips_of(a.data), poses.load(a.data / "mocap", held_out=True)
     for number in range(a.count):
-        rng = np.random.default_rng([a.seed, number])
         half = HALVES[number % 2]
-        place = a.out / half / f"un_{a.seed:d}_{number:02d}"
-        words = make(place, rng, plans[half][number // 2], bodies, clips, still, height=a.height, tilt=a.tilt)
-        print(f"{half}/{place.name}: {words}", flush=True)
+        place, plan = a.out / half / f"un_{a.seed:d}_{number:02d}", plans[half][number // 2]
+        for attempt in range(ATTEMPTS):
+            rng = np.random.default_rng([a.seed, number, attempt] if attempt else [a.seed, number])
+            try:
+                words = make(place, rng, plan, bodies, clips, still, height=a.height, tilt=a.tilt)
+            except NotToBeHadError as error:
+                print(f"{half}/{place.name}: {error}; another motion is drawn", flush=True)
+            else:
+                print(f"{half}/{place.name}: {words}", flush=True)
+                break
+        else:
+            raise SystemExit(f"{place.name}: expected one of {ATTEMPTS} motions to be had as {plan}, found none")
 
 
 def _plan(rng: Rng, count: int) -> list[Plan]:
@@ -207,7 +220,7 @@ def _view(
         if wanted[0] <= share < wanted[1] and 1.0 <= far.min() and far.max() <= 4.7:
             surfaces = [(surface - middle) @ turn.T + shift for surface in motion.surfaces]
             return Motion(surfaces, joints, motion.words, motion.seat), view
-    raise SystemExit(f"{motion.words}: expected a view of it from {drawn_height} m, {plan.person}, found none")
+    raise NotToBeHadError(f"{motion.words}: expected a view of it from {drawn_height} m, {plan.person}, found none")
 
 
 def _inside(view: View, joints: Array) -> float:
@@ -227,7 +240,7 @@ def _room(rng: Rng, motion: Motion, view: View, plan: Plan) -> list[shapes.Mesh]
         shares = [_hidden(view, motion.surfaces[i], meshes) for i in (0, len(motion.surfaces) // 2, -1)]
         if max(shares) < high and low <= np.mean(shares):
             return meshes
-    raise SystemExit(f"{motion.words}: expected furniture with somebody {plan.person}, found none")
+    raise NotToBeHadError(f"{motion.words}: expected furniture with somebody {plan.person}, found none")
 
 
 def _hidden(view: View, surface: Array, room: list[shapes.Mesh]) -> float:

@@ -26,12 +26,15 @@ __all__ = [
     "bins_among",
     "color_bins",
     "config_fields",
+    "joined_mask",
+    "mask_regions",
     "nearest_surface",
     "nearest_surfaces",
     "person_candidates",
     "points_within",
     "render_depth",
-    "splat",
+    "shown",
+    "skin_mask",
     "still_scene",
 ]
 
@@ -122,35 +125,62 @@ def bin_counts(bins: npt.NDArray[np.uint16], mask: npt.NDArray[np.uint8]) -> npt
         MeasurementError: a mask of another size.
     """
 
-def splat(
+def shown(
     pixels: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
     marks: npt.NDArray[np.bool_] | None,
     *,
-    height: int,
-    width: int,
-) -> tuple[
-    npt.NDArray[np.uint8],
-    npt.NDArray[np.uint8] | None,
-    npt.NDArray[np.intp],
-    tuple[int, int],
-    npt.NDArray[np.float32],
-]:
-    """Where points are in a picture.
+    beyond: npt.NDArray[np.bool_],
+    reach: int,
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_] | None, npt.NDArray[np.intp]]:
+    """Where a depth camera saw something in a picture (H, W).
 
     Args:
-        pixels: (N, 2) where they are, NaN = nowhere.
+        pixels: (N, 2) where its points are, NaN = nowhere.
         points: (N, 3) in the camera's frame [m].
         marks: (N,) of some of them.
-        height, width: of the picture.
+        beyond: (H, W) where it does not look.
+        reach: what is within so many rows and columns of a point belongs to it.
 
     Returns:
-        (height, width) 1 where points are; the same of the marked ones; which lie in the picture; and, from the pixel (row,
-        column) on, the depth of the nearest one in each, infinite where none is.
+        (H, W) where something was seen, or is beyond, but no line of pixels on the far side of edges between surfaces; (H, W) the
+        same of the marked points alone; which points lie in the picture.
 
     Raises:
         MeasurementError: other shapes.
     """
+
+def skin_mask(
+    bins: npt.NDArray[np.uint16],
+    table: npt.NDArray[np.bool_],
+    *,
+    longest: float,
+    body: npt.NDArray[np.bool_] | None = None,
+    always: npt.NDArray[np.float32] | None = None,
+    before: npt.NDArray[np.bool_] | None = None,
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """(H, W): where a picture has skin's colour, single pixels removed; (H, W): where that may be the body's.
+
+    Args:
+        bins: (H, W), see `color_bins`.
+        table: (32768,) which of them are skin's.
+        longest: gaps of two pixels are closed between regions no longer than this [px].
+        body: (H, W) where the body may be.
+        always: (H, W) share of the time in which a pixel shows skin where none is; half or more is the scene.
+        before: (H, W) where something is before the scene.
+
+    Raises:
+        MeasurementError: sizes that do not fit together.
+    """
+
+def joined_mask(mask: npt.NDArray[np.bool_], longest: float) -> npt.NDArray[np.bool_]:
+    """A mask (H, W) with gaps of two pixels closed between regions no longer than `longest` [px]."""
+
+def mask_regions(
+    mask: npt.NDArray[np.bool_],
+) -> tuple[npt.NDArray[np.int32], list[tuple[tuple[int, int], tuple[int, int], int, tuple[float, float]]]]:
+    """What hangs together in a mask (H, W), at corners too: (H, W) the number of its region in each pixel, from 1; and rows,
+    columns (from and up to), area [px] and middle (u, v) of each region."""
 
 def still_scene(
     now: npt.NDArray[np.float32], farthest: npt.NDArray[np.float32], then: npt.NDArray[np.float32]

@@ -29,7 +29,7 @@ mod _core {
     #[pymodule_export]
     use super::body::PyBody;
     #[pymodule_export]
-    use super::chroma::{bin_counts, bins_among, color_bins};
+    use super::chroma::{bin_counts, bins_among, color_bins, joined_mask, mask_regions, skin_mask};
     #[pymodule_export]
     use super::config::config_fields;
     #[pymodule_export]
@@ -45,7 +45,7 @@ mod _core {
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
-    use super::registration::{nearest_surface, nearest_surfaces, points_within, splat, still_scene};
+    use super::registration::{nearest_surface, nearest_surfaces, points_within, shown, still_scene};
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]

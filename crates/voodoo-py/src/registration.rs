@@ -4,6 +4,7 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use voodoo_core::error::TrackError;
 use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
 use voodoo_core::observation::still::still;
 
@@ -48,38 +49,33 @@ pub fn points_within<'py>(
     Ok((points, PyArray1::from_vec(py, pixels)))
 }
 
-type Image<'py, T> = Bound<'py, PyArray2<T>>;
-type Splatted<'py> =
-    (Image<'py, u8>, Option<Image<'py, u8>>, Bound<'py, PyArray1<isize>>, (usize, usize), Image<'py, f32>);
+type Marks<'py> = Bound<'py, PyArray2<bool>>;
+type Shown<'py> = (Marks<'py>, Option<Marks<'py>>, Bound<'py, PyArray1<isize>>);
 
-/// Where points are in a picture: all of them, the marked ones, which are inside, and the least depths from a corner on.
+/// Where something was seen in a picture; where something marked; and which points are inside.
 #[pyfunction]
-#[pyo3(signature = (pixels, points, marks, *, height, width))]
-pub fn splat<'py>(
+#[pyo3(signature = (pixels, points, marks, *, beyond, reach))]
+pub fn shown<'py>(
     py: Python<'py>,
     pixels: PyReadonlyArray2<'py, f64>,
     points: PyReadonlyArray2<'py, f64>,
     marks: Option<PyReadonlyArray1<'py, bool>>,
-    height: usize,
-    width: usize,
-) -> PyResult<Splatted<'py>> {
+    beyond: PyReadonlyArray2<'py, bool>,
+    reach: usize,
+) -> PyResult<Shown<'py>> {
     columns(py, "pixels", &pixels, 2)?;
     columns(py, "points", &points, 3)?;
     let (places, points) = (pixels.as_slice()?.as_chunks().0, points.as_slice()?.as_chunks().0);
     let marks = marks.as_ref().map(|marks| marks.as_slice()).transpose()?;
-    let found = py.detach(|| ProjectedPoints::new(places, points, marks, [height, width]));
-    let ProjectedPoints { seen, marked, inside, rows, columns, nearest } = found.map_err(|error| error.into_py(py))?;
-    let marked = match marks {
-        Some(_) => Some(PyArray1::from_vec(py, marked).reshape([height, width])?),
-        None => None,
-    };
-    Ok((
-        PyArray1::from_vec(py, seen).reshape([height, width])?,
-        marked,
-        PyArray1::from_vec(py, inside),
-        (rows.start, columns.start),
-        PyArray1::from_vec(py, nearest).reshape([rows.len(), columns.len()])?,
-    ))
+    let (size, beyond) = ([beyond.dims()[0], beyond.dims()[1]], beyond.as_slice()?);
+    let found = py.detach(|| {
+        let found = ProjectedPoints::new(places, points, marks, size)?;
+        let (mask, before) = found.shown(beyond, reach, size)?;
+        Ok((mask, before, found.inside))
+    });
+    let (mask, before, inside) = found.map_err(|error: TrackError| error.into_py(py))?;
+    let before = before.map(|before| PyArray1::from_vec(py, before).reshape(size)).transpose()?;
+    Ok((PyArray1::from_vec(py, mask).reshape(size)?, before, PyArray1::from_vec(py, inside)))
 }
 
 /// Depth of the nearest surface around a place in a picture and whether most of it is still; none with too few points.
@@ -120,8 +116,6 @@ pub fn nearest_surfaces<'py>(
     let image = (image, [size[0], size[1]]);
     py.detach(|| measured.nearest_surfaces(image, &places, radius)).map_err(|error| error.into_py(py))
 }
-
-type Marks<'py> = Bound<'py, PyArray2<bool>>;
 
 /// Where a depth image shows what may be the scene, and where something before what was seen there once.
 #[pyfunction]

@@ -22,13 +22,6 @@ _CORNERS = np.array([[bool(corner >> axis & 1) for axis in range(3)] for corner 
 """Which of a box's corners are at its high end."""
 
 
-_AROUND = np.ones((3, 3), np.uint8)
-
-
-_EDGE_M = 0.10
-"""Surfaces that differ by more than this in depth do not touch."""
-
-
 _STANDS = 1e-3
 """A pose whose entries change by less is that of a camera that stands."""
 
@@ -136,6 +129,7 @@ def body_view(
     low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
     z = depth[::step, ::step].astype(np.float32) * np.float32(metres_per_unit)
     rows, columns = _window(depth_camera, world_from_depth, low, high)
+    poses = [np.asarray(pose, dtype=np.float64).tobytes() for pose in (world_from_color, world_from_depth)]
     points, index = _core.points_within(
         z,
         depth_camera.rays(),
@@ -145,50 +139,28 @@ def body_view(
         low=low,
         high=high,
         world_from_sensor=world_from_depth,
-        other_from_sensor=np.linalg.inv(world_from_color) @ world_from_depth,
+        other_from_sensor=_between(*poses),
     )
     standing = None if scene is None else scene.see(z, world_from_depth)
     still, moved = (None, None) if standing is None else (item.ravel()[index] for item in standing)
     pixels = color_camera.project(points)
-    mask, front, inside, corner, nearest = _core.splat(
-        pixels, points, moved, height=color_camera.height, width=color_camera.width
-    )
-    # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
-    size = 2 * int(np.ceil(1.5 * step * color_camera.fx / depth_camera.fx)) + 1
-    around = np.ones((size, size), np.uint8)
-    grown = cv2.dilate(mask, around).view(np.bool_)
-    before = None if front is None else cv2.dilate(front, around).view(np.bool_)
     # A few centimetres of the body's distance move what is beyond by less than a pixel.
-    z = round(median(in_sensor(world_from_depth, places)[:, 2].tolist()), 1)
-    poses = [np.asarray(pose, dtype=np.float64).tobytes() for pose in (world_from_depth, world_from_color)]
-    grown |= _beyond(depth_camera, poses[0], color_camera, poses[1], max(z, 0.1))
-    # A hand's region ends where a table behind it begins.
-    edges = _behind_edges(nearest)
-    window = tuple(slice(first, first + count) for first, count in zip(corner, edges.shape, strict=True))
-    for image in (grown, before):
-        if image is not None:
-            image[window] &= ~edges
+    away = round(median(in_sensor(world_from_depth, places)[:, 2].tolist()), 1)
+    beyond = _beyond(depth_camera, poses[1], color_camera, poses[0], max(away, 0.1))
+    # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
+    reach = math.ceil(1.5 * step * color_camera.fx / depth_camera.fx)
+    mask, before, inside = _core.shown(pixels, points, moved, beyond=beyond, reach=reach)
     depths = points[:, 2].copy()
     if len(inside) < len(points):
         pixels, depths, still = pixels[inside], depths[inside], None if still is None else still[inside]
-    return BodyView(grown, pixels, depths, still, before)
+    return BodyView(mask, pixels, depths, still, before)
 
 
-def _behind_edges(nearest: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
-    """(H, W): True in a line on the far side of the edges between surfaces.
-
-    Args:
-        nearest: (H, W) depths [m], infinite where nothing was measured; between the others the nearest one counts.
-    """
-    if not nearest.size:
-        return np.zeros(nearest.shape, dtype=np.bool_)
-    unknown = np.isinf(nearest)
-    _, labels = cv2.distanceTransformWithLabels(
-        unknown.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    # Known pixels are numbered row by row, from 1.
-    z = np.concatenate([np.zeros(1, np.float32), nearest[~unknown]]).take(np.asarray(labels, dtype=np.int32))
-    return np.asarray(z > cv2.erode(z, _AROUND) + _EDGE_M)
+@lru_cache(maxsize=16)
+def _between(color_pose: bytes, depth_pose: bytes) -> FloatArray:
+    """(4, 4) color_from_depth."""
+    world_from_color, world_from_depth = (np.frombuffer(pose).reshape(4, 4) for pose in (color_pose, depth_pose))
+    return np.asarray(np.linalg.inv(world_from_color) @ world_from_depth)
 
 
 def _window(camera: Camera, world_from_depth: FloatArray, low: FloatArray, high: FloatArray) -> tuple[slice, slice]:

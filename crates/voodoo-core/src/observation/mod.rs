@@ -3,7 +3,8 @@
 //! `frame` is what goes in (K06 IV-A). Step 1 of the method, the choice of points that may lie on the body (K06 IV-B.1), is
 //! `candidates`, with `pixels` and `background`; `clusters` sorts them for the next step. `depth_view` asks the images about places in
 //! space, `segments` looks for a lost body, and `registration` brings depths into the picture of
-//! another camera, `chroma` tells colours, and `still` what stands.
+//! another camera, with `far_edges` between surfaces, `chroma` tells colours, `masks` and `mask_regions` where skin's are, and
+//! `still` what stands.
 
 pub mod background;
 mod background_moved;
@@ -12,7 +13,10 @@ pub mod candidates;
 pub mod chroma;
 pub(crate) mod clusters;
 pub mod depth_view;
+pub mod far_edges;
 pub mod frame;
+pub mod mask_regions;
+pub mod masks;
 pub mod observer;
 pub mod picture;
 pub(crate) mod pixels;

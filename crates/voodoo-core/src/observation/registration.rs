@@ -3,6 +3,9 @@
 use std::ops::Range;
 
 use crate::error::TrackError;
+use crate::math::widest;
+use crate::observation::far_edges::far_edges;
+use crate::observation::masks::grown;
 
 /// Part of a depth image (metres, along the optical axis) in which the body is expected.
 #[derive(Clone, Debug)]
@@ -65,31 +68,53 @@ impl Window<'_> {
         self.check()?;
         let to_world = world_from_sensor.map(|row| row.map(|entry| entry as f32));
         let (mut points, mut pixels) = (Vec::new(), Vec::new());
+        let mut inside = vec![false; self.columns.len()];
         for row in self.rows.clone() {
-            for column in self.columns.clone() {
-                let index = row * self.size[1] + column;
-                let z = self.depth[index];
-                if !(z.is_finite() && z > 0.0) {
-                    continue;
-                }
-                let ray = self.rays[(row * self.camera[1] + column) * self.step];
-                let (x, y) = (ray[0] * z, ray[1] * z);
-                let inside = (0..3).all(|axis| {
-                    let turn = &to_world[axis];
-                    let place = f64::from(turn[0] * x + turn[1] * y + turn[2] * z + turn[3]);
-                    place > low[axis] && place < high[axis]
-                });
-                if inside {
-                    let [x, y, z] = [x, y, z].map(f64::from);
-                    points.push([0, 1, 2].map(|axis| {
-                        let turn = &other_from_sensor[axis];
-                        turn[0] * x + turn[1] * y + turn[2] * z + turn[3]
-                    }));
-                    pixels.push(index as isize);
-                }
+            let first = row * self.size[1];
+            let depths = &self.depth[first..][self.columns.clone()];
+            let rays = &self.rays[(row * self.camera[1] + self.columns.start) * self.step..];
+            widest(
+                #[inline(always)]
+                || {
+                    // One column after the other fills whole registers.
+                    if self.step == 1 {
+                        gate(&mut inside, depths.iter().zip(rays), (low, high), &to_world);
+                    } else {
+                        gate(&mut inside, depths.iter().zip(rays.iter().step_by(self.step)), (low, high), &to_world);
+                    }
+                },
+            );
+            for (offset, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
+                let (z, ray) = (depths[offset], rays[offset * self.step]);
+                let [x, y, z] = [ray[0] * z, ray[1] * z, z].map(f64::from);
+                points.push([0, 1, 2].map(|axis| {
+                    let turn = &other_from_sensor[axis];
+                    turn[0] * x + turn[1] * y + turn[2] * z + turn[3]
+                }));
+                pixels.push((first + self.columns.start + offset) as isize);
             }
         }
         Ok((points, pixels))
+    }
+}
+
+/// Which depths along rays are returns from within a box (world, metres).
+#[inline(always)]
+fn gate<'a>(
+    inside: &mut [bool],
+    pixels: impl Iterator<Item = (&'a f32, &'a [f32; 2])>,
+    (low, high): ([f64; 3], [f64; 3]),
+    to_world: &[[f32; 4]; 4],
+) {
+    for (inside, (z, ray)) in inside.iter_mut().zip(pixels) {
+        let (x, y) = (ray[0] * z, ray[1] * z);
+        let mut passes = z.is_finite() & (*z > 0.0);
+        for axis in 0..3 {
+            let turn = &to_world[axis];
+            let place = f64::from(turn[0] * x + turn[1] * y + turn[2] * z + turn[3]);
+            passes &= (place > low[axis]) & (place < high[axis]);
+        }
+        *inside = passes;
     }
 }
 
@@ -155,6 +180,51 @@ impl ProjectedPoints {
             *least = least.min(points[index][2] as f32);
         }
         Ok(Self { seen, marked, inside, rows, columns, nearest })
+    }
+}
+
+/// Surfaces that differ by more than this in depth, metres, do not touch.
+const SURFACES_APART: f32 = 0.1;
+
+impl ProjectedPoints {
+    /// Where something was seen within `reach` pixels, or a camera does not look (`beyond`, 1 there), and of the marked points the
+    /// first; without the lines behind edges between surfaces, in a picture of `[height, width]`.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when `beyond` is no picture of that size.
+    pub fn shown(
+        &self,
+        beyond: &[bool],
+        reach: usize,
+        [height, width]: [usize; 2],
+    ) -> Result<(Vec<bool>, Option<Vec<bool>>), TrackError> {
+        if beyond.len() != self.seen.len() || height.checked_mul(width) != Some(beyond.len()) {
+            let found = format!("{} for {}", beyond.len(), self.seen.len());
+            return Err(TrackError::measurement("beyond", "as many pixels as the picture has", found));
+        }
+        let around = self.rows.start.saturating_sub(reach) * width..(self.rows.end + reach).min(height) * width;
+        let grow = |mask: &[u8]| {
+            let mut whole = vec![0; mask.len()];
+            whole[around.clone()].copy_from_slice(&grown(&mask[around.clone()], width, reach));
+            whole
+        };
+        let mut seen = grow(&self.seen);
+        let mut before = (!self.marked.is_empty()).then(|| grow(&self.marked));
+        let count = self.columns.len();
+        let edges = far_edges(&self.nearest, count, SURFACES_APART, reach);
+        let mut mask = beyond.to_vec();
+        mask.iter_mut().zip(&seen).for_each(|(pixel, seen)| *pixel |= *seen != 0);
+        for (row, edges) in self.rows.clone().zip(edges.chunks_exact(count.max(1))) {
+            let here = row * width + self.columns.start..row * width + self.columns.end;
+            let seen = &mut seen[here.clone()];
+            seen.iter_mut().zip(edges).for_each(|(seen, edge)| *seen &= u8::from(*edge));
+            mask[here.clone()].iter_mut().zip(&*seen).for_each(|(pixel, edge)| *pixel &= *edge == 0);
+            if let Some(before) = &mut before {
+                before[here].iter_mut().zip(&*seen).for_each(|(pixel, edge)| *pixel &= !*edge);
+            }
+        }
+        let before = before.map(|before| before.into_iter().map(|pixel| pixel != 0).collect());
+        Ok((mask, before))
     }
 }
 

@@ -10,6 +10,9 @@ use crate::observation::frame::{Frame, PointSlice};
 use crate::regions::{Posed, RegionLine, Regions};
 use crate::shape::SurfaceBatch;
 
+/// Distances in single precision are off by less: metres, and share of a distance.
+const ROUNDING: f64 = 1e-3;
+
 impl Tracker {
     /// The lines along which the last step looked for edges of colours in a camera's picture.
     pub fn region_lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
@@ -73,6 +76,46 @@ impl Tracker {
 
     /// Signed distances of world points to the surface of every limb, metres, negative inside: limb by limb, a point each.
     pub fn limb_distances(&self, points: PointSlice) -> Result<Vec<Vec<f32>>, TrackError> {
+        let queries = self.queries(points)?;
+        let mut surface = SurfaceBatch::default();
+        let limbs = self.model.body.limbs().iter().zip(&self.motion.poses);
+        Ok(limbs
+            .map(|(limb, pose)| {
+                limb.shape.closest_points(pose, &queries, &mut surface);
+                surface.signed_distance[..points.len()].to_vec()
+            })
+            .collect())
+    }
+
+    /// Signed distances of world points to the surface of the posed body, metres, negative inside.
+    pub fn distance(&self, points: PointSlice) -> Result<Vec<f32>, TrackError> {
+        let queries = self.queries(points)?;
+        let mut least = vec![f32::INFINITY; points.len()];
+        let (mut surface, mut near, mut chosen) = (SurfaceBatch::default(), Points::default(), Vec::new());
+        for (limb, pose) in self.model.body.limbs().iter().zip(&self.motion.poses) {
+            // What is farther from the limb's box than from another limb needs no closest point; in the box it may be deeper.
+            let bounds = limb.shape.aabb(pose);
+            [&mut near.x, &mut near.y, &mut near.z].into_iter().for_each(Vec::clear);
+            chosen.clear();
+            for (index, least) in least.iter().enumerate() {
+                let point = [queries.x[index], queries.y[index], queries.z[index]];
+                let place = Vec3::from_array(point.map(f64::from));
+                let away = (bounds.mins - place).max(place - bounds.maxs).max(Vec3::ZERO).length();
+                if away - ROUNDING * (1.0 + away) < f64::from(least.max(0.0)) {
+                    near.push(point);
+                    chosen.push(index);
+                }
+            }
+            limb.shape.closest_points(pose, &near, &mut surface);
+            for (index, distance) in chosen.iter().zip(&surface.signed_distance) {
+                least[*index] = least[*index].min(*distance);
+            }
+        }
+        Ok(least)
+    }
+
+    /// World points in the working frame of the posed body.
+    fn queries(&self, points: PointSlice) -> Result<Points, TrackError> {
         if !self.is_started() {
             return Err(TrackError::NotInitialised);
         }
@@ -88,24 +131,6 @@ impl Tracker {
             }
             queries.push((point - self.motion.origin).to_array().map(|value| value as f32));
         }
-        let mut surface = SurfaceBatch::default();
-        let limbs = self.model.body.limbs().iter().zip(&self.motion.poses);
-        Ok(limbs
-            .map(|(limb, pose)| {
-                limb.shape.closest_points(pose, &queries, &mut surface);
-                surface.signed_distance[..points.len()].to_vec()
-            })
-            .collect())
-    }
-
-    /// Signed distances of world points to the surface of the posed body, metres, negative inside.
-    pub fn distance(&self, points: PointSlice) -> Result<Vec<f32>, TrackError> {
-        let mut least = vec![f32::INFINITY; points.len()];
-        for distances in self.limb_distances(points)? {
-            for (least, distance) in least.iter_mut().zip(distances) {
-                *least = least.min(distance);
-            }
-        }
-        Ok(least)
+        Ok(queries)
     }
 }

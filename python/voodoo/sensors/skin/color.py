@@ -78,11 +78,14 @@ class SkinColour:
         self.skin: Histogram = prior / prior.sum()
         self.rest: Histogram = np.full(_SHAPE, 1.0 / _SIZE, dtype=np.float32)
         self._pictures = 0
+        self._table: tuple[Histogram, Histogram, Mask] | None = None
 
-    def classify(self, colours: Colours) -> Mask:
-        """(H, W): True where a picture has the colour of skin; single pixels are removed."""
-        found = colours.among(self.skin > self.ratio * self.rest)
-        return np.asarray(cv2.medianBlur(found, 3), dtype=np.uint8).view(np.bool_)
+    def table(self) -> Mask:
+        """Which bins are skin's (32768,)."""
+        known = self._table
+        if known is None or known[0] is not self.skin or known[1] is not self.rest:
+            known = self._table = (self.skin, self.rest, (self.skin > self.ratio * self.rest).reshape(-1))
+        return known[2]
 
     def learn(self, colours: Colours, inside: Sequence[Mask], *, outside: Mask, body: Mask | None = None) -> bool:
         """Learn from the pixels where skin must be, and from those far from it.

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
+
 Mask = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.int32]
 
@@ -16,6 +18,8 @@ PALM_M, FACE_M = 0.045, 0.085
 """Radii of a palm and of a face."""
 LONGEST_HAND = 4.6
 """A hand with stretched fingers in radii of its palm."""
+LONGEST_JOINED = 3.0
+"""Regions no longer than this, in radii of a palm, may be parts of one hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +47,7 @@ def joined(skin: Mask, *, palm_px: float) -> Mask:
         skin: True where the colour is skin's.
         palm_px: radius of a palm in the image [px].
     """
-    pixels = skin.view(np.uint8)
-    x, y, w, h = cv2.boundingRect(pixels)
-    if not (w and h):
-        return skin
-    window = (slice(y, y + h), slice(x, x + w))
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(pixels[window], connectivity=8)
-    size = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
-    small = size <= 3.0 * palm_px
-    small[0] = False
-    closed = cv2.morphologyEx(
-        small.take(np.asarray(labels, dtype=np.int32)).view(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)
-    )
-    result = skin.copy()
-    result[window] |= closed.view(np.bool_)
-    return result
+    return _core.joined_mask(skin, longest=LONGEST_JOINED * palm_px)
 
 
 def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
@@ -76,28 +66,20 @@ def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
     """
     smallest = max(0.2 * math.pi * palm_px**2, 6.0)
     largest = 4.0 * math.pi * (FACE_M / PALM_M * palm_px) ** 2
-    pixels = skin.view(np.uint8)
-    x, y, w, h = cv2.boundingRect(pixels)
-    regions = np.zeros(skin.shape, dtype=np.int32)
+    labels, regions = _core.mask_regions(skin)
     found: list[Candidate] = []
-    if not (w and h):
-        return found, regions
-    _, labels, stats, centres = cv2.connectedComponentsWithStats(pixels[y : y + h, x : x + w], connectivity=8)
-    regions[y : y + h, x : x + w] = labels
-    for region, (left, top, width, height, area) in enumerate(stats.tolist()):
-        # The first is what lies around all of them.
-        if not region or not smallest <= area <= largest:
+    for region, ((top, bottom), (left, right), area, middle) in enumerate(regions, start=1):
+        if not smallest <= area <= largest:
             continue
-        middle = (float(centres[region][0]) + x, float(centres[region][1]) + y)
-        if math.hypot(width, height) <= LONGEST_HAND * palm_px:
+        if math.hypot(right - left, bottom - top) <= LONGEST_HAND * palm_px:
             found.append(Candidate(middle, region, area))
             continue
-        mask = labels[top : top + height, left : left + width] == region
+        mask = labels[top:bottom, left:right] == region
         hand = _length(mask) <= LONGEST_HAND * palm_px
         found.append(Candidate(middle, region, area, hand=hand))
         if not hand:
-            found += [Candidate((u + left + x, v + top + y), region, area) for u, v in _tips(mask, palm_px)]
-    return found, regions
+            found += [Candidate((u + left, v + top), region, area) for u, v in _tips(mask, palm_px)]
+    return found, labels
 
 
 def _length(mask: Mask) -> float:

@@ -26,6 +26,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
 from voodoo.model.camera import Camera
@@ -35,7 +36,7 @@ from voodoo.sensors.pixels import FloatArray, checked_camera, in_sensor, lengths
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin.color import Colours, SkinColour
 from voodoo.sensors.skin.hands import elsewhere, of_pieces, to_palm
-from voodoo.sensors.skin.regions import FACE_M, PALM_M, Candidate, candidates, joined
+from voodoo.sensors.skin.regions import FACE_M, LONGEST_JOINED, PALM_M, Candidate, candidates
 from voodoo.sensors.skin.rules import allowed_sites
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.sensors.skin.tracks import Blob, Blobs, Sight
@@ -194,22 +195,19 @@ class SkinTracker:
 
     def _segmented(self, image: ByteImage, body: BodyView | None, palm_px: float) -> Mask:
         """(H, W): skin, without what is nowhere near the body and what has been there for long."""
-        self._colours = (image, Colours.of(image))
-        self._seen = self.colour.classify(self._colours[1])
-        skin = self._seen.copy()
-        self._body = None if body is None else body.mask
-        if body is not None:
-            skin &= body.mask
-        self._before = None if body is None else body.before
-        if self._static is not None and self._static.shape == skin.shape:
-            there = self._static < 0.5
+        colours = Colours.of(image)
+        self._colours = (image, colours)
+        self._body, self._before = (None, None) if body is None else (body.mask, body.before)
+        always = self._static if self._static is not None and self._static.shape == image.shape[:2] else None
+        self._seen, skin = _core.skin_mask(
+            colours.bins,
+            self.colour.table(),
+            longest=LONGEST_JOINED * palm_px,
+            body=self._body,
+            always=always,
             # A hand before a wooden door is not the door.
-            skin &= there if self._before is None else there | self._before
-        # Where two colours meet, a camera mixes them, at times to the colour of skin: lines of a pixel or two.
-        skin = np.asarray(cv2.morphologyEx(skin.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), dtype=bool)
-        skin = joined(skin, palm_px=palm_px)
-        if body is not None:
-            skin &= body.mask
+            before=self._before,
+        )
         return skin
 
     def _sights(

@@ -1,0 +1,220 @@
+//! What hangs together in a mask of a picture, and skin's regions.
+
+use crate::error::TrackError;
+use crate::observation::chroma;
+use crate::observation::masks::{bounds, closed, opened, smoothed};
+
+/// A region of a mask: pixels that touch, at corners too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// First row and column, and one beyond the last.
+    pub rows: (usize, usize),
+    /// Columns likewise.
+    pub columns: (usize, usize),
+    /// Pixels.
+    pub area: usize,
+    /// Sum of their columns, and of their rows.
+    pub sums: [usize; 2],
+}
+
+impl Region {
+    fn of(run: &Run) -> Self {
+        let count = run.end - run.start;
+        let columns = (run.start + run.end - 1) * count / 2;
+        let sums = [columns, run.row * count];
+        Self { rows: (run.row, run.row + 1), columns: (run.start, run.end), area: count, sums }
+    }
+
+    fn join(&mut self, other: &Self) {
+        let both = |a: (usize, usize), b: (usize, usize)| (a.0.min(b.0), a.1.max(b.1));
+        (self.rows, self.columns) = (both(self.rows, other.rows), both(self.columns, other.columns));
+        self.area += other.area;
+        self.sums = [0, 1].map(|axis| self.sums[axis] + other.sums[axis]);
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    row: usize,
+    start: usize,
+    end: usize,
+    /// Another run of the same region with a smaller index, or itself.
+    parent: usize,
+}
+
+/// The regions of a mask of so many columns, and the number of its region, from 1, in each pixel; they are numbered by the first
+/// two by two pixels that hold something of them.
+pub fn regions(mask: &[u8], width: usize) -> (Vec<Region>, Vec<i32>) {
+    let mut runs = joined_runs(mask, width);
+    for index in 0..runs.len() {
+        runs[index].parent = first(&runs, index);
+    }
+    let mut found: Vec<((usize, usize), usize, Region)> = Vec::new();
+    let mut place = vec![0; runs.len()];
+    for (index, run) in runs.iter().enumerate() {
+        let block = (run.row / 2, run.start / 2);
+        if run.parent == index {
+            place[index] = found.len();
+            found.push((block, index, Region::of(run)));
+        } else {
+            let known = &mut found[place[run.parent]];
+            known.0 = known.0.min(block);
+            known.2.join(&Region::of(run));
+        }
+    }
+    found.sort_unstable_by_key(|(block, _, _)| *block);
+    let mut labels = vec![0; mask.len()];
+    for ((_, index, _), number) in found.iter().zip(1..) {
+        place[*index] = number;
+    }
+    for run in &runs {
+        labels[run.row * width + run.start..run.row * width + run.end].fill(place[run.parent] as i32);
+    }
+    (found.into_iter().map(|(_, _, region)| region).collect(), labels)
+}
+
+/// Stretches of pixels in rows, each pointing to one before it that it touches.
+fn joined_runs(mask: &[u8], width: usize) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    let mut above = 0..0;
+    for (row, pixels) in mask.chunks_exact(width.max(1)).enumerate() {
+        let begin = runs.len();
+        let mut start = 0;
+        while let Some(next) = pixels[start..].iter().position(|pixel| *pixel != 0) {
+            start += next;
+            let end = pixels[start..].iter().position(|pixel| *pixel == 0).map_or(width, |length| start + length);
+            runs.push(Run { row, start, end, parent: runs.len() });
+            start = end;
+        }
+        let mut other = above.start;
+        for index in begin..runs.len() {
+            while other < above.end && runs[other].end < runs[index].start {
+                other += 1;
+            }
+            let mut touching = other;
+            while touching < above.end && runs[touching].start <= runs[index].end {
+                let (a, b) = (first(&runs, index), first(&runs, touching));
+                runs[a.max(b)].parent = a.min(b);
+                touching += 1;
+            }
+        }
+        above = begin..runs.len();
+    }
+    runs
+}
+
+fn first(runs: &[Run], mut index: usize) -> usize {
+    while runs[index].parent != index {
+        index = runs[index].parent;
+    }
+    index
+}
+
+/// A mask of so many columns with gaps of two pixels closed between regions whose boxes' diagonals are no longer than `longest`.
+pub fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
+    let mut result = mask.to_vec();
+    let [rows, columns] = bounds(mask, width);
+    let part: Vec<u8> = rows.clone().flat_map(|row| &mask[row * width..][columns.clone()]).copied().collect();
+    let (regions, mut labels) = regions(&part, columns.len());
+    let length = |(low, high): (usize, usize)| (high - low) as f64;
+    let small: Vec<bool> =
+        regions.iter().map(|region| length(region.columns).hypot(length(region.rows)) <= longest).collect();
+    for label in &mut labels {
+        *label = i32::from(*label > 0 && small[(*label - 1) as usize]);
+    }
+    let small: Vec<u8> = labels.iter().map(|label| *label as u8).collect();
+    for (row, closed) in rows.zip(closed(&small, columns.len()).chunks_exact(columns.len().max(1))) {
+        result[row * width..][columns.clone()].iter_mut().zip(closed).for_each(|(pixel, closed)| *pixel |= closed);
+    }
+    result
+}
+
+/// What skin is looked for in: a picture, and where it may be.
+#[derive(Clone, Copy, Debug)]
+pub struct SkinPicture<'a> {
+    /// Of each pixel's colour, see [`chroma::bins`].
+    pub bins: &'a [u16],
+    /// Columns.
+    pub width: usize,
+    /// Which bins are skin's.
+    pub table: &'a [bool],
+    /// Where the body may be.
+    pub body: Option<&'a [bool]>,
+    /// How much of the time a pixel shows skin where no skin is; half or more is the scene.
+    pub always: Option<&'a [f32]>,
+    /// Where something is before the scene.
+    pub before: Option<&'a [bool]>,
+}
+
+impl SkinPicture<'_> {
+    /// Pixels of skin's colour, single ones removed; and of those the ones that may be the body's, in regions at least three
+    /// pixels wide, with gaps closed between regions no longer than `longest`.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when sizes do not fit together.
+    pub fn skin(&self, longest: f64) -> Result<(Vec<u8>, Vec<u8>), TrackError> {
+        let count = self.bins.len();
+        let whole = if self.width > 0 { count.is_multiple_of(self.width) } else { count == 0 };
+        let masks = [self.body, self.before].into_iter().flatten().map(<[_]>::len);
+        if !whole || masks.chain(self.always.map(<[_]>::len)).any(|length| length != count) {
+            let found = format!("{count} pixels in rows of {} and masks of another size", self.width);
+            return Err(TrackError::measurement("skin", "a picture and masks of its size", found));
+        }
+        let seen = smoothed(&chroma::among(self.bins, self.table)?, self.width);
+        let mut skin = seen.clone();
+        let within = |skin: &mut [u8]| {
+            if let Some(body) = self.body {
+                skin.iter_mut().zip(body).for_each(|(pixel, body)| *pixel &= u8::from(*body));
+            }
+        };
+        within(&mut skin);
+        match (self.always, self.before) {
+            (Some(always), Some(before)) => {
+                for ((pixel, always), before) in skin.iter_mut().zip(always).zip(before) {
+                    *pixel &= u8::from((*always < 0.5) | *before);
+                }
+            }
+            (Some(always), None) => {
+                skin.iter_mut().zip(always).for_each(|(pixel, always)| *pixel &= u8::from(*always < 0.5));
+            }
+            (None, _) => {}
+        }
+        let mut skin = joined(&opened(&skin, self.width), self.width, longest);
+        within(&mut skin);
+        Ok((seen, skin))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_touch_at_corners_and_are_numbered_from_the_top() {
+        let mask = [[0, 0, 0, 0, 0, 1], [1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 0, 0], [1, 0, 0, 0, 1, 1]].concat();
+        let (found, labels) = regions(&mask, 6);
+        assert_eq!(labels, [[0, 0, 0, 0, 0, 3], [1, 0, 0, 2, 0, 0], [0, 1, 0, 0, 0, 0], [1, 0, 0, 0, 4, 4]].concat());
+        assert_eq!(found[0], Region { rows: (1, 4), columns: (0, 2), area: 3, sums: [1, 6] });
+        assert_eq!(found[3], Region { rows: (3, 4), columns: (4, 6), area: 2, sums: [9, 6] });
+        assert!(regions(&[], 0).0.is_empty() && regions(&[0; 6], 3).0.is_empty());
+    }
+
+    #[test]
+    fn only_short_regions_are_joined_and_sizes_are_checked() {
+        let mask = [[1, 0, 1, 1, 0, 0, 0], [1, 0, 1, 1, 0, 0, 0]].concat();
+        assert_eq!(joined(&mask, 7, 3.0)[..7], [1, 1, 1, 1, 0, 0, 0]);
+        assert_eq!(joined(&mask, 7, 1.0), mask);
+        let (bins, table) = (vec![0; 12], vec![true; chroma::BINS]);
+        let picture = SkinPicture { bins: &bins, width: 4, table: &table, body: None, always: None, before: None };
+        assert_eq!(picture.skin(3.0).unwrap(), (vec![1; 12], vec![1; 12]));
+        let body = [true, true, true, false].repeat(3);
+        assert_eq!(SkinPicture { body: Some(&body), ..picture }.skin(3.0).unwrap().1[..4], [1, 1, 1, 0]);
+        let always = [0.6; 12];
+        assert_eq!(SkinPicture { always: Some(&always), ..picture }.skin(3.0).unwrap().1, [0; 12]);
+        let before = SkinPicture { always: Some(&always), before: Some(&body), ..picture };
+        assert_eq!(before.skin(3.0).unwrap().1[..4], [1, 1, 1, 0]);
+        assert!(SkinPicture { width: 5, ..picture }.skin(3.0).is_err());
+        assert!(SkinPicture { body: Some(&body[1..]), ..picture }.skin(3.0).is_err());
+    }
+}

@@ -1,0 +1,101 @@
+//! Masks of pictures, row by row, 1 where something is and 0 elsewhere: grown, opened, closed, smoothed.
+
+use crate::math::widest;
+
+/// 1 wherever a mask of so many columns has something within `reach` rows and columns.
+pub fn grown(mask: &[u8], width: usize, reach: usize) -> Vec<u8> {
+    around(mask, width, reach, |a, b| a | b)
+}
+
+/// A mask without what is narrower than three pixels.
+pub fn opened(mask: &[u8], width: usize) -> Vec<u8> {
+    around(&around(mask, width, 1, |a, b| a & b), width, 1, |a, b| a | b)
+}
+
+/// A mask with gaps of up to two pixels filled.
+pub fn closed(mask: &[u8], width: usize) -> Vec<u8> {
+    around(&around(mask, width, 1, |a, b| a | b), width, 1, |a, b| a & b)
+}
+
+/// Joins every pixel with all those within `reach` rows and columns; what is outside the picture does not count.
+fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) -> Vec<u8> {
+    let height = mask.len().checked_div(width).unwrap_or(0);
+    let (mut row, mut found) = (vec![0; width], vec![0; mask.len()]);
+    widest(
+        #[inline(always)]
+        || {
+            for (index, found) in found.chunks_exact_mut(width.max(1)).enumerate() {
+                row.copy_from_slice(&mask[index * width..][..width]);
+                let (first, last) = (index.saturating_sub(reach), (index + reach).min(height - 1));
+                for other in (first..index).chain(index + 1..=last) {
+                    row.iter_mut().zip(&mask[other * width..][..width]).for_each(|(a, b)| *a = join(*a, *b));
+                }
+                found.copy_from_slice(&row);
+                for apart in 1..=reach.min(width - 1) {
+                    found[apart..].iter_mut().zip(&row).for_each(|(a, b)| *a = join(*a, *b));
+                    found.iter_mut().zip(&row[apart..]).for_each(|(a, b)| *a = join(*a, *b));
+                }
+            }
+        },
+    );
+    found
+}
+
+/// What most of each pixel and its eight neighbours are; beyond the border a picture goes on as it ends.
+pub fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
+    let height = mask.len().checked_div(width).unwrap_or(0);
+    let (mut row, mut found) = (vec![0; width], vec![0; mask.len()]);
+    widest(
+        #[inline(always)]
+        || {
+            for (index, found) in found.chunks_exact_mut(width.max(1)).enumerate() {
+                let line = |other: usize| &mask[other.min(height - 1) * width..][..width];
+                let rows = line(index.saturating_sub(1)).iter().zip(line(index)).zip(line(index + 1));
+                row.iter_mut().zip(rows).for_each(|(sum, ((a, b), c))| *sum = a + b + c);
+                if let (Some(inner), Some(second), Some(third)) = (found.get_mut(1..), row.get(1..), row.get(2..)) {
+                    for (((found, a), b), c) in inner.iter_mut().zip(&row).zip(second).zip(third) {
+                        *found = u8::from(a + b + c > 4);
+                    }
+                }
+                let end = width - 1;
+                found[0] = u8::from(2 * row[0] + row[end.min(1)] > 4);
+                found[end] = u8::from(2 * row[end] + row[end.saturating_sub(1)] > 4);
+            }
+        },
+    );
+    found
+}
+
+/// Smallest range of rows and of columns that holds all of a mask.
+pub fn bounds(mask: &[u8], width: usize) -> [std::ops::Range<usize>; 2] {
+    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+    for (index, row) in mask.chunks_exact(width.max(1)).enumerate() {
+        if let Some(first) = row.iter().position(|pixel| *pixel != 0) {
+            let last = row.iter().rposition(|pixel| *pixel != 0).unwrap_or(first);
+            low = [low[0].min(index), low[1].min(first)];
+            high = [index + 1, high[1].max(last + 1)];
+        }
+    }
+    [0, 1].map(|axis| low[axis].min(high[axis])..high[axis])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_grows_shrinks_and_is_smoothed() {
+        let mask = [[0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 1]].concat();
+        let wide = [[1, 1, 1, 0, 0], [1, 1, 1, 0, 0], [1, 1, 1, 1, 1], [0, 0, 0, 1, 1]].concat();
+        assert_eq!(grown(&mask, 5, 1), wide);
+        assert_eq!(grown(&mask, 5, 9), [1; 20]);
+        assert_eq!(opened(&wide, 5)[..10], [1, 1, 1, 0, 0, 1, 1, 1, 0, 0]);
+        let gap = [[1, 1, 0, 1, 1]; 3].concat();
+        assert_eq!((closed(&gap, 5), opened(&gap, 5)), (vec![1; 15], gap.clone()));
+        assert_eq!(smoothed(&mask, 5), [0; 20]);
+        assert_eq!(smoothed(&gap, 5), [1; 15]);
+        assert_eq!(bounds(&mask, 5), [1..4, 1..5]);
+        assert_eq!(bounds(&[0; 20], 5), [0..0, 0..0]);
+        assert!(grown(&[], 0, 1).is_empty() && smoothed(&[], 0).is_empty() && smoothed(&[1], 1) == [1]);
+    }
+}
