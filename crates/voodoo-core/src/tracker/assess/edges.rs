@@ -1,0 +1,58 @@
+//! Whether arms and legs are where they are thought to be, where pictures are all that shows them: what is not known to a few
+//! centimetres by what edges told is not called measured.
+
+use super::Assessor;
+use crate::association::correspondence::RegionSupport;
+use crate::body::Model;
+use crate::body::two_bone::TwoBone;
+use crate::tracker::estimate::{LimbStatus, Status};
+use crate::uncertainty::Found;
+
+/// A limb is in doubt whose end is known less well, metres. Edges err alike: errors are some three times as large.
+const UNSURE: f64 = 0.038;
+/// What speaks for all of a limb makes it surer by so many e-folds.
+const SPOKEN_FOR: f64 = 0.9;
+
+impl Assessor {
+    /// Takes what a frame's edges told.
+    pub(in crate::tracker) fn follow_edges(&mut self, model: &Model, found: Found) {
+        let Found { poses, correspondences, time_scale, config, .. } = found;
+        let points = correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
+        let pictures = !correspondences.region_support.is_empty();
+        if points || !pictures && self.sure.is_empty() {
+            self.forget_edges();
+            return;
+        }
+        self.edges.observe(model, poses, correspondences, time_scale, config);
+        let Self { edges, sure, .. } = self;
+        sure.clear();
+        sure.extend((0..poses.len()).map(|limb| {
+            let support = correspondences.region_support.get(limb).copied();
+            let RegionSupport { own, shown, .. } = support.unwrap_or_default();
+            edges.end_sigma(limb) * (-SPOKEN_FOR * own[0] * shown).exp() < UNSURE
+        }));
+    }
+
+    /// Nothing that edges told before counts.
+    pub(super) fn forget_edges(&mut self) {
+        self.edges.forget();
+        self.sure.clear();
+    }
+
+    /// Statuses of arms and legs by what edges told, if that is all there is.
+    pub(super) fn doubt_by_edges(&self, extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
+        if self.sure.is_empty() || self.status == Status::Lost {
+            return;
+        }
+        for chain in extremities {
+            for limb in [chain.upper, chain.lower] {
+                statuses[limb] = match statuses[limb] {
+                    _ if self.sure[limb] => LimbStatus::Measured,
+                    LimbStatus::Measured => LimbStatus::Inferred,
+                    doubtful => doubtful,
+                };
+            }
+            chain.ends.iter().for_each(|end| statuses[*end] = statuses[chain.lower]);
+        }
+    }
+}
