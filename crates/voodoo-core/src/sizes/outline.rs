@@ -225,3 +225,36 @@ fn level_pairs(model: &mut Model, poses: &mut [Pose]) {
     }
     model.body.close_joints(poses);
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::testing::standing;
+
+    /// Mean error of lengths, as a share, of a start whose arms and legs have lengths off by `shares`, left and right.
+    fn off(shares: [[f64; 2]; 4]) -> f64 {
+        let (mut model, mut poses) = standing();
+        let true_body = model.body.clone();
+        let limb = |name: &str| true_body.limb_index(name).unwrap();
+        for (name, shares) in ["upperarm", "forearm", "thigh", "calf"].iter().zip(shares) {
+            for (side, share) in ["l", "r"].iter().zip(shares) {
+                model.body.change_length(limb(&format!("{side}_{name}")), 1.0 + share);
+            }
+        }
+        level_pairs(&mut model, &mut poses);
+        let ratio = |name: &str| {
+            let length = |body: &Body| body.limbs()[limb(name)].shape.length();
+            (length(&model.body) / length(&true_body) - 1.0).abs()
+        };
+        ["l_upperarm", "l_forearm", "l_thigh", "l_calf"].iter().map(|name| ratio(name) / 4.0).sum()
+    }
+
+    #[test]
+    fn the_less_alike_pairs_are_the_more_are_lengths_those_of_proportion() {
+        let alike = [[0.15, 0.15], [-0.1, -0.1], [0.05, 0.05], [-0.1, -0.1]];
+        assert!((off(alike) - 0.1).abs() < 1e-9, "a person may have such limbs");
+        let unlike = [[-0.3, 0.0], [-0.1, 0.2], [0.2, 0.0], [0.0, -0.2]];
+        assert!(off(unlike) < 0.06, "{}; the means alone are 0.1 off", off(unlike));
+    }
+}

@@ -10,7 +10,7 @@ use crate::body::kinematics::freedoms;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, factor};
 use crate::solver::{ChainSolver, SITE_SCALE, Spread};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Regions, Sites, Term};
@@ -28,9 +28,12 @@ pub struct ByEdges {
     normal: NormalEquations,
     system: ChainSolver,
     spread: Spread,
-    /// Information of all unknowns, lower triangle, and the variance of each, after the last frame.
+    /// Information of all unknowns after the last frame, lower triangle.
     known: Vec<f64>,
-    variance: Vec<f64>,
+    /// How much says of each that it has not moved, and working memory.
+    still: Vec<f64>,
+    factored: Vec<f64>,
+    solved: Vec<f64>,
     /// Of every limb's far end, metres; empty before the first frame.
     sigma: Vec<f64>,
 }
@@ -59,44 +62,56 @@ impl ByEdges {
         let body = &model.body;
         self.expect(body, time_scale);
         self.sum_terms(body, &model.extremities, poses, correspondences, config);
-        let Self { normal, system, spread, known, variance, sigma } = self;
+        let Self { normal, system, spread, known, sigma, .. } = self;
         sigma.clear();
         if !system.factor_added(body, normal, poses, known) {
-            known.clear();
+            know_alone(known, self.still.len(), MOST_UNSURE);
             return;
         }
-        variance.clear();
         for (limb, part) in body.limbs().iter().enumerate() {
-            let own = spread.of_joint(system, limb);
-            variance.extend((0..count(body, limb)).map(|index| own[(index, index)]));
             let end = poses[limb] * (part.shape.length() * Vec3::Z);
             let end = spread.of_limb(system, limb, end);
             sigma.push((3..6).map(|axis| end[(axis, axis)]).sum::<f64>().sqrt());
         }
     }
 
-    /// What was known fades: each unknown may have moved, the root as far as anything can.
+    /// What was known fades: every joint may have moved, the root as far as anything can.
     fn expect(&mut self, body: &Body, time_scale: f64) {
-        let Self { known, variance, .. } = self;
-        let n: usize = (0..body.limbs().len()).map(|limb| count(body, limb)).sum();
+        let Self { known, still, factored, solved, .. } = self;
+        still.clear();
+        for limb in body.limbs() {
+            let sigma = limb.parent.as_ref().map_or(MOST_UNSURE, |(_, joint)| USUAL_MOTION * joint.motion * time_scale);
+            let count = limb.parent.as_ref().map_or(6, |(_, joint)| freedoms(joint));
+            still.extend((0..count).map(|_| 1.0 / (sigma * sigma)));
+        }
+        let n = still.len();
         if known.len() != n * n {
-            known.clear();
-            known.resize(n * n, 0.0);
-            known.iter_mut().step_by(n + 1).for_each(|value| *value = 1.0 / (AS_SET * AS_SET));
+            know_alone(known, n, AS_SET);
             return;
         }
-        let mut unknowns = variance.iter_mut();
-        for limb in 0..body.limbs().len() {
-            let motion = body.limbs()[limb].parent.as_ref().map_or(f64::INFINITY, |(_, joint)| joint.motion);
-            let moved = (USUAL_MOTION * motion * time_scale).powi(2);
-            for before in unknowns.by_ref().take(count(body, limb)) {
-                // The share of its standard deviation then in that of now.
-                *before = (*before / (*before + moved).min(MOST_UNSURE * MOST_UNSURE)).sqrt();
-            }
+        // (A^-1 + Q)^-1 = A - A (A + Q^-1)^-1 A, with A + Q^-1 = L^T L and L^T Y = A: A - Y^T Y.
+        factored.clone_from(known);
+        factored.iter_mut().step_by(n + 1).zip(&*still).for_each(|(value, still)| *value += still);
+        solved.clear();
+        solved.extend((0..n * n).map(|index| known[(index / n).max(index % n) * n + (index / n).min(index % n)]));
+        if !factor(factored, n) {
+            know_alone(known, n, MOST_UNSURE);
+            return;
         }
-        for (row, values) in known.chunks_exact_mut(n).enumerate() {
-            let own = variance[row];
-            values.iter_mut().zip(&*variance).for_each(|(value, other)| *value *= own * other);
+        for row in (0..n).rev() {
+            let (before, rest) = solved.split_at_mut(row * n);
+            let own = &mut rest[..n];
+            own.iter_mut().for_each(|value| *value /= factored[row * n + row]);
+            for (other, values) in before.chunks_exact_mut(n).enumerate() {
+                let share = factored[row * n + other];
+                if share != 0.0 {
+                    values.iter_mut().zip(&*own).for_each(|(value, own)| *value -= share * own);
+                }
+            }
+            for (index, values) in known.chunks_exact_mut(n).enumerate() {
+                let share = own[index];
+                values[..=index].iter_mut().zip(&*own).for_each(|(value, own)| *value -= share * own);
+            }
         }
     }
 
@@ -113,7 +128,8 @@ impl ByEdges {
         normal.clear(poses.len());
         Regions { pairs: &correspondences.regions }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
-            let said = correspondences.region_support.get(limb).map_or(0.0, |support| support.own[0] - support.against[0]);
+            let said =
+                correspondences.region_support.get(limb).map_or(0.0, |support| support.own[0] - support.against[0]);
             let told = (said.max(0.0) * said).max(LEAST_TOLD);
             let loose = extremities.iter().flat_map(TwoBone::limbs).all(|other| other != limb);
             block.h *= if loose { LOOSE * told } else { told };
@@ -123,7 +139,87 @@ impl ByEdges {
     }
 }
 
-/// Number of unknowns of a limb's joint, or of the root.
-fn count(body: &Body, limb: usize) -> usize {
-    body.limbs()[limb].parent.as_ref().map_or(6, |(_, joint)| freedoms(joint))
+/// Every one of `n` unknowns is known by itself.
+fn know_alone(known: &mut Vec<f64>, n: usize, sigma: f64) {
+    known.clear();
+    known.resize(n * n, 0.0);
+    known.iter_mut().step_by(n + 1).for_each(|value| *value = 1.0 / (sigma * sigma));
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::association::correspondence::{RegionPair, RegionSupport};
+    use crate::testing::standing;
+
+    /// Edges of all limbs that cameras see which look at right angles to `normals`; all of them speak for their limb, or none.
+    fn edges(model: &Model, poses: &[Pose], normals: &[Vec3], own: f64) -> Correspondences {
+        let mut found = Correspondences::default();
+        for (limb, part) in model.body.limbs().iter().enumerate() {
+            for (step, normal) in (0..8).flat_map(|step| normals.iter().map(move |normal| (step, *normal))) {
+                let x = poses[limb] * (f64::from(step) / 7.0 * part.shape.length() * Vec3::Z);
+                found.regions.push(RegionPair { limb, x, normal, distance: 0.0, information: 1e4, source: 0 });
+            }
+            found.region_support.push(RegionSupport { own: [own; 2], ..RegionSupport::default() });
+        }
+        found
+    }
+
+    /// Standard deviations of a forearm's end in frames of such edges.
+    fn sigmas(frames: &[(&[Vec3], f64)]) -> Vec<f64> {
+        let (model, poses) = standing();
+        let lower = model.extremities[crate::testing::first_arm(&model)].lower;
+        let mut told = ByEdges::default();
+        let observe = |(normals, own): &(&[Vec3], f64)| {
+            told.observe(&model, &poses, &edges(&model, &poses, normals, *own), 1.0, &Config::default());
+            told.end_sigma(lower)
+        };
+        frames.iter().map(observe).collect()
+    }
+
+    #[test]
+    fn what_no_camera_sees_is_known_less_from_frame_to_frame_and_at_once_when_one_does() {
+        let (two, one): (&[Vec3], &[Vec3]) = (&[Vec3::X, Vec3::Z], &[Vec3::X]);
+        let both = sigmas(&[(two, 1.0); 20]);
+        assert!(both.iter().all(|sigma| *sigma < 0.03), "{both:?}");
+        let told = sigmas(&[&[(two, 1.0)][..], &[(one, 1.0); 18], &[(two, 1.0)]].concat());
+        assert!((2..19).all(|frame| told[frame] >= told[frame - 1] - 1e-9), "{told:?}");
+        assert!(told[18] > 3.0 * both[18] && told[19] < 1.2 * both[19], "{told:?}");
+    }
+
+    #[test]
+    fn edges_that_do_not_speak_for_their_limb_tell_little() {
+        let normals: &[Vec3] = &[Vec3::X, Vec3::Z];
+        let [sure, doubtful] = [1.0, 0.0].map(|own| sigmas(&[(normals, own); 10])[9]);
+        assert!(doubtful > 2.0 * sure, "{doubtful} {sure}");
+    }
+
+    #[test]
+    fn what_was_known_fades_as_the_dense_inverse_says() {
+        let (model, poses) = standing();
+        let mut told = ByEdges::default();
+        let found = edges(&model, &poses, &[Vec3::X, Vec3::Z], 0.7);
+        told.observe(&model, &poses, &found, 1.0, &Config::default());
+        let n = told.still.len();
+        let whole = |known: &[f64]| DMatrix::from_fn(n, n, |i, j| known[i.max(j) * n + i.min(j)]);
+        let before = whole(&told.known);
+        told.expect(&model.body, 2.0);
+        let moved = DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 / told.still[i] } else { 0.0 });
+        let expected = (before.try_inverse().unwrap() + moved).try_inverse().unwrap();
+        assert!((whole(&told.known) - &expected).amax() < 1e-6 * expected.amax());
+    }
+
+    #[test]
+    fn nothing_is_known_before_the_first_frame() {
+        let mut told = ByEdges::default();
+        assert_eq!(told.end_sigma(0), f64::INFINITY);
+        let (model, poses) = standing();
+        told.observe(&model, &poses, &edges(&model, &poses, &[Vec3::X], 1.0), 1.0, &Config::default());
+        assert!(told.end_sigma(0) < 0.1);
+        told.forget();
+        assert_eq!(told.end_sigma(0), f64::INFINITY);
+    }
 }

@@ -56,3 +56,30 @@ impl Assessor {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::standing;
+
+    #[test]
+    fn arms_and_legs_are_measured_where_edges_told_where_they_are() {
+        let (model, poses) = standing();
+        let chain = &model.extremities[0];
+        let statuses = |internal: LimbStatus, sure: bool, status: Status| {
+            let mut assessor = Assessor { sure: vec![sure; poses.len()], status, ..Assessor::default() };
+            let mut statuses = vec![internal; poses.len()];
+            assessor.doubt_by_edges(&model.extremities, &mut statuses);
+            assessor.forget_edges();
+            let mut forgotten = vec![internal; poses.len()];
+            assessor.doubt_by_edges(&model.extremities, &mut forgotten);
+            assert_eq!(forgotten, vec![internal; poses.len()], "edges are not all there is");
+            (statuses[0], [chain.upper, chain.lower, chain.ends[0]].map(|limb| statuses[limb]))
+        };
+        let (measured, inferred, lost) = (LimbStatus::Measured, LimbStatus::Inferred, LimbStatus::Lost);
+        assert_eq!(statuses(measured, false, Status::Tracking), (measured, [inferred; 3]));
+        assert_eq!(statuses(lost, false, Status::Tracking), (lost, [lost; 3]));
+        assert_eq!(statuses(lost, true, Status::Degraded), (lost, [measured; 3]));
+        assert_eq!(statuses(lost, true, Status::Lost), (lost, [lost; 3]), "nothing of a lost body is measured");
+    }
+}
