@@ -182,9 +182,9 @@ mod tests {
 
     #[test]
     fn what_no_camera_sees_is_known_less_from_frame_to_frame_and_at_once_when_one_does() {
-        let (two, one): (&[Vec3], &[Vec3]) = (&[Vec3::X, Vec3::Z], &[Vec3::X]);
+        let (two, one): (&[Vec3], &[Vec3]) = (&Vec3::AXES, &[Vec3::X, Vec3::Y]);
         let both = sigmas(&[(two, 1.0); 20]);
-        assert!(both.iter().all(|sigma| *sigma < 0.03), "{both:?}");
+        assert!(both.iter().all(|sigma| *sigma < 0.05), "{both:?}");
         let told = sigmas(&[&[(two, 1.0)][..], &[(one, 1.0); 18], &[(two, 1.0)]].concat());
         assert!((2..19).all(|frame| told[frame] >= told[frame - 1] - 1e-9), "{told:?}");
         assert!(told[18] > 3.0 * both[18] && told[19] < 1.2 * both[19], "{told:?}");
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn edges_that_do_not_speak_for_their_limb_tell_little() {
-        let normals: &[Vec3] = &[Vec3::X, Vec3::Z];
+        let normals: &[Vec3] = &Vec3::AXES;
         let [sure, doubtful] = [1.0, 0.0].map(|own| sigmas(&[(normals, own); 10])[9]);
         assert!(doubtful > 2.0 * sure, "{doubtful} {sure}");
     }

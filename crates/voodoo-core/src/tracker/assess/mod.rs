@@ -166,8 +166,9 @@ impl Assessor {
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
             }
         }
-        let doubtful = self.status == Status::Tracking && measured_share(statuses) < TRACKED;
-        estimate.status = if doubtful { Status::Degraded } else { self.status };
+        let status = if self.told_by_edges() { overall(statuses) } else { self.status };
+        let doubtful = status == Status::Tracking && measured_share(statuses) < TRACKED;
+        estimate.status = if doubtful { Status::Degraded } else { status };
     }
 
     fn forget_limbs(&mut self) {
