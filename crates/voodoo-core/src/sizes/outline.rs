@@ -22,6 +22,8 @@ const AXIS_SIGMA: f64 = 0.02;
 const TIP_SIGMA: f64 = 0.03;
 /// What it leaves open of a limb's length where those of the others are known, as a share.
 const PROPORTION_SIGMA: f64 = 0.05;
+/// A person's left and right limbs, as keypoints show them, differ by this, metres.
+const UNLIKE_SIGMA: f64 = 0.02;
 
 /// What is known of the surface of one limb.
 #[derive(Clone, Copy, Debug)]
@@ -213,7 +215,7 @@ fn level_pairs(model: &mut Model, poses: &mut [Pose]) {
         usual += length(&model.reference_body, pair[0]);
     }
     // The variance of the difference of two is four times that of their mean.
-    let off = 0.25 * off;
+    let off = 0.25 * (off - UNLIKE_SIGMA * UNLIKE_SIGMA).max(0.0);
     for pair in &pairs {
         let [one, other] = [0, 1].map(|side| length(&model.body, pair[side]));
         let wanted = length(&model.reference_body, pair[0]) * sum / usual;
