@@ -1,17 +1,20 @@
 """Pose from colour regions on recordings of several colour cameras with exact truth, and under disturbances.
 
     python benches/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] [--rounds 9] ...
+    python benches/color_regions.py D/multiview/mv_* --pairs
     python benches/color_regions.py D/multiview/mv_d2* --grey --picture worst.jpg
 
 Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, mean and spread of the errors of joint
 angles, joints that are more than 10 cm off in the last third of a second, how many of the ends of limbs that are more than 10 cm
 off their status tells, and how many of the others it doubts, and user time of a step. Pictures are decoded before the clock runs.
+With `--pairs` it does so for every two of four cameras, and at the end for all of these together.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import json
 import re
 import time
@@ -176,6 +179,13 @@ def run(
     return np.array(errors), np.array(measured), angle_error(np.array(found), truth[order]), seconds
 
 
+def told_and_doubted(errors: npt.NDArray[np.float64], measured: npt.NDArray[np.bool_]) -> tuple[float, float, int]:
+    """Share of what is more than 10 cm off that is not called measured, and of the rest, in percent; how many are off."""
+    far = errors > 0.1
+    told, doubted = (100 * float((~measured[which]).mean()) if which.any() else np.nan for which in (far, ~far))
+    return told, doubted, int(far.sum())
+
+
 def main() -> None:
     """Measure."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -188,22 +198,30 @@ def main() -> None:
     parser.add_argument("--config", default="{}", help="JSON of configuration keys")
     for switch in ("noise", "rectangles", "corrupt", "dim", "grey", "background", "default-lengths"):
         parser.add_argument(f"--{switch}", action="store_true")
+    parser.add_argument("--pairs", action="store_true", help="every two of four cameras")
     options = parser.parse_args()
-    for folder in options.recordings:
+    ends = np.array([joint[2:] in LIMBS for joint in JOINTS])
+    pairs = [f"{one},{other}" for one, other in itertools.combinations(range(4), 2)]
+    together = []
+    chosen = pairs if options.pairs else [options.cameras]
+    for folder, cameras in itertools.product(options.recordings, chosen):
+        options.cameras = cameras
         errors, measured, angles, seconds = run(folder, options)
-        ends = np.array([joint[2:] in LIMBS for joint in JOINTS])
-        far, near = ends & (errors > 0.1), ends & (errors <= 0.1)
-        told, doubted = (100 * (~measured[which]).mean() if which.any() else np.nan for which in (far, near))
+        together.append((errors[:, ends].ravel(), measured[:, ends].ravel()))
+        told, doubted, count = told_and_doubted(*together[-1])
         lost = [joint for joint, error in zip(JOINTS, errors[-10:].mean(axis=0), strict=True) if error > 0.1]
         tenth = len(errors) // 10
         print(
-            f"{folder.name}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
+            f"{folder.name} {cameras}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
             f" angles {angles[0]:.1f} deg, spread {angles[1]:.1f}, lost {lost},"
-            f" told {told:.0f} % of {far.sum()}, doubted {doubted:.1f} %, first and last tenth"
+            f" told {told:.0f} % of {count}, doubted {doubted:.1f} %, first and last tenth"
             f" {100 * errors[:tenth].mean():.2f} {100 * errors[-tenth:].mean():.2f} cm,"
             f" {1e3 * float(np.median(seconds)):.1f} ms",
             flush=True,
         )
+    if options.pairs:
+        told, doubted, count = told_and_doubted(*(np.concatenate(part) for part in zip(*together, strict=True)))
+        print(f"all: told {told:.1f} % of {count}, doubted {doubted:.1f} %")
 
 
 if __name__ == "__main__":

@@ -27,6 +27,15 @@ impl ChainSolver {
         }
         factor(&mut self.h, n)
     }
+
+    /// The same with what is `known` of all unknowns, a lower triangle, to which the limbs' information is added.
+    pub fn factor_added(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], known: &mut [f64]) -> bool {
+        self.chain.layout(body);
+        self.assemble(body, normal, poses, 0.0);
+        known.iter_mut().zip(&self.h).for_each(|(known, told)| *known += told);
+        self.h.copy_from_slice(known);
+        factor(&mut self.h, self.chain.freedoms)
+    }
 }
 
 impl Spread {

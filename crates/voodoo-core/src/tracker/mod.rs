@@ -349,16 +349,17 @@ impl Tracker {
         let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, estimate, .. } = self;
         estimate.fill(&model.body, motion, fit.correspondences(), observer.candidates());
         (estimate.stamp, estimate.steps) = (stamp, steps);
+        let Some(time_scale) = time_scale else {
+            assessor.report_status(model, estimate);
+            assessor.forget_spread(&model.body, estimate);
+            return;
+        };
+        let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
+        let (pairs, sizes_found) = (sizes.followed(), sizes.found());
+        let found = Found { body, poses, correspondences, pairs, sizes_found, time_scale, config };
+        assessor.follow_edges(model, found);
         assessor.report_status(model, estimate);
-        match time_scale {
-            None => assessor.forget_spread(&model.body, estimate),
-            Some(time_scale) => {
-                let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
-                let (pairs, sizes_found) = (sizes.followed(), sizes.found());
-                let found = Found { body, poses, correspondences, pairs, sizes_found, time_scale, config };
-                assessor.report_spread(found, hypotheses.rivals(), |limb| sizes.girth_sigma(body, limb), estimate);
-            }
-        }
+        assessor.report_spread(found, hypotheses.rivals(), |limb| sizes.girth_sigma(body, limb), estimate);
     }
 }
 

@@ -6,8 +6,10 @@
 //! Every unknown of the chain also remembers how well it was known, and by how much it may have moved since: what nothing
 //! measures grows more uncertain with every frame.
 
+mod by_edges;
 mod covariances;
 
+pub use by_edges::ByEdges;
 pub use covariances::Covariances;
 
 use crate::association::correspondence::Correspondences;

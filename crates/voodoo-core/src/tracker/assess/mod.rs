@@ -11,6 +11,7 @@
 //! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
 //! body is called tracked of which more than a quarter of the limbs is not measured.
 
+mod edges;
 mod exclusive;
 mod limb_history;
 mod spread;
@@ -23,7 +24,7 @@ use crate::body::{Body, Model};
 use crate::fit::{Context, Matched};
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
-use crate::uncertainty::Uncertainty;
+use crate::uncertainty::{ByEdges, Uncertainty};
 use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
@@ -60,6 +61,9 @@ pub(super) struct Assessor {
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
     uncertainty: Uncertainty,
+    edges: ByEdges,
+    /// Of every limb whether edges told where it is; empty where they are not all there is.
+    sure: Vec<bool>,
 }
 
 impl Assessor {
@@ -153,6 +157,7 @@ impl Assessor {
             return;
         }
         statuses.extend_from_slice(&self.internal);
+        self.doubt_by_edges(&model.extremities, statuses);
         // A body that is lost altogether has no limb that is not.
         if statuses.iter().any(|status| *status != LimbStatus::Lost) {
             for chain in &model.extremities {
@@ -161,8 +166,9 @@ impl Assessor {
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
             }
         }
-        let doubtful = self.status == Status::Tracking && measured_share(statuses) < TRACKED;
-        estimate.status = if doubtful { Status::Degraded } else { self.status };
+        let status = if self.told_by_edges() { overall(statuses) } else { self.status };
+        let doubtful = status == Status::Tracking && measured_share(statuses) < TRACKED;
+        estimate.status = if doubtful { Status::Degraded } else { status };
     }
 
     fn forget_limbs(&mut self) {

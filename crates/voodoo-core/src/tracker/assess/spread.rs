@@ -29,6 +29,7 @@ impl Assessor {
     /// Reports that nothing was measured of a pose that was set.
     pub(in crate::tracker) fn forget_spread(&mut self, body: &Body, estimate: &mut Estimate) {
         self.uncertainty.forget();
+        self.forget_edges();
         estimate.covariances.forget(body);
     }
 }

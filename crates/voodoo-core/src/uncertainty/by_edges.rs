@@ -1,0 +1,225 @@
+//! How far limbs may be off where pictures are all that shows them: what their edges have told, from frame to frame.
+//!
+//! An edge tells of one direction only. How far away a limb is, no camera sees; where a second one does not see it either, or
+//! from the same side, nothing does. What was known of every unknown of the chain is kept with all that ties it to others,
+//! fades as the body moves, and grows by what this frame's edges tell.
+
+use super::{MOST_UNSURE, USUAL_MOTION};
+use crate::association::correspondence::Correspondences;
+use crate::body::kinematics::freedoms;
+use crate::body::two_bone::TwoBone;
+use crate::body::{Body, Model};
+use crate::config::Config;
+use crate::math::{Pose, Vec3, factor};
+use crate::solver::{ChainSolver, SITE_SCALE, Spread};
+use crate::terms::normal_equations::NormalEquations;
+use crate::terms::{Regions, Sites, Term};
+
+/// Standard deviation of every unknown of a pose that was set, radians and metres.
+const AS_SET: f64 = 0.03;
+/// Share of what edges tell of a limb that is no part of an arm or leg: clothes hang on the trunk, hair on the head.
+const LOOSE: f64 = 0.1;
+/// What is told of a limb of which no line speaks: so little.
+const LEAST_TOLD: f64 = 1e-3;
+
+/// What is known of a pose, from frame to frame.
+#[derive(Debug, Default)]
+pub struct ByEdges {
+    normal: NormalEquations,
+    system: ChainSolver,
+    spread: Spread,
+    /// Information of all unknowns after the last frame, lower triangle.
+    known: Vec<f64>,
+    /// How much says of each that it has not moved, and working memory.
+    still: Vec<f64>,
+    factored: Vec<f64>,
+    solved: Vec<f64>,
+    /// Of every limb's far end, metres; empty before the first frame.
+    sigma: Vec<f64>,
+}
+
+impl ByEdges {
+    /// Nothing is known of the pose that comes next but that it was set.
+    pub fn forget(&mut self) {
+        self.known.clear();
+        self.sigma.clear();
+    }
+
+    /// Standard deviation of where a limb ends, metres, after the last frame; infinite where that is not known.
+    pub fn end_sigma(&self, limb: usize) -> f64 {
+        self.sigma.get(limb).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// Takes what was matched at `poses`, so many times 1/30 s after the last frame.
+    pub fn observe(
+        &mut self,
+        model: &Model,
+        poses: &[Pose],
+        correspondences: &Correspondences,
+        time_scale: f64,
+        config: &Config,
+    ) {
+        let body = &model.body;
+        self.expect(body, time_scale);
+        self.sum_terms(body, &model.extremities, poses, correspondences, config);
+        let Self { normal, system, spread, known, sigma, .. } = self;
+        sigma.clear();
+        if !system.factor_added(body, normal, poses, known) {
+            know_alone(known, self.still.len(), MOST_UNSURE);
+            return;
+        }
+        for (limb, part) in body.limbs().iter().enumerate() {
+            let end = poses[limb] * (part.shape.length() * Vec3::Z);
+            let end = spread.of_limb(system, limb, end);
+            sigma.push((3..6).map(|axis| end[(axis, axis)]).sum::<f64>().sqrt());
+        }
+    }
+
+    /// What was known fades: every joint may have moved, the root as far as anything can.
+    fn expect(&mut self, body: &Body, time_scale: f64) {
+        let Self { known, still, factored, solved, .. } = self;
+        still.clear();
+        for limb in body.limbs() {
+            let sigma = limb.parent.as_ref().map_or(MOST_UNSURE, |(_, joint)| USUAL_MOTION * joint.motion * time_scale);
+            let count = limb.parent.as_ref().map_or(6, |(_, joint)| freedoms(joint));
+            still.extend((0..count).map(|_| 1.0 / (sigma * sigma)));
+        }
+        let n = still.len();
+        if known.len() != n * n {
+            know_alone(known, n, AS_SET);
+            return;
+        }
+        // (A^-1 + Q)^-1 = A - A (A + Q^-1)^-1 A, with A + Q^-1 = L^T L and L^T Y = A: A - Y^T Y.
+        factored.clone_from(known);
+        factored.iter_mut().step_by(n + 1).zip(&*still).for_each(|(value, still)| *value += still);
+        solved.clear();
+        solved.extend((0..n * n).map(|index| known[(index / n).max(index % n) * n + (index / n).min(index % n)]));
+        if !factor(factored, n) {
+            know_alone(known, n, MOST_UNSURE);
+            return;
+        }
+        for row in (0..n).rev() {
+            let (before, rest) = solved.split_at_mut(row * n);
+            let own = &mut rest[..n];
+            own.iter_mut().for_each(|value| *value /= factored[row * n + row]);
+            for (other, values) in before.chunks_exact_mut(n).enumerate() {
+                let share = factored[row * n + other];
+                if share != 0.0 {
+                    values.iter_mut().zip(&*own).for_each(|(value, own)| *value -= share * own);
+                }
+            }
+            for (index, values) in known.chunks_exact_mut(n).enumerate() {
+                let share = own[index];
+                values[..=index].iter_mut().zip(&*own).for_each(|(value, own)| *value -= share * own);
+            }
+        }
+    }
+
+    /// What the frame tells of every limb, by how much of what it shows speaks for it.
+    fn sum_terms(
+        &mut self,
+        body: &Body,
+        extremities: &[TwoBone],
+        poses: &[Pose],
+        correspondences: &Correspondences,
+        config: &Config,
+    ) {
+        let normal = &mut self.normal;
+        normal.clear(poses.len());
+        Regions { pairs: &correspondences.regions }.add(body, poses, normal);
+        for (limb, block) in normal.limbs.iter_mut().enumerate() {
+            let said =
+                correspondences.region_support.get(limb).map_or(0.0, |support| support.own[0] - support.against[0]);
+            let told = (said.max(0.0) * said).max(LEAST_TOLD);
+            let loose = extremities.iter().flat_map(TwoBone::limbs).all(|other| other != limb);
+            block.h *= if loose { LOOSE * told } else { told };
+        }
+        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        Sites { correspondences, information, scale: SITE_SCALE, biased: true }.add(body, poses, normal);
+    }
+}
+
+/// Every one of `n` unknowns is known by itself.
+fn know_alone(known: &mut Vec<f64>, n: usize, sigma: f64) {
+    known.clear();
+    known.resize(n * n, 0.0);
+    known.iter_mut().step_by(n + 1).for_each(|value| *value = 1.0 / (sigma * sigma));
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::association::correspondence::{RegionPair, RegionSupport};
+    use crate::testing::standing;
+
+    /// Edges of all limbs that cameras see which look at right angles to `normals`; all of them speak for their limb, or none.
+    fn edges(model: &Model, poses: &[Pose], normals: &[Vec3], own: f64) -> Correspondences {
+        let mut found = Correspondences::default();
+        for (limb, part) in model.body.limbs().iter().enumerate() {
+            for (step, normal) in (0..8).flat_map(|step| normals.iter().map(move |normal| (step, *normal))) {
+                let x = poses[limb] * (f64::from(step) / 7.0 * part.shape.length() * Vec3::Z);
+                found.regions.push(RegionPair { limb, x, normal, distance: 0.0, information: 1e4, source: 0 });
+            }
+            found.region_support.push(RegionSupport { own: [own; 2], ..RegionSupport::default() });
+        }
+        found
+    }
+
+    /// Standard deviations of a forearm's end in frames of such edges.
+    fn sigmas(frames: &[(&[Vec3], f64)]) -> Vec<f64> {
+        let (model, poses) = standing();
+        let lower = model.extremities[crate::testing::first_arm(&model)].lower;
+        let mut told = ByEdges::default();
+        let observe = |(normals, own): &(&[Vec3], f64)| {
+            told.observe(&model, &poses, &edges(&model, &poses, normals, *own), 1.0, &Config::default());
+            told.end_sigma(lower)
+        };
+        frames.iter().map(observe).collect()
+    }
+
+    #[test]
+    fn what_no_camera_sees_is_known_less_from_frame_to_frame_and_at_once_when_one_does() {
+        let (two, one): (&[Vec3], &[Vec3]) = (&Vec3::AXES, &[Vec3::X, Vec3::Y]);
+        let both = sigmas(&[(two, 1.0); 20]);
+        assert!(both.iter().all(|sigma| *sigma < 0.05), "{both:?}");
+        let told = sigmas(&[&[(two, 1.0)][..], &[(one, 1.0); 18], &[(two, 1.0)]].concat());
+        assert!((2..19).all(|frame| told[frame] >= told[frame - 1] - 1e-9), "{told:?}");
+        assert!(told[18] > 3.0 * both[18] && told[19] < 1.2 * both[19], "{told:?}");
+    }
+
+    #[test]
+    fn edges_that_do_not_speak_for_their_limb_tell_little() {
+        let normals: &[Vec3] = &Vec3::AXES;
+        let [sure, doubtful] = [1.0, 0.0].map(|own| sigmas(&[(normals, own); 10])[9]);
+        assert!(doubtful > 2.0 * sure, "{doubtful} {sure}");
+    }
+
+    #[test]
+    fn what_was_known_fades_as_the_dense_inverse_says() {
+        let (model, poses) = standing();
+        let mut told = ByEdges::default();
+        let found = edges(&model, &poses, &[Vec3::X, Vec3::Z], 0.7);
+        told.observe(&model, &poses, &found, 1.0, &Config::default());
+        let n = told.still.len();
+        let whole = |known: &[f64]| DMatrix::from_fn(n, n, |i, j| known[i.max(j) * n + i.min(j)]);
+        let before = whole(&told.known);
+        told.expect(&model.body, 2.0);
+        let moved = DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 / told.still[i] } else { 0.0 });
+        let expected = (before.try_inverse().unwrap() + moved).try_inverse().unwrap();
+        assert!((whole(&told.known) - &expected).amax() < 1e-6 * expected.amax());
+    }
+
+    #[test]
+    fn nothing_is_known_before_the_first_frame() {
+        let mut told = ByEdges::default();
+        assert_eq!(told.end_sigma(0), f64::INFINITY);
+        let (model, poses) = standing();
+        told.observe(&model, &poses, &edges(&model, &poses, &[Vec3::X], 1.0), 1.0, &Config::default());
+        assert!(told.end_sigma(0) < 0.1);
+        told.forget();
+        assert_eq!(told.end_sigma(0), f64::INFINITY);
+    }
+}
