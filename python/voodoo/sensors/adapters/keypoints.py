@@ -35,8 +35,7 @@ class KeypointsAdapter(Adapter[KeypointImage]):
             "camera": item.camera,
             "world_from_sensor": item.root_from_sensor,
         }
-        alone = len(item.people) == 1
-        person = item.people[0] if alone else nearest_person(item.people, predicted=context.predicted, **place)
+        person = nearest_person(item.people, predicted=context.predicted, **place)
         if person is None:
             context.memory.put(self.kind, item.sensor, KeypointReport())
             return
