@@ -4,10 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+import voodoo._core as _core
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo.sensors.body_view import BodyView, body_view
 from voodoo.sensors.skin.hands import FINGERS_M, of_pieces, to_palm
-from voodoo.sensors.skin.regions import candidates, joined
+from voodoo.sensors.skin.regions import LONGEST_JOINED, candidates
 from voodoo.sensors.skin.tracker import SkinTracker
 
 
@@ -42,7 +43,7 @@ def test_what_a_shadow_parts_is_one_hand_and_arms_stay_apart():
     mask = np.zeros((240, 320), bool)
     mask[100:108, 100:108] = mask[110:118, 100:108] = True  # palm and fingers
     mask[100:150, 200:208] = mask[100:150, 210:218] = True  # two forearms
-    _, regions = candidates(joined(mask, palm_px=5.4), palm_px=5.4)
+    _, regions = candidates(_core.joined_mask(mask, longest=LONGEST_JOINED * 5.4), palm_px=5.4)
     assert regions[104, 104] == regions[114, 104] != 0
     assert regions[120, 204] != regions[120, 214]
 

@@ -19,7 +19,8 @@ PALM_M, FACE_M = 0.045, 0.085
 LONGEST_HAND = 4.6
 """A hand with stretched fingers in radii of its palm."""
 LONGEST_JOINED = 3.0
-"""Regions no longer than this, in radii of a palm, may be parts of one hand."""
+"""Regions no longer than this, in radii of a palm, may be parts of one hand: a shadow between the fingers and the palm does not
+make two of it. Arms that lie near each other stay apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +38,6 @@ class Candidate:
     region: int
     area: int
     hand: bool = True
-
-
-def joined(skin: Mask, *, palm_px: float) -> Mask:
-    """The mask (H, W) with gaps of two pixels closed between regions no longer than half a hand: a shadow between the fingers
-    and the palm does not make two hands of one. Arms that lie near each other stay apart.
-
-    Args:
-        skin: True where the colour is skin's.
-        palm_px: radius of a palm in the image [px].
-    """
-    return _core.joined_mask(skin, longest=LONGEST_JOINED * palm_px)
 
 
 def candidates(skin: Mask, *, palm_px: float) -> tuple[list[Candidate], Labels]:
