@@ -109,13 +109,29 @@ def witness(
 
 def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArray:
     """Which points (N, 3) lie within a capsule of CAPSULES; segments without both joints are left out."""
+    known = [
+        (joints[start], joints[end], radius)
+        for start, end, radius in CAPSULES
+        if start in joints and end in joints and np.isfinite([joints[start], joints[end]]).all()
+    ]
     near = np.zeros(len(points), dtype=bool)
-    for start, end, radius in CAPSULES:
-        if start in joints and end in joints and np.isfinite([joints[start], joints[end]]).all():
-            a, axis = joints[start], joints[end] - joints[start]
-            t = np.clip((points - a) @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
-            near |= np.linalg.norm(points - a - t[:, None] * axis, axis=1) <= radius
+    if not known:
+        return near
+    # Most of an image is far from everybody.
+    low = np.min([np.minimum(a, b) - radius for a, b, radius in known], axis=0)
+    high = np.max([np.maximum(a, b) + radius for a, b, radius in known], axis=0)
+    inside = np.flatnonzero(_in_box(points, low, high))
+    about = points[inside]
+    for a, b, radius in known:
+        axis, offset = b - a, about - a
+        t = np.clip(offset @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
+        near[inside] |= np.linalg.norm(offset - t[:, None] * axis, axis=1) <= radius
     return near
+
+
+def _in_box(points: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
+    x, y, z = ((points[:, axis] >= low[axis]) & (points[:, axis] <= high[axis]) for axis in range(3))
+    return np.asarray(x & y & z)
 
 
 def _select(
@@ -132,7 +148,7 @@ def _select(
     rings = [transform(estimate.world_from_limb[limb.name], limb_rings(limb.shape)) for limb in body.limbs]
     corners = np.concatenate(rings).reshape(-1, 3)
     low, high = corners.min(axis=0) - _BOX_MARGIN_M, corners.max(axis=0) + _BOX_MARGIN_M
-    return np.asarray(((points >= low) & (points <= high)).all(axis=1))
+    return _in_box(points, low, high)
 
 
 def _overlap(depth: DepthImage, person: BoolArray, body: Body, estimate: Estimate) -> float:

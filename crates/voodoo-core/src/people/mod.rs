@@ -19,7 +19,7 @@ use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
 use crate::observation::share::NOBODY;
-use crate::relocalize::sized;
+use crate::relocalize::{SAME_PERSON, sized};
 use crate::tracker::Tracker;
 use claims::{Claimant, Claims};
 use clothes::Clothes;
@@ -245,7 +245,7 @@ impl People {
     /// Those who are believed to be persons get a tracker: their own when they are somebody who was there. Who they are is asked
     /// together with all others who are seen.
     fn welcome(&mut self, frame: &Frame, believed: &[Stranger]) {
-        let absent: Vec<usize> = (0..self.persons.len()).filter(|number| !self.persons[*number].tracked()).collect();
+        let absent: Vec<usize> = (0..self.persons.len()).filter(|number| self.may_be(*number, believed)).collect();
         if !absent.is_empty() {
             self.detect(frame, Wanted::All);
             self.strangers.leave_out(believed);
@@ -272,6 +272,15 @@ impl People {
                 self.persons.iter_mut().for_each(|person| person.there &= person.tracked());
             }
         }
+    }
+
+    /// Whether one of the strangers may be this person: who is away, and who follows less than what such a stranger shows beside
+    /// them.
+    fn may_be(&self, number: usize, strangers: &[Stranger]) -> bool {
+        let person = &self.persons[number];
+        let beside = |stranger: &&Stranger| stranger.place.distance(person.place) < SAME_PERSON;
+        let shown = strangers.iter().filter(beside).map(|stranger| stranger.pixels.len()).max();
+        !person.tracked() || shown.is_some_and(|shown| self.claims.explained(number) < shown)
     }
 
     /// What a stranger wears.
