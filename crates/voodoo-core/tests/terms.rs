@@ -8,8 +8,9 @@ use voodoo_core::association::correspondence::{ContourPair, Correspondences, Lim
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Vec3};
+use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
-use voodoo_core::terms::{Contour, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
+use voodoo_core::terms::{Contour, Floor, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
 
 /// Compares the analytic gradient with differences of the cost; `evaluate` fills the system at given poses. Where the cost has a
 /// kink, as where two limbs begin to touch, the gradient lies between the differences to both sides; elsewhere these agree.
@@ -158,6 +159,25 @@ proptest! {
         normal.clear(poses.len());
         term.add(&body, &poses, &mut normal);
         prop_assert!(normal.limbs[forearm].g.norm() > 1e-3, "the overlap is not felt");
+    }
+
+    #[test]
+    fn floor(angles in angles(), tilt in -0.3..0.3_f64) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = random_pose(&body, &angles);
+        // The middle of the body is in the floor: some limbs end above it, some below.
+        let normal = Vec3::new(tilt.sin(), 0.0, tilt.cos());
+        let term = Floor { plane: Ground { normal, offset: normal.dot(poses[0].translation) }, sigma: 1.0 };
+        check(&body, &poses, &|poses, normal| term.add(&body, poses, normal))?;
+        let mut system = NormalEquations::default();
+        system.clear(poses.len());
+        term.add(&body, &poses, &mut system);
+        for (limb, part) in body.limbs().iter().enumerate() {
+            let height = term.plane.height(poses[limb] * (Vec3::Z * part.shape.length()));
+            let push = system.limbs[limb].g;
+            // What is above feels nothing.
+            prop_assert_eq!(height < 0.0, push.norm() > 0.0);
+        }
     }
 
     #[test]

@@ -276,8 +276,9 @@ fn problem<'a>(
     predicted: &'a [Pose],
     step: usize,
 ) -> Problem<'a> {
-    let Context { config, model, time_scale, .. } = context;
-    Problem { body: &model.body, correspondences, predicted, step, time_scale, config }
+    let Context { config, model, seen, time_scale, .. } = context;
+    let floor = seen.floor();
+    Problem { body: &model.body, correspondences, predicted, floor, step, time_scale, config }
 }
 
 #[cfg(test)]

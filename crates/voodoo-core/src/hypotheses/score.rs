@@ -7,6 +7,7 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
+use crate::observation::frame::Ground;
 use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
 
@@ -14,7 +15,7 @@ use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
 /// are soft; a joint may turn by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
-/// How deep (metres) a place of an axis lies in another limb when it is inside: surfaces touch.
+/// How deep (metres) a place of an axis lies in another limb, or below the floor, when there is no room for it: surfaces touch.
 const INSIDE: f64 = 0.01;
 /// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
 const ROUGHLY: f64 = 0.08;
@@ -70,11 +71,11 @@ pub fn strain(context: Context, matched: Matched, chain: &TwoBone, poses: &[Pose
             cost += moved * moved;
         }
     }
-    cost + overlap_cost(body, chain, poses) + extremity_landmark_cost(matched, chain, poses)
+    cost + overlap_cost(body, context.seen.floor(), chain, poses) + extremity_landmark_cost(matched, chain, poses)
 }
 
-/// Patches of an arm or leg whose axis lies inside another limb: there is no room for it.
-fn overlap_cost(body: &Body, chain: &TwoBone, poses: &[Pose]) -> f64 {
+/// Patches of an arm or leg whose axis lies inside another limb or below the floor: there is no room for it.
+fn overlap_cost(body: &Body, floor: Option<Ground>, chain: &TwoBone, poses: &[Pose]) -> f64 {
     let mut cost = 0.0;
     for limb in chain.limbs() {
         let shape = &body.limbs()[limb].shape;
@@ -83,13 +84,15 @@ fn overlap_cost(body: &Body, chain: &TwoBone, poses: &[Pose]) -> f64 {
         let first = if limb == chain.upper { 2 } else { 0 };
         for place in &ALONG_LIMB[first..] {
             let point = poses[limb] * Vec3::new(0.0, 0.0, place * shape.length());
-            let within = (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
-                let shape = &body.limbs()[other].shape;
-                // Most limbs are too far away to hold it.
-                let reach = shape.length() + shape.a0().max(shape.b0()).max(shape.a1()).max(shape.b1());
-                (point - poses[other].translation).length_squared() < reach * reach
-                    && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -INSIDE
-            });
+            let below = floor.is_some_and(|floor| floor.height(point) < -INSIDE);
+            let within = below
+                || (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
+                    let shape = &body.limbs()[other].shape;
+                    // Most limbs are too far away to hold it.
+                    let reach = shape.length() + shape.a0().max(shape.b0()).max(shape.a1()).max(shape.b1());
+                    (point - poses[other].translation).length_squared() < reach * reach
+                        && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -INSIDE
+                });
             cost += if within { patches / ALONG_LIMB.len() as f64 } else { 0.0 };
         }
     }
@@ -225,12 +228,12 @@ mod tests {
     fn an_arm_inside_the_trunk_costs_its_patches_and_one_beside_it_nothing() {
         let (model, poses) = standing();
         let (body, chain) = (&model.body, &model.extremities[first_arm(&model)]);
-        assert_eq!(overlap_cost(body, chain, &poses), 0.0);
-        assert_eq!(overlap_cost(body, chain, &raised(&model, &poses, 0.2).0), 0.0);
+        assert_eq!(overlap_cost(body, None, chain, &poses), 0.0);
+        assert_eq!(overlap_cost(body, None, chain, &raised(&model, &poses, 0.2).0), 0.0);
         let mut inside = poses.clone();
         let middle = 0.5 * (poses[0].translation + chain.root(body, &poses));
         chain.reach(body, &mut inside, middle, 0.0);
-        let cost = overlap_cost(body, chain, &inside);
+        let cost = overlap_cost(body, None, chain, &inside);
         assert!(cost > 10.0, "{cost} patches");
     }
 

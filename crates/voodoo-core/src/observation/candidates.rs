@@ -61,7 +61,7 @@ impl Candidates {
         self.source.clear();
         self.cameras.clear();
         let (up, floor) = match frame.ground {
-            Some(ground) => (ground.normal, ground.offset + config.ground_clearance - ground.normal.dot(origin)),
+            Some(ground) => (ground.normal, ground.about(origin).offset + config.ground_clearance),
             None => (Vec3::ZERO, -1.0),
         };
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);

@@ -183,6 +183,18 @@ pub struct Ground {
     pub offset: f64,
 }
 
+impl Ground {
+    /// The same floor where `origin`, a place in the world, is the origin.
+    pub fn about(self, origin: Vec3) -> Self {
+        Self { offset: self.offset - self.normal.dot(origin), ..self }
+    }
+
+    /// Height of a point above the floor, metres.
+    pub fn height(&self, point: Vec3) -> f64 {
+        self.normal.dot(point) - self.offset
+    }
+}
+
 /// All measurements of one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {

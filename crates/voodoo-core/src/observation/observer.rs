@@ -3,7 +3,7 @@
 use super::background::{Backgrounds, OTHERS};
 use super::candidates::{Candidates, body_box};
 use super::depth_view::{DepthViews, find_segmented};
-use super::frame::Frame;
+use super::frame::{Frame, Ground};
 use super::share::Share;
 use crate::body::Body;
 use crate::config::Config;
@@ -27,6 +27,11 @@ impl<'a> Observation<'a> {
     /// The working frame's origin in the world.
     pub fn origin(&self) -> Vec3 {
         self.views.origin
+    }
+
+    /// The floor in the working frame, where it is known.
+    pub fn floor(&self) -> Option<Ground> {
+        self.frame().ground.map(|ground| ground.about(self.origin()))
     }
 
     /// The same frame with other candidates.

@@ -81,8 +81,9 @@ impl Segments {
             self.samples.retain(|sample| !inside(sample));
         }
         if let Some(ground) = frame.ground {
-            let floor = ground.offset + config.ground_clearance - ground.normal.dot(origin);
-            self.samples.retain(|sample| ground.normal.dot(Vec3::from_array(sample.point.map(f64::from))) >= floor);
+            let floor = ground.about(origin);
+            let height = |point: [f32; 3]| floor.height(Vec3::from_array(point.map(f64::from)));
+            self.samples.retain(|sample| height(sample.point) >= config.ground_clearance);
         }
         // Sorting without memory of its own keeps no order of equals, but sums must be the same on every run.
         self.samples.sort_unstable_by(|a, b| {

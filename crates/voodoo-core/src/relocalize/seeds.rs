@@ -111,7 +111,7 @@ fn place(
         Height::Ground => {
             let origin = context.seen.origin();
             let ground = context.seen.frame().ground;
-            ground.map(|ground| ground.offset - ground.normal.dot(origin) - extent.low)?
+            ground.map(|ground| ground.about(origin).offset - extent.low)?
         }
     };
     Some(Pose::from_parts(postures.level(across) + up * rise, (turn * root).normalize()))

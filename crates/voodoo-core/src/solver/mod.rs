@@ -22,6 +22,7 @@ use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Pair};
 use crate::config::{Config, SolverKind};
 use crate::math::Pose;
+use crate::observation::frame::Ground;
 
 /// Largest turn of a joint or limb in one step, radians: linearised rows hold no farther.
 const LARGEST_TURN: f64 = 0.5;
@@ -39,6 +40,8 @@ pub struct Problem<'a> {
     pub correspondences: &'a Correspondences,
     /// The poses expected before the frame was seen.
     pub predicted: &'a [Pose],
+    /// The floor, working frame, where it is known.
+    pub floor: Option<Ground>,
     /// Index of the step in its frame.
     pub step: usize,
     /// Seconds since the last frame, as multiples of 1/30 s; the standard deviations of motion grow with it.

@@ -10,9 +10,9 @@ use crate::body::Pair;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
+use crate::terms::{Contour, Floor, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
 
-/// Standard deviation of an axis that lies in another limb, metres.
+/// Standard deviation of an axis that lies in another limb or below the floor, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
 const ROUGH: f64 = 0.35;
@@ -108,8 +108,9 @@ impl WholeBody {
         let prior = Prior { predicted, root, joints: &self.joint_sigmas, still_gain };
         let limits = Limits { sigma: LIMIT_SIGMA };
         let penetration = Penetration { sigma: OVERLAP_SIGMA };
+        let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The objective: one more term is a file and a line here.
-        let terms: [Option<&dyn Term>; 7] = [
+        let terms: [Option<&dyn Term>; 8] = [
             Some(&surface),
             Some(&sites),
             Some(&contour),
@@ -117,6 +118,7 @@ impl WholeBody {
             Some(&prior),
             config.limits.then_some(&limits),
             config.penetration.then_some(&penetration),
+            floor.as_ref().filter(|_| config.penetration).map(|floor| floor as &dyn Term),
         ];
         self.normal.clear(poses.len());
         for term in terms.into_iter().flatten() {

@@ -1,6 +1,7 @@
 //! The energy: each term adds to the same normal equations. The list of files is the objective.
 
 mod contour;
+mod floor;
 mod limits;
 pub mod normal_equations;
 mod penetration;
@@ -10,6 +11,7 @@ mod sites;
 mod surface;
 
 pub use contour::Contour;
+pub use floor::Floor;
 pub use limits::Limits;
 pub use penetration::Penetration;
 pub use prior::Prior;

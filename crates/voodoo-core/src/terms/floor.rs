@@ -1,0 +1,31 @@
+//! Nobody stands in the floor: the ends of limbs stay above it. Soft, as limbs are among each other: the floor may be told or seen a
+//! little wrong.
+
+use super::Term;
+use crate::body::Body;
+use crate::math::{Pose, Vec3};
+use crate::observation::frame::Ground;
+use crate::terms::normal_equations::{NormalEquations, line};
+
+/// One-sided: `r = max(0, -height)` for the distal end of every limb's axis.
+#[derive(Debug)]
+pub struct Floor {
+    /// The floor, in the frame of the poses.
+    pub plane: Ground,
+    /// Standard deviation of the depth below it, metres.
+    pub sigma: f64,
+}
+
+impl Term for Floor {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
+        let weight = 1.0 / (self.sigma * self.sigma);
+        for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
+            let end = *pose * (Vec3::Z * limb.shape.length());
+            let depth = -self.plane.height(end);
+            if depth > 0.0 {
+                normal.cost += weight * depth * depth;
+                normal.limbs[index].add_row(weight, &-line(end, self.plane.normal), depth);
+            }
+        }
+    }
+}
