@@ -19,47 +19,55 @@ pub fn closed(mask: &[u8], width: usize) -> Vec<u8> {
 
 /// Joins every pixel with all those within `reach` rows and columns; what is outside the picture does not count.
 fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) -> Vec<u8> {
-    let height = mask.len().checked_div(width).unwrap_or(0);
-    let (mut row, mut found) = (vec![0; width], vec![0; mask.len()]);
-    widest(
+    by_rows(
+        mask,
+        width,
         #[inline(always)]
-        || {
-            for (index, found) in found.chunks_exact_mut(width.max(1)).enumerate() {
-                row.copy_from_slice(&mask[index * width..][..width]);
-                let (first, last) = (index.saturating_sub(reach), (index + reach).min(height - 1));
-                for other in (first..index).chain(index + 1..=last) {
-                    row.iter_mut().zip(&mask[other * width..][..width]).for_each(|(a, b)| *a = join(*a, *b));
-                }
-                found.copy_from_slice(&row);
-                for apart in 1..=reach.min(width - 1) {
-                    found[apart..].iter_mut().zip(&row).for_each(|(a, b)| *a = join(*a, *b));
-                    found.iter_mut().zip(&row[apart..]).for_each(|(a, b)| *a = join(*a, *b));
-                }
+        |index, row, found| {
+            row.copy_from_slice(&mask[index * width..][..width]);
+            let last = (index + reach).min(mask.len() / width - 1);
+            for other in (index.saturating_sub(reach)..index).chain(index + 1..=last) {
+                row.iter_mut().zip(&mask[other * width..][..width]).for_each(|(a, b)| *a = join(*a, *b));
+            }
+            found.copy_from_slice(row);
+            for apart in 1..=reach.min(width - 1) {
+                found[apart..].iter_mut().zip(&*row).for_each(|(a, b)| *a = join(*a, *b));
+                found.iter_mut().zip(&row[apart..]).for_each(|(a, b)| *a = join(*a, *b));
             }
         },
-    );
-    found
+    )
 }
 
 /// What most of each pixel and its eight neighbours are; beyond the border a picture goes on as it ends.
 pub fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
-    let height = mask.len().checked_div(width).unwrap_or(0);
+    by_rows(
+        mask,
+        width,
+        #[inline(always)]
+        |index, row, found| {
+            let line = |other: usize| &mask[other.min(mask.len() / width - 1) * width..][..width];
+            let rows = line(index.saturating_sub(1)).iter().zip(line(index)).zip(line(index + 1));
+            row.iter_mut().zip(rows).for_each(|(sum, ((a, b), c))| *sum = a + b + c);
+            if let (Some(inner), Some(second), Some(third)) = (found.get_mut(1..), row.get(1..), row.get(2..)) {
+                for (((found, a), b), c) in inner.iter_mut().zip(&*row).zip(second).zip(third) {
+                    *found = u8::from(a + b + c > 4);
+                }
+            }
+            let end = width - 1;
+            found[0] = u8::from(2 * row[0] + row[end.min(1)] > 4);
+            found[end] = u8::from(2 * row[end] + row[end.saturating_sub(1)] > 4);
+        },
+    )
+}
+
+/// A mask made row by row: `make` gets the number of a row, working memory for one, and the row to fill.
+fn by_rows(mask: &[u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mut [u8])) -> Vec<u8> {
     let (mut row, mut found) = (vec![0; width], vec![0; mask.len()]);
     widest(
         #[inline(always)]
         || {
             for (index, found) in found.chunks_exact_mut(width.max(1)).enumerate() {
-                let line = |other: usize| &mask[other.min(height - 1) * width..][..width];
-                let rows = line(index.saturating_sub(1)).iter().zip(line(index)).zip(line(index + 1));
-                row.iter_mut().zip(rows).for_each(|(sum, ((a, b), c))| *sum = a + b + c);
-                if let (Some(inner), Some(second), Some(third)) = (found.get_mut(1..), row.get(1..), row.get(2..)) {
-                    for (((found, a), b), c) in inner.iter_mut().zip(&row).zip(second).zip(third) {
-                        *found = u8::from(a + b + c > 4);
-                    }
-                }
-                let end = width - 1;
-                found[0] = u8::from(2 * row[0] + row[end.min(1)] > 4);
-                found[end] = u8::from(2 * row[end] + row[end.saturating_sub(1)] > 4);
+                make(index, &mut row, found);
             }
         },
     );
