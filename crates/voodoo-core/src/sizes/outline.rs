@@ -6,7 +6,7 @@ use super::girth::{
     ALIKE, GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel,
 };
 use crate::association::correspondence::RegionPair;
-use crate::body::Model;
+use crate::body::{Body, Model};
 use crate::fit::{Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
@@ -20,6 +20,8 @@ const AXIS_SIGMA: f64 = 0.02;
 
 /// What anthropometry leaves open of the length of hands, feet and heads, metres.
 const TIP_SIGMA: f64 = 0.03;
+/// What it leaves open of a limb's length where those of the others are known, as a share.
+const PROPORTION_SIGMA: f64 = 0.05;
 
 /// What is known of the surface of one limb.
 #[derive(Clone, Copy, Debug)]
@@ -198,13 +200,61 @@ impl Outlines {
     }
 }
 
-/// Gives both limbs of a pair the mean of their lengths: in contours alone, a wrong start shows for long.
+/// Gives both limbs of a pair one length: in contours alone, a wrong start shows for long. That is the mean of theirs, and the
+/// less they are alike, the more what they would be by the others: how unlike pairs are tells how far off the start is.
 fn level_pairs(model: &mut Model, poses: &mut [Pose]) {
-    for pair in model.body.pairs().iter().filter(|pair| pair.len() == 2) {
-        let lengths = [0, 1].map(|side| model.body.limbs()[pair[side]].shape.length());
-        for (limb, length) in pair.iter().zip(lengths) {
-            model.body.change_length(*limb, 0.5 * (lengths[0] + lengths[1]) / length);
+    let length = |body: &Body, limb: usize| body.limbs()[limb].shape.length();
+    let pairs: Vec<_> = model.body.pairs().into_iter().filter(|pair| pair.len() == 2).collect();
+    let [mut off, mut sum, mut usual] = [0.0; 3];
+    for pair in &pairs {
+        let [one, other] = [0, 1].map(|side| length(&model.body, pair[side]));
+        off += (one - other).powi(2) / pairs.len() as f64;
+        sum += 0.5 * (one + other);
+        usual += length(&model.reference_body, pair[0]);
+    }
+    // The variance of the difference of two is four times that of their mean.
+    let off = 0.25 * off;
+    for pair in &pairs {
+        let [one, other] = [0, 1].map(|side| length(&model.body, pair[side]));
+        let wanted = length(&model.reference_body, pair[0]) * sum / usual;
+        let share = off / (off + (PROPORTION_SIGMA * wanted).powi(2));
+        let length = 0.5 * (one + other) * (1.0 - share) + wanted * share;
+        for (limb, before) in pair.iter().zip([one, other]) {
+            model.body.change_length(*limb, length / before);
         }
     }
     model.body.close_joints(poses);
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::testing::standing;
+
+    /// Mean error of lengths, as a share, of a start whose arms and legs have lengths off by `shares`, left and right.
+    fn off(shares: [[f64; 2]; 4]) -> f64 {
+        let (mut model, mut poses) = standing();
+        let true_body = model.body.clone();
+        let limb = |name: &str| true_body.limb_index(name).unwrap();
+        for (name, shares) in ["upperarm", "forearm", "thigh", "calf"].iter().zip(shares) {
+            for (side, share) in ["l", "r"].iter().zip(shares) {
+                model.body.change_length(limb(&format!("{side}_{name}")), 1.0 + share);
+            }
+        }
+        level_pairs(&mut model, &mut poses);
+        let ratio = |name: &str| {
+            let length = |body: &Body| body.limbs()[limb(name)].shape.length();
+            (length(&model.body) / length(&true_body) - 1.0).abs()
+        };
+        ["l_upperarm", "l_forearm", "l_thigh", "l_calf"].iter().map(|name| ratio(name) / 4.0).sum()
+    }
+
+    #[test]
+    fn the_less_alike_pairs_are_the_more_are_lengths_those_of_proportion() {
+        let alike = [[0.15, 0.15], [-0.1, -0.1], [0.05, 0.05], [-0.1, -0.1]];
+        assert!((off(alike) - 0.1).abs() < 1e-9, "a person may have such limbs");
+        let unlike = [[-0.3, 0.0], [-0.1, 0.2], [0.2, 0.0], [0.0, -0.2]];
+        assert!(off(unlike) < 0.06, "{}; the means alone are 0.1 off", off(unlike));
+    }
 }
