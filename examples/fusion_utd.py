@@ -45,7 +45,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth",), depth_filter=None))
     chance = np.random.default_rng(11)
     gate, predictor = SiteGate(), SitePredictor()
-    predictor.update(float("nan"), tracker.estimate.joints)
+    predictor.update(float("nan"), tracker.estimate.joint_names, tracker.estimate.joint_positions)
     noise, model = PixelNoise(pixels=NOISE_PX), SensorModel()
     found = np.empty((len(recording), len(reference.names), 3))
     for index, recorded in enumerate(recording):
@@ -72,7 +72,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
             ]
             add_rays(frame, seen, model=model)
         estimate = tracker.step(frame)
-        predictor.update(recorded.stamp, estimate.joints)
+        predictor.update(recorded.stamp, estimate.joint_names, estimate.joint_positions)
         found[index] = [estimate.joints.get(name, np.full(3, np.nan)) for name in reference.names]
     errors = joint_errors(found, reference.positions, lag=LAG)
     return {

@@ -29,8 +29,9 @@ def near(points):
 
 def moving(shift, angle=0.0, **options):
     motion = LimbMotion(velocity_share=1.0, **options)
-    motion.update(0.0, {"still": turned(0.0, (0.0, 0.0, 0.0)), "moved": turned(0.0, (0.0, 1.0, 0.0))})
-    motion.update(STEP, {"still": turned(0.0, (0.0, 0.0, 0.0)), "moved": turned(angle, np.add((0.0, 1.0, 0.0), shift))})
+    still = turned(0.0, (0.0, 0.0, 0.0))
+    motion.update(0.0, np.array([still, turned(0.0, (0.0, 1.0, 0.0))]))
+    motion.update(STEP, np.array([still, turned(angle, np.add((0.0, 1.0, 0.0), shift))]))
     return motion
 
 
@@ -57,7 +58,7 @@ def test_what_is_not_known_to_move_stays():
     late = moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, 5.0, near)
     assert late[1, 0] == pytest.approx(0.1 + 0.1 * 0.03 / STEP), "for no longer than 0.1 s"
     another_body = moving((0.03, 0.0, 0.0))
-    another_body.update(2 * STEP, {"one": np.eye(4)})
+    another_body.update(2 * STEP, np.eye(4)[None])
     assert another_body.motion_compensated(POINTS, STEP, near) is POINTS
 
 
@@ -69,9 +70,8 @@ def test_an_older_scan_is_moved_along_with_the_leg(monkeypatch):
     tracker.reset(joints=start)
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("scan",)))
     shift = np.array([0.05, 0.0, 0.0])
-    then = {name: turned(0.0, -shift) @ pose for name, pose in tracker.estimate.world_from_limb.items()}
-    front_end._motion.update(0.0, then)
-    front_end._motion.update(STEP, tracker.estimate.world_from_limb)
+    front_end._motion.update(0.0, turned(0.0, -shift) @ tracker.estimate.limb_poses)
+    front_end._motion.update(STEP, tracker.estimate.limb_poses)
     pose = turned(0.3, (0.2, 0.1, 0.35))
     legs = [tracker.estimate.world_from_limb[f"{side}_calf"][:3, 3] for side in "lr"]
     places = np.array([[leg[0] - 0.05, leg[1], 0.35] for leg in legs] + [[4.0, 0.5, 0.35]])

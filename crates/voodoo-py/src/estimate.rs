@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::PyArrayDyn;
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
 use voodoo_core::Body;
@@ -52,16 +52,16 @@ fn mapping<'py, 'a, T: IntoPyObject<'py>>(
     Ok(PyMappingProxy::new(py, dict.as_mapping()))
 }
 
-fn matrices<'py, 'a>(
-    py: Python<'py>,
-    items: impl Iterator<Item = (&'a String, &'a Mat3)>,
+/// The rows of one array by name: views, which cost less than an array each.
+fn rows<'py, 'a>(
+    names: impl IntoIterator<Item = &'a String>,
+    all: &Array<'py>,
 ) -> PyResult<Bound<'py, PyMappingProxy>> {
-    let dict = PyDict::new(py);
-    for (name, matrix) in items {
-        // Symmetric: columns are rows.
-        dict.set_item(name, frozen(py, matrix.to_cols_array().to_vec(), &[3, 3])?)?;
+    let dict = PyDict::new(all.py());
+    for (name, row) in names.into_iter().zip(0..all.shape()[0]) {
+        dict.set_item(name, all.get_item(row)?)?;
     }
-    Ok(PyMappingProxy::new(py, dict.as_mapping()))
+    Ok(PyMappingProxy::new(all.py(), dict.as_mapping()))
 }
 
 pub fn status_word(status: Status) -> &'static str {
@@ -233,30 +233,19 @@ impl PyEstimate {
     /// Position (3,) [m] of every named joint and site.
     #[getter]
     fn joints<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (py, this) = (slf.py(), slf.get());
-        let dict = PyDict::new(py);
-        for (name, site) in this.names.sites.iter().zip(&this.estimate.sites) {
-            dict.set_item(name, frozen(py, site.to_array().to_vec(), &[3])?)?;
-        }
-        Ok(PyMappingProxy::new(py, dict.as_mapping()))
+        rows(&slf.get().names.sites, &slf.get().joint_positions(slf.py())?)
     }
 
     /// Pose (4, 4) of every limb.
     #[getter]
     fn world_from_limb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (py, this) = (slf.py(), slf.get());
-        let dict = PyDict::new(py);
-        for (name, pose) in this.names.limbs.iter().zip(&this.estimate.world_from_limb) {
-            dict.set_item(name, frozen(py, matrix(pose).into_iter().flatten().collect(), &[4, 4])?)?;
-        }
-        Ok(PyMappingProxy::new(py, dict.as_mapping()))
+        rows(&slf.get().names.limbs, &slf.get().limb_poses(slf.py())?)
     }
 
     /// Covariance (3, 3) [m^2] of the position of every joint and site, world frame; NaN before the first frame.
     #[getter]
     fn covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        matrices(slf.py(), this.names.sites.iter().zip(&this.estimate.covariances.sites))
+        rows(&slf.get().names.sites, &slf.get().joint_covariances(slf.py())?)
     }
 
     /// The same as an array (J, 3, 3) in the order of joint_names.
@@ -269,25 +258,18 @@ impl PyEstimate {
     /// Standard deviation (3,) [m] of every joint's and site's x, y and z in the world.
     #[getter]
     fn joint_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (py, this) = (slf.py(), slf.get());
-        let dict = PyDict::new(py);
-        for (name, covariance) in this.names.sites.iter().zip(&this.estimate.covariances.sites) {
-            let sigma = (0..3).map(|axis| covariance.col(axis)[axis].sqrt()).collect();
-            dict.set_item(name, frozen(py, sigma, &[3])?)?;
-        }
-        Ok(PyMappingProxy::new(py, dict.as_mapping()))
+        let (this, sites) = (slf.get(), &slf.get().estimate.covariances.sites);
+        let sigma = sites.iter().flat_map(|covariance| (0..3).map(|axis| covariance.col(axis)[axis].sqrt()));
+        rows(&this.names.sites, &frozen(slf.py(), sigma.collect(), &[sites.len(), 3])?)
     }
 
     /// Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the
     /// origin of the limb's frame, as in geometry_msgs/PoseWithCovariance.
     #[getter]
     fn limb_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (py, this) = (slf.py(), slf.get());
-        let dict = PyDict::new(py);
-        for (name, covariance) in this.names.limbs.iter().zip(&this.estimate.covariances.limbs) {
-            dict.set_item(name, frozen(py, covariance.iter().flatten().copied().collect(), &[6, 6])?)?;
-        }
-        Ok(PyMappingProxy::new(py, dict.as_mapping()))
+        let (this, limbs) = (slf.get(), &slf.get().estimate.covariances.limbs);
+        let all = limbs.iter().flatten().flatten().copied().collect();
+        rows(&this.names.limbs, &frozen(slf.py(), all, &[limbs.len(), 6, 6])?)
     }
 
     /// Covariance (3, 3) [rad^2] of the turn of every joint about the world's axes.
@@ -295,7 +277,10 @@ impl PyEstimate {
     fn angle_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
         let turns = this.names.joints.iter().zip(&this.estimate.covariances.turns);
-        matrices(slf.py(), turns.filter_map(|(name, turn)| Some((name.as_ref()?, turn))))
+        let (names, turns): (Vec<_>, Vec<_>) = turns.filter_map(|(name, turn)| Some((name.as_ref()?, turn))).unzip();
+        // Symmetric: columns are rows.
+        let all = turns.iter().flat_map(|turn: &&Mat3| turn.to_cols_array()).collect();
+        rows(names, &frozen(slf.py(), all, &[turns.len(), 3, 3])?)
     }
 
     /// Standard deviation of every limb's length [m]; NaN where lengths are not refined.

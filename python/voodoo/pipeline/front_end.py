@@ -60,7 +60,8 @@ class FrontEnd:
         self._motion = LimbMotion()
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
         if self.search.posed:
-            self._predictor.update(float("nan"), self.tracker.estimate.joints)
+            posed = self.tracker.estimate
+            self._predictor.update(float("nan"), posed.joint_names, posed.joint_positions)
 
     @property
     def frozen(self) -> tuple[str, ...]:
@@ -112,8 +113,8 @@ class FrontEnd:
         return estimate
 
     def _learn(self, recorded: RecordedFrame, estimate: Estimate) -> None:
-        self._predictor.update(recorded.stamp, estimate.joints)
-        self._motion.update(recorded.stamp, estimate.world_from_limb)
+        self._predictor.update(recorded.stamp, estimate.joint_names, estimate.joint_positions)
+        self._motion.update(recorded.stamp, estimate.limb_poses)
         for item in recorded.measurements:
             for adapter in adapters_of(item):
                 adapter.learn(item, estimate, self.memory, vouched=self._vouched)

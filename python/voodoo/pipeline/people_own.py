@@ -100,8 +100,8 @@ class PeopleOwn:
         self._persons = {number: kept for number, kept in self._persons.items() if number in there}
         for number, found in there.items():
             person = self._persons.setdefault(number, self._new())
-            person.predictor.update(estimate.stamp, found.joints)
-            person.motion.update(estimate.stamp, found.world_from_limb)
+            person.predictor.update(estimate.stamp, found.joint_names, found.joint_positions)
+            person.motion.update(estimate.stamp, found.limb_poses)
             for item in pictured:
                 for adapter in _own_adapters(item, self._settings):
                     adapter.learn(item, found, person.memory, vouched=False)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 from voodoo.sensors.pixels import FloatArray, lengths, ray_distance
@@ -89,10 +87,8 @@ class SitePredictor:
     _positions: FloatArray = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
     _velocity: FloatArray = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
 
-    def update(self, stamp: float, joints: Mapping[str, npt.NDArray[np.float64]]) -> None:
-        """Take up an estimate; a NaN stamp (after a reset) forgets the velocity."""
-        names = tuple(joints)
-        positions = np.array(list(joints.values()), dtype=np.float64).reshape(-1, 3)
+    def update(self, stamp: float, names: tuple[str, ...], positions: FloatArray) -> None:
+        """Take up an estimate's named positions (J, 3) [m]; a NaN stamp (after a reset) forgets the velocity."""
         velocity = np.zeros_like(positions)
         if stamp > self._stamp:
             before = self._positions

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,9 +37,8 @@ class LimbMotion:
     _before: tuple[float, FloatArray] | None = field(default=None, repr=False)
     _stamp: float = field(default=float("nan"), repr=False)
 
-    def update(self, stamp: float, world_from_limb: Mapping[str, npt.NDArray[np.float64]]) -> None:
-        """Take up the poses of all limbs (4, 4) at `stamp` [s]."""
-        poses = np.array(list(world_from_limb.values()), dtype=np.float64)
+    def update(self, stamp: float, poses: FloatArray) -> None:
+        """Take up the poses of all limbs (L, 4, 4) at `stamp` [s]."""
         comparable = self._poses is not None and len(self._poses) == len(poses) and stamp > self._stamp
         self._before = (stamp - self._stamp, self._poses) if comparable and self._poses is not None else None
         self._poses, self._stamp = poses, stamp

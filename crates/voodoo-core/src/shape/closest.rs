@@ -179,6 +179,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// A starting angle: the direction `(x/a, y/b)` of the slice, then one step over the evolute of its ellipse.
+    #[inline(always)]
     pub(super) fn guess(&self, q: Vec3) -> Angle {
         // Not the very ends: a tip has no ellipse.
         let (a, b) = self.semi_axes(q.z.clamp(0.1 * self.length, 0.9 * self.length));

@@ -61,14 +61,15 @@ impl Feet {
 impl TaperedEllipticCylinder {
     /// [`Self::closest_point`] of all queries, of a shape whose end ellipses differ little, at most [`LANES`], limb frame.
     pub(super) fn closest_points_in_one_basin(&self, queries: &[Vec3], mut found: impl FnMut(usize, SurfacePoint)) {
-        let mut folded = [Vec3::ONE; LANES];
+        // Lanes that are not wanted repeat the first: none takes longer than those that are.
+        let Some(first) = queries.first() else { return };
+        let mut folded = [super::closest::folded(*first); LANES];
         for (folded, query) in folded.iter_mut().zip(queries) {
             *folded = super::closest::folded(*query);
         }
-        let start = folded.map(|query| self.guess(query));
         let guessed = widest(
             #[inline(always)]
-            || self.refine_lanes(&start, &folded),
+            || self.refine_lanes(&folded.map(|query| self.guess(query)), &folded),
         );
         for (lane, query) in queries.iter().enumerate() {
             found(lane, self.settled(*query, guessed.get(lane)));
