@@ -1,7 +1,9 @@
 //! How long frames have spoken against an arm or leg, and whether two in a row asked for the same change.
 
-/// A chain is tried in every `REST`th frame only after so many refusals in a row, since a hidden arm is refused for seconds, and
-/// once where nothing came near to what the frame shows.
+/// A chain is tried in every second frame only after so many refusals in a row.
+const WEARY: usize = 8;
+/// And in every `REST`th after so many, since a hidden arm is refused for seconds, and once where nothing came near to what the
+/// frame shows.
 const TIRED: usize = 30;
 const REST: usize = 4;
 
@@ -33,7 +35,8 @@ impl Persistence {
         self.voted_before = voted_before;
         self.frames += 1;
         self.refused += 1;
-        let rests = self.rest > 0 || self.refused > TIRED && !self.refused.is_multiple_of(REST);
+        let every = if self.refused > TIRED { REST } else { 1 + usize::from(self.refused > WEARY) };
+        let rests = self.rest > 0 || !self.refused.is_multiple_of(every);
         let rests = rests && !new;
         self.rest = self.rest.saturating_sub(1);
         self.frames >= patience && !rests
@@ -106,18 +109,18 @@ mod tests {
         let mut persistence = Persistence::default();
         assert!(persistence.observe(Some(1), false));
         persistence.rest();
-        let tried: Vec<bool> = (0..2 * REST).map(|_| persistence.observe(Some(1), false)).collect();
-        assert_eq!(tried, [false, false, false, true, true, true, true, true]);
+        let tried: Vec<bool> = (1..2 * REST).map(|_| persistence.observe(Some(1), false)).collect();
+        assert_eq!(tried, [false, false, false, true, true, true, true]);
         persistence.rest();
         assert!(!persistence.observe(None, false) && persistence.observe(Some(1), false));
     }
 
     #[test]
-    fn a_chain_refused_for_long_is_tried_in_every_fourth_frame_until_it_asks() {
+    fn a_chain_is_tried_less_the_longer_it_is_refused_until_it_asks() {
         let mut persistence = Persistence::default();
         let tried: Vec<bool> = (0..TIRED + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
-        assert!(tried[..TIRED].iter().all(|due| *due));
-        assert_eq!(tried[TIRED..].iter().filter(|due| **due).count(), 10);
+        let due = |tried: &[bool]| tried.iter().filter(|due| **due).count();
+        assert_eq!([&tried[..WEARY], &tried[WEARY..TIRED], &tried[TIRED..]].map(due), [8, 11, 10]);
         let mut tired = persistence;
         assert!((0..REST).all(|_| tired.observe(Some(1), true)), "there is something new");
         while !persistence.observe(Some(1), false) {}
