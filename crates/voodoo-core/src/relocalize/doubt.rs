@@ -116,7 +116,7 @@ impl Doubt {
             self.agreed = 0;
         } else {
             self.elsewhere = 0.0;
-            self.agreed += usize::from(!self.found_itself);
+            self.agreed += usize::from(!self.found_itself && !among);
         }
         self.elsewhere >= ENOUGH_ODDS
     }
