@@ -1,4 +1,4 @@
-"""Axes of limbs keep out of other limbs, and only where that is asked for."""
+"""Axes of limbs keep out of other limbs and out of the floor, and only where that is asked for."""
 
 import numpy as np
 import pytest
@@ -35,3 +35,19 @@ def test_an_arm_is_pushed_out_of_the_hip_where_that_is_asked_for(penetration):
         frame.add_position("skull_tip", tracker.estimate.joints["skull_tip"])
         tracker.step(frame)
     assert deepest(tracker) < 0.5 * before if penetration else abs(deepest(tracker) - before) < 1e-3
+
+
+@pytest.mark.parametrize("penetration", [True, False])
+def test_nobody_stands_in_the_floor_where_that_is_asked_for(penetration):
+    tracker = voodoo.Tracker(voodoo.Body.human(height=1.75), config=voodoo.Config(penetration=penetration))
+    tracker.reset(joints=START)
+    feet = ("l_ankle", "r_ankle")
+    low = min(tracker.estimate.joints[name][2] for name in feet)
+    # The floor is 20 cm above where the feet are: knees must bend, for the head stays.
+    for step in range(10):
+        frame = voodoo.Frame(stamp=0.1 * step)
+        frame.set_ground(normal=(0.0, 0.0, 1.0), offset=low + 0.2)
+        frame.add_position("skull_tip", tracker.estimate.joints["skull_tip"])
+        tracker.step(frame)
+    raised = min(tracker.estimate.joints[name][2] for name in feet) - low
+    assert raised > 0.15 if penetration else abs(raised) < 0.01

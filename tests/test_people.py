@@ -89,6 +89,15 @@ def test_of_two_near_each_other_the_one_that_explains_more_stays(someone):
     assert [person.id for person in people.step(frame(0.0, someone))] == [2]
 
 
+def test_who_is_followed_beside_where_they_are_is_taken_up_and_not_found_twice(someone):
+    people = voodoo.People()
+    people.add(shifted(STANDING, 0.3, 0.2, -0.3), fit_sizes=False)
+    for index in range(8):
+        found = people.step(frame(index / 15.0, someone))
+        assert [person.id for person in found] == [1]
+    assert np.linalg.norm(found.persons[0].estimate.joints["humanoid_root"] - STANDING["humanoid_root"]) < 0.15
+
+
 def test_free_points_belong_to_whose_surface_explains_them(someone):
     body, estimate = someone
     beside = shifted(STANDING, 0.0, 0.62, 0.0)

@@ -278,7 +278,8 @@ config! {
     facing: bool = true, "";
     /// Keep joints within their limits, softly (whole-body solvers).
     limits: bool = true, "";
-    /// Axes of limbs are pushed out of other limbs that they are not joined to (whole-body solvers).
+    /// Axes of limbs are pushed out of other limbs that they are not joined to, and their ends up to the floor where it is known
+    /// (whole-body solvers).
     penetration: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";

@@ -235,6 +235,11 @@ mod tests {
         chain.reach(body, &mut inside, middle, 0.0);
         let cost = overlap_cost(body, None, chain, &inside);
         assert!(cost > 10.0, "{cost} patches");
+        // A floor above the whole arm leaves it no room, one below it all.
+        let below = |offset| overlap_cost(body, Some(Ground { normal: Vec3::Y, offset }), chain, &poses);
+        let ends = chain.limbs().map(|limb| poses[limb].translation.y);
+        let [low, high] = ends.fold([f64::MAX, f64::MIN], |[low, high], y| [low.min(y), high.max(y)]);
+        assert!(below(high + 1.0) > 10.0 && below(low - 1.0) == 0.0, "{}", below(high + 1.0));
     }
 
     #[test]
