@@ -65,6 +65,18 @@ class Estimate:
     limb_covariance: dict = field(default_factory=dict)
     joint_sigma: dict = field(default_factory=dict)
 
+    @property
+    def joint_names(self):
+        return tuple(self.joints)
+
+    @property
+    def joint_positions(self):
+        return np.array(list(self.joints.values())).reshape(-1, 3)
+
+    @property
+    def limb_poses(self):
+        return np.array(list(self.world_from_limb.values())).reshape(-1, 4, 4)
+
 
 def searching(stamp):
     return Estimate(stamp, {}, {}, "searching", float("nan"))

@@ -111,7 +111,9 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     limits: bool = True
     """Keep joints within their limits, softly (whole-body solvers)."""
     penetration: bool = True
-    """Axes of limbs are pushed out of other limbs that they are not joined to (whole-body solvers)."""
+    """Axes of limbs are pushed out of other limbs that they are not joined to, and their ends up to the floor
+    where it is known (whole-body solvers).
+    """
     fit_girths: bool = True
     """After a reset that fits sizes, the first frame's points also fit the girths."""
     fit_lengths: bool = True
