@@ -7,6 +7,8 @@ the frame shown is the one in which the lost joints are farthest away. Recording
 """
 
 import argparse
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -17,7 +19,8 @@ from voodoo.evaluation import metrics
 from voodoo.model.projection import CameraView
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
-from voodoo.recordings import DepthImage, Recording, Reference
+from voodoo.recordings import DepthImage, RecordedFrame, Recording, RecordingInfo, Reference
+from voodoo.recordings.loaders import guess_loader, options_of
 from voodoo.visualization.canvas import Picture
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.sheet import contact_sheet
@@ -26,6 +29,33 @@ BONES = tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "
 BONES += tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("hip", "knee"), ("knee", "ankle")))
 MAGENTA = (255, 0, 255)
 WIDTH, HEIGHT = 420, 520
+
+
+class DepthAlone(Recording):
+    """The depth images of a recording whose loader cannot leave the rest out itself."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        for name in ("path", "name", "root_frame", "start", "reference"):
+            setattr(self, name, getattr(recording, name))
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        for frame in self._recording:
+            yield RecordedFrame(frame.stamp, tuple(m for m in frame.measurements if isinstance(m, DepthImage)))
+
+    def info(self) -> RecordingInfo:
+        about = self._recording.info()
+        return replace(about, sensors=tuple(sensor for sensor in about.sensors if sensor.kind == "depth"))
+
+
+def depth_of(path: Path) -> Recording:
+    """A recording without anything but depth."""
+    if "use" in options_of(guess_loader(path)):
+        return voodoo.open_recording(path, use=("depth",))
+    return DepthAlone(voodoo.open_recording(path))
 
 
 def reference_at(reference: Reference, stamps: np.ndarray) -> np.ndarray:
@@ -80,7 +110,7 @@ def main() -> None:
     arguments = parser.parse_args()
     tiles = []
     for path in arguments.recordings:
-        recording = voodoo.open_recording(path) if path.is_file() else voodoo.open_recording(path, use=("depth",))
+        recording = depth_of(path)
         tile = worst(recording)
         print(recording.name, "loses nothing" if tile is None else "loses joints")
         tiles += [] if tile is None else [tile]
