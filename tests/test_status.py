@@ -6,7 +6,14 @@ import pytest
 import voodoo
 from scene import standing_joints
 from voodoo.evaluation import metrics
+from voodoo.export import write_trc
+from voodoo.export.track import Track
 from voodoo.ik import Chain
+from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_tracker
+from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.keypoint_layouts import LAYOUTS
+from voodoo.sensors.keypoints import KeypointSensor
 from voodoo.synthetic.render import render_depth
 from voodoo.synthetic.sequence import CAMERA, METRES_PER_UNIT, VirtualSequence
 
@@ -127,7 +134,7 @@ def test_a_cupboard_of_a_persons_size_is_no_body(body, width):
 
 
 def test_keypoints_alone_track_a_person_who_is_seen():
-    """Hips tell of the pelvis, shoulders of the clavicles: no depth image is needed to call that tracked."""
+    """Hips tell of the pelvis, paired of the clavicles: no depth image is needed to call that tracked."""
     body = voodoo.Body.human(1.75)
     tracker = voodoo.Tracker(body)
     standing = standing_joints(body)
@@ -147,3 +154,42 @@ def test_keypoints_alone_track_a_person_who_is_seen():
             frame.add_position(name, standing[name], weight=20.0)
         estimate = tracker.step(frame)
     assert estimate.limb_status["r_calf"] != "measured" and estimate.status != "tracking"
+
+
+SEEN_FROM = (
+    np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]]),
+    np.array([[1.0, 0.0, 0.0, 3.0], [0.0, 0.0, 1.0, -3.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]]),
+)
+"""Before the person of the bundled recording, and to the right of it."""
+
+
+def test_a_whole_recording_of_markers_alone_is_tracked(tmp_path):
+    reference = open_recording(sample_path()).reference
+    paired = [name for name in reference.names if name[:2] in ("l_", "r_")]
+    count, columns = len(reference.stamps), [reference.names.index(name) for name in paired]
+    places, nothing = reference.positions[:, columns], np.empty((count, 0, 4, 4))
+    truth = Track(reference.stamps, ("tracking",) * count, np.zeros(count), tuple(paired), places, (), nothing)
+    write_trc(tmp_path / "m.trc", truth)
+    recording = open_recording(tmp_path / "m.trc")
+    states = [str(step.estimate.status) for step in track(recording, start_tracker(recording))]
+    assert states == ["tracking"] * 90
+
+
+def test_a_whole_recording_of_keypoints_alone_is_tracked():
+    """As a network sees the true joints in two cameras, with errors of three pixels."""
+    recording, layout = open_recording(sample_path()), LAYOUTS["coco17"]
+    reference, rng = recording.reference, np.random.default_rng(5)
+    alone = {part.site: next(iter(part.shares)) for part in layout.parts if len(part.shares) == 1}
+    tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
+    tracker.reset(joints=recording.start["joints"])
+    states = []
+    for stamp, places in zip(reference.stamps, reference.positions, strict=True):
+        frame, true = voodoo.Frame(stamp=float(stamp)), dict(zip(reference.names, places, strict=True))
+        for pose in SEEN_FROM:
+            rows = np.zeros((layout.count, 3))
+            for site in sorted(alone.keys() & true.keys()):
+                pixel = CAMERA.project((true[site] - pose[:3, 3])[None] @ pose[:3, :3])[0]
+                rows[alone[site]] = [*(pixel + rng.normal(0.0, 3.0, 2)), 0.9]
+            KeypointSensor("coco17", CAMERA, pose).add(frame, rows, predicted=dict(tracker.estimate.joints))
+        states.append(str(tracker.step(frame).status))
+    assert states == ["tracking"] * 90
