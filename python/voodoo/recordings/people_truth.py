@@ -12,9 +12,11 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.recordings.joint_table import read_positions
+from voodoo.recordings.stored import MOST_BYTES
 
 PEOPLE_TRUTH_FILE = "truth_people.csv"
 _FIRST = ("stamp_s", "person", "in_view")
+_LAST = np.iinfo(np.int32).max
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,7 +69,8 @@ def read_people_truth(path: Path, root_from_truth: Callable[[float], FloatArray]
     names, table = read_positions(path, _FIRST)
     if not names:
         raise RecordingError(f"{path}: expected joints, NAME_x, NAME_y, NAME_z, found none")
-    if not np.isfinite(table).all() or (table[:, 1] < 1).any() or (table[:, 1] % 1.0 != 0.0).any():
+    persons = table[:, 1]
+    if not np.isfinite(table).all() or not ((persons >= 1) & (persons <= _LAST) & (persons % 1.0 == 0.0)).all():
         raise RecordingError(f"{path}: expected finite numbers and persons from 1, found others")
     return _by_person(path, table, names, root_from_truth)
 
@@ -80,6 +83,10 @@ def _by_person(
     persons, column = np.unique(table[:, 1].astype(np.int64), return_inverse=True)
     if len(np.unique(frame * len(persons) + column)) != len(table):
         raise RecordingError(f"{path}: expected one row for a person and stamp, found several")
+    if len(stamps) * len(persons) * len(names) * 24 > MOST_BYTES:
+        raise RecordingError(
+            f"{path}: expected people who are there together, found {len(persons)} at {len(stamps)} stamps"
+        )
     in_view = np.zeros((len(stamps), len(persons)))
     in_view[frame, column] = table[:, 2]
     positions = np.full((len(stamps), len(persons), len(names), 3), np.nan)
