@@ -21,16 +21,21 @@ import voodoo
 from bag_writer import Messages, write_bag
 from scene import standing_joints
 from voodoo import ik
+from voodoo.batch.storage import find_sources
 from voodoo.cli import app
 from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
 from voodoo.evaluation.report import markdown
 from voodoo.evaluation.score import Score
 from voodoo.export.track import Track
 from voodoo.model.camera import MOST_PIXELS
+from voodoo.pipeline.start import Init
 from voodoo.recordings import open_recording, ros_bag, sample_path
+from voodoo.recordings.films import _opened
 from voodoo.recordings.matlab import read_mat
+from voodoo.recordings.people_truth import read_people_truth
 from voodoo.recordings.pictures import decode_color, decode_depth_png, picture_size
-from voodoo.recordings.truth import read_start
+from voodoo.recordings.truth import read_start, read_truth
+from voodoo.visualization.image_writer import PictureWriter, save_picture
 
 BODY = voodoo.Body.human()
 FAR = standing_joints(BODY) | {"l_wrist": (1e300, 0.0, 0.0)}
@@ -89,6 +94,8 @@ def refused(done, *words):
         (lambda: open_recording("a\0b"), RecordingError, "path: expected a file or folder, found a name with a NUL"),
         (lambda: open_recording("~nobody-of-that-name/x"), RecordingError, "found the home of an unknown user"),
         (lambda: voodoo.Body.load("a\0b"), BodyError, "found a name with a NUL"),
+        (lambda: Init.load(Path("a\0b")), VoodooError, "found a name with a NUL"),
+        (lambda: find_sources(["~nobody-of-that-name/x"]), VoodooError, "found the home of an unknown user"),
     ],
 )
 def test_arguments_are_refused_by_name(call, error, words):
@@ -252,6 +259,8 @@ def test_fifos_and_devices_are_no_pictures(tmp_path):
     refused(run("info", tmp_path / "x.trc"), "x.trc")
     os.mkfifo(tmp_path / "x.bag")
     refused(run("info", tmp_path / "x.bag"), "x.bag")
+    os.mkfifo(tmp_path / "x.json")
+    refused(run("track", sample_path(), "--init", tmp_path / "x.json"), "x.json", "found no regular file")
 
 
 def test_archives_have_a_limit_and_errors_name_them(tmp_path, monkeypatch):
@@ -311,6 +320,63 @@ def test_numpy_does_not_talk_to_users(tmp_path):
     assert "RuntimeWarning" in loud.stderr
 
 
+@pytest.mark.parametrize("path", ["~nobody-of-that-name/x.csv", "a\0b", "a\0b.json", "x" * 5000])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("track",),
+        ("info",),
+        ("init",),
+        ("ik",),
+        ("eval",),
+        ("batch", "--out", "o"),
+        *(("track", sample_path(), option) for option in ("--init", "--config", "--body", "--with")),
+    ],
+    ids=lambda words: f"{words[0]} {words[-1]}",
+)
+def test_paths_that_cannot_be_are_refused_in_a_line(tmp_path, monkeypatch, command, path):
+    monkeypatch.chdir(tmp_path)
+    done = run(*command, path)
+    assert isinstance(done.exception, SystemExit), done.exception
+    assert done.exit_code in (1, 2) and done.stderr and "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_results_of_a_batch_have_a_path_that_can_be():
+    refused(run("batch", sample_path(), "--out", "~nobody-of-that-name/x"), "found the home of an unknown user")
+
+
+LATIN = os.fsdecode(b"caf\xe9")
+"""As files of old are named: OpenCV ends the process for one."""
+
+
+def test_names_of_other_bytes_do_not_reach_opencv(tmp_path):
+    picture = np.zeros((16, 16, 3), np.uint8)
+    for make in (
+        lambda: PictureWriter(tmp_path / f"{LATIN}.mp4", rate_hz=30.0),
+        lambda: PictureWriter(tmp_path / LATIN, rate_hz=30.0),
+        lambda: save_picture(tmp_path / f"{LATIN}.png", picture),
+    ):
+        with pytest.raises(VoodooError, match=r"caf.*: expected a name in UTF-8, found other bytes"):
+            make()
+    if sys.platform == "linux":  # others have no such files
+        (tmp_path / f"{LATIN}.avi").touch()
+        with pytest.raises(RecordingError, match="expected a name in UTF-8"):
+            _opened(tmp_path / f"{LATIN}.avi")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no such names here")
+def test_names_of_other_bytes_are_read_and_told(tmp_path):
+    folder = tmp_path / LATIN
+    (folder / "depth").mkdir(parents=True)
+    (folder / "calibration.toml").write_text("width=4\nheight=3\nfx=5\nfy=5\ncx=1\ncy=1\n")
+    (folder / "depth" / "1.0.png").write_bytes(cv2.imencode(".png", np.ones((3, 4), np.uint16))[1].tobytes())
+    command = [sys.executable, "-c", "from voodoo.cli import main; main()", "info", folder]
+    utf8 = {**os.environ, "LC_ALL": "C.UTF-8", "PYTHONUTF8": "0", "PYTHONIOENCODING": "utf-8:strict"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=utf8)
+    assert done.returncode == 0 and done.stderr == "" and r"caf\udce9" in done.stdout
+
+
 def test_a_failure_stands_below_the_table():
     text = markdown([Score("walk", Path("walk"), failure="walk: expected | a\nrecording, found\nnone " + "x" * 300)])
     rows = [line for line in text.splitlines() if line.startswith("| walk")]
@@ -366,3 +432,24 @@ def test_a_start_beyond_all_numbers_is_refused(tmp_path, number):
     file.write_text(json.dumps({"joints": {"l_wrist": [number, 0.0, 0.0]}}))
     with pytest.raises(RecordingError, match=r"joint l_wrist: expected \[x, y, z\] in metres"):
         read_start(file, lambda frame: np.eye(4))
+    with pytest.raises(VoodooError, match=r"init\.json: joints\.l_wrist\.0: .*finite number"):
+        Init.load(file)
+
+
+@pytest.mark.parametrize("cell", ["9" * 400, "1e400", "-inf", "1e300", "0.5", "\0"])
+def test_truths_beyond_all_numbers_are_refused(tmp_path, cell):
+    alone, people = tmp_path / "truth.csv", tmp_path / "truth_people.csv"
+    alone.write_text(f"stamp_s,l_hip_x,l_hip_y,l_hip_z\n{cell},1,2,3\n0.1,1,2,3\n")
+    with pytest.raises(RecordingError, match=r"truth\.csv"):
+        read_truth(alone, lambda stamp: np.eye(4))
+    people.write_text(f"stamp_s,person,in_view,l_hip_x,l_hip_y,l_hip_z\n0.1,{cell},1,1,2,3\n")
+    with pytest.raises(RecordingError, match=r"truth_people\.csv"):
+        read_people_truth(people, lambda stamp: np.eye(4))
+
+
+def test_people_who_never_meet_take_no_gigabytes(tmp_path):
+    path = tmp_path / "truth_people.csv"
+    rows = "".join(f"{number},{number},1,1,2,3\n" for number in range(1, 5000))
+    path.write_text("stamp_s,person,in_view,l_hip_x,l_hip_y,l_hip_z\n" + rows)
+    with pytest.raises(RecordingError, match="expected people who are there together, found 4999 at 4999 stamps"):
+        read_people_truth(path, lambda stamp: np.eye(4))

@@ -95,3 +95,16 @@ def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Pat
         return Path(text).expanduser()
     except RuntimeError:
         raise error(f"{name}: expected a file or folder, found the home of an unknown user: {text}") from None
+
+
+def utf8_name(path: Path, *, error: type[VoodooError] = VoodooError) -> str:
+    """The name of a file for OpenCV, which dies of one that is not UTF-8.
+
+    Raises:
+        VoodooError: of the class `error`, for such a name.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise error(f"{str(path)!r}: expected a name in UTF-8, found other bytes") from None
+    return str(path)

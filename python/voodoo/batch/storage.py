@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
 
-from voodoo.errors import RecordingError, VoodooError, reading
+from voodoo.errors import RecordingError, VoodooError, a_path, reading
 from voodoo.evaluation.search import find_recordings
 
 _FILES = (".bag", ".mcap", ".db3", ".zip", ".trc", ".c3d")
@@ -48,8 +48,12 @@ def is_local(word: str) -> bool:
 
 
 def local_path(word: str) -> Path:
-    """The path of what `is_local`."""
-    return Path(unquote(word.split("://", 1)[1]) if "://" in word else word).expanduser()
+    """The path of what `is_local`.
+
+    Raises:
+        VoodooError: it cannot be one, see `a_path`.
+    """
+    return a_path(unquote(word.split("://", 1)[1]) if "://" in word else word, error=VoodooError)
 
 
 def find_sources(words: Sequence[str], *, only: Sequence[str] = ()) -> list[str]:

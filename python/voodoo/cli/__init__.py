@@ -5,6 +5,8 @@ What a command needs is imported when it runs, so that help and version are ther
 
 from __future__ import annotations
 
+import io
+import sys
 from typing import Annotated
 
 import typer
@@ -29,6 +31,8 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the `voodoo` command."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be of any bytes
     app()
 
 

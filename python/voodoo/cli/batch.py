@@ -7,7 +7,6 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -61,7 +60,7 @@ def batch_command(
     """
     from voodoo._core import __version__
     from voodoo.batch.run import Batch, run
-    from voodoo.batch.storage import find_sources
+    from voodoo.batch.storage import find_sources, local_path
     from voodoo.batch.summary import DONE, FAILED
     from voodoo.batch.task import Settings
     from voodoo.cli.people import limit_of
@@ -86,7 +85,7 @@ def batch_command(
             version=__version__,
         )
         sources = find_sources(recordings, only=only or ())
-        batch = Batch(sources, out if "://" in out else str(Path(out).expanduser().absolute()), settings)
+        batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings)
         before = len(sources) - len(batch.jobs)
         interrupted = False
         if batch.jobs:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from voodoo._core import Estimate
 from voodoo.config import Config
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, a_path
 from voodoo.export.result_file import SUFFIXES
 from voodoo.export.skeleton import bones
 from voodoo.export.track import Track
@@ -28,6 +28,7 @@ from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
+from voodoo.recordings.stored import read_stored
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
 from voodoo.sensors.settings import FrontEndSettings, inputs_for
@@ -68,10 +69,7 @@ class Init(BaseModel):
         Raises:
             VoodooError: not readable, not JSON, or not of that form; names the file and the key.
         """
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise VoodooError(f"{path}: expected a readable JSON file, found {error.strerror or error}") from error
+        content = read_stored(a_path(path, error=VoodooError), "a JSON file")
         try:
             return cls.model_validate_json(content)
         except ValidationError as error:

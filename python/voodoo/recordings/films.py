@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import RecordingError, reading
+from voodoo.errors import RecordingError, reading, utf8_name
 from voodoo.measurements import ColorImage
 from voodoo.model.camera import Camera
 from voodoo.recordings.camera_files import PlacedCamera
@@ -151,7 +151,7 @@ def _number(file: Path) -> str:
 
 def _opened(path: Path) -> cv2.VideoCapture:
     check_stored(path, "a video", most=_MOST_BYTES)
-    film = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    film = cv2.VideoCapture(utf8_name(path, error=RecordingError), cv2.CAP_FFMPEG)
     if not film.isOpened():
         raise RecordingError(f"{path}: expected a video that FFmpeg reads, found none")
     return film

@@ -7,7 +7,7 @@ from types import TracebackType
 
 import cv2
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, utf8_name
 from voodoo.visualization.ink import Picture
 
 
@@ -19,13 +19,14 @@ class PictureWriter:
         rate_hz: frames a second of the film.
 
     Raises:
-        VoodooError: another suffix that names a film or picture, or a file that cannot be written.
+        VoodooError: another suffix that names a film or picture, a name that is not UTF-8, or a file that cannot be written.
     """
 
     def __init__(self, path: Path, *, rate_hz: float) -> None:
         """Refuse names that cannot be meant, make the folder."""
         if path.suffix.lower() in (".avi", ".mkv", ".mov", ".webm", ".gif", ".png", ".jpg"):
             raise VoodooError(f"{path}: expected a folder or a name that ends in .mp4, found {path.suffix!r}")
+        utf8_name(path)
         self._path = path
         self._rate_hz = rate_hz
         self._is_film = path.suffix.lower() == ".mp4"
@@ -89,5 +90,5 @@ def save_picture(path: Path, picture: Picture) -> None:
         VoodooError: it could not be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), picture):
+    if not cv2.imwrite(utf8_name(path), picture):
         raise VoodooError(f"{path}: expected a file that can be written, found that OpenCV cannot")
