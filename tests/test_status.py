@@ -134,7 +134,7 @@ def test_a_cupboard_of_a_persons_size_is_no_body(body, width):
 
 
 def test_keypoints_alone_track_a_person_who_is_seen():
-    """Hips tell of the pelvis, paired of the clavicles: no depth image is needed to call that tracked."""
+    """Hips tell of the pelvis, shoulders of the clavicles: no depth image is needed to call that tracked."""
     body = voodoo.Body.human(1.75)
     tracker = voodoo.Tracker(body)
     standing = standing_joints(body)

@@ -27,7 +27,7 @@ impl Segmentation {
         self.distorted = image.rays.is_some();
         let told = around.ground.map(|ground| {
             let normal = camera_from_world.rotation * ground.normal;
-            Ground { normal, offset: ground.offset - ground.normal.dot(image.world_from_sensor.translation) }
+            Ground { normal, ..ground.about(image.world_from_sensor.translation) }
         });
         // Where nobody told it, up is upwards in the image.
         let up = around.up.map_or(-Vec3::Y, |up| camera_from_world.rotation * up);
