@@ -1,10 +1,9 @@
 //! How long frames have spoken against an arm or leg, and whether two in a row asked for the same change.
 
-/// A chain is tried in every second frame only after so many refusals in a row.
+/// A chain is tried in every second frame only after so many refusals in a row, in every third after twice as many, and so on:
+/// a hidden arm is refused for seconds.
 const WEARY: usize = 8;
-/// And in every `REST`th after so many, since a hidden arm is refused for seconds, and once where nothing came near to what the
-/// frame shows.
-const TIRED: usize = 30;
+/// But at least in every `REST`th, which is as well the next one where nothing came near to what the frame shows.
 const REST: usize = 4;
 
 /// What past frames said against one arm or leg.
@@ -35,7 +34,7 @@ impl Persistence {
         self.voted_before = voted_before;
         self.frames += 1;
         self.refused += 1;
-        let every = if self.refused > TIRED { REST } else { 1 + usize::from(self.refused > WEARY) };
+        let every = self.refused.div_ceil(WEARY).min(REST);
         let rests = self.rest > 0 || !self.refused.is_multiple_of(every);
         let rests = rests && !new;
         self.rest = self.rest.saturating_sub(1);
@@ -118,9 +117,10 @@ mod tests {
     #[test]
     fn a_chain_is_tried_less_the_longer_it_is_refused_until_it_asks() {
         let mut persistence = Persistence::default();
-        let tried: Vec<bool> = (0..TIRED + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
+        let tried: Vec<bool> = (0..3 * WEARY + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
         let due = |tried: &[bool]| tried.iter().filter(|due| **due).count();
-        assert_eq!([&tried[..WEARY], &tried[WEARY..TIRED], &tried[TIRED..]].map(due), [8, 11, 10]);
+        let eights = [0, 1, 2, 3].map(|eight| due(&tried[eight * WEARY..][..WEARY]));
+        assert_eq!((eights, due(&tried[3 * WEARY..])), ([8, 4, 3, 2], 10));
         let mut tired = persistence;
         assert!((0..REST).all(|_| tired.observe(Some(1), true)), "there is something new");
         while !persistence.observe(Some(1), false) {}
