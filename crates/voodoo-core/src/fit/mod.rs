@@ -178,10 +178,12 @@ impl Fit {
         predicted: &[Pose],
         poses: &[Pose],
         pairs: &[Pair],
+        pull: &[f64],
         change: &mut [f64],
     ) -> bool {
         let Self { solver, correspondences, .. } = self;
-        solver.lengths(&problem(context, correspondences, predicted, context.config.max_steps), poses, pairs, change)
+        let problem = problem(context, correspondences, predicted, context.config.max_steps);
+        solver.lengths(&problem, poses, pairs, pull, change)
     }
 
     /// Lets the solver follow the named sites before the frame's steps.

@@ -121,6 +121,11 @@ impl Doubt {
         self.elsewhere >= ENOUGH_ODDS
     }
 
+    /// Whether the detection that was weighed last was where the body is tracked.
+    pub(super) fn agrees(&self) -> bool {
+        self.elsewhere == 0.0
+    }
+
     /// Notes what a frame said: whether the body was lost, and what a detector says of what stands where it is tracked. Whether
     /// there is nobody any more.
     pub(super) fn nobody(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {

@@ -188,6 +188,11 @@ impl Relocalizer {
         }
     }
 
+    /// Whether what a detector saw last is where the body is tracked.
+    pub fn agrees(&self) -> bool {
+        self.doubt.agrees()
+    }
+
     /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.
     pub fn nobody(&mut self, stamp: f64, lost: bool) -> bool {
         self.doubt.nobody(stamp, lost, self.people.verdict())

@@ -2,15 +2,19 @@
 
 pub mod girth;
 mod outline;
+mod told;
 mod unlike;
 
 use crate::association::contour::edges;
 use crate::body::{Body, Model, Pair};
 use crate::config::Config;
+use crate::detect::Detection;
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::math::{Pose, Vec3};
+use crate::solver::LENGTH_INFORMATION;
 use girth::{GIRTH_STEPS, Girth, GirthFit, TIP_FACTORS, girth_step};
 use outline::Outlines;
+use told::Told;
 use unlike::{START_GATE, equalise_limb_lengths};
 
 /// A limb becomes longer or shorter by at most this share in one frame.
@@ -45,6 +49,9 @@ pub struct Sizes {
     pairs: Vec<Pair>,
     stretched: Vec<f64>,
     change: Vec<f64>,
+    pull: Vec<f64>,
+    /// What detections said of the lengths of a body that was found.
+    told: Told,
 }
 
 impl Sizes {
@@ -56,9 +63,22 @@ impl Sizes {
         self.girths.clear();
         self.outlines.clear();
         self.pairs.clear();
+        self.told.clear();
         if fit && config.fit_lengths {
             self.follow_lengths(model);
         }
+    }
+
+    /// Takes in what a detector says of the sizes of a body that it found: the lengths are drawn to the mean of all it said.
+    pub fn hear(&mut self, detection: &Detection) {
+        if self.found() {
+            self.told.hear(&detection.lengths);
+        }
+    }
+
+    /// Whether what a detector said of a body that it found does not tell its sizes yet.
+    pub fn unsure(&self) -> bool {
+        self.told.unsure()
     }
 
     /// The sizes are to be fitted, but the pose has to be first.
@@ -191,10 +211,15 @@ impl Sizes {
         predicted: &[Pose],
         fit: &mut Fit,
     ) {
-        let Self { pairs, stretched, change, .. } = self;
+        let Self { pairs, stretched, change, pull, told, .. } = self;
         change.clear();
-        change.extend(stretched.iter().map(|factor: &f64| 1.0 - factor));
-        if !fit.lengths(setting.of(model), predicted, poses, pairs, change) {
+        pull.clear();
+        for (pair, stretched) in pairs.iter().zip(stretched.iter()) {
+            let (factor, information) = told.of(&model.body, pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
+            change.push(factor - stretched);
+            pull.push(information);
+        }
+        if !fit.lengths(setting.of(model), predicted, poses, pairs, pull, change) {
             return;
         }
         let [shortest, longest] = LENGTH_FACTORS;

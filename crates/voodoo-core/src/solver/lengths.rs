@@ -29,7 +29,7 @@ impl ChainSolver {
         normal: &NormalEquations,
         poses: &[Pose],
         pairs: &[Pair],
-        [inertia, pull]: [f64; 2],
+        (inertia, pull): (f64, &[f64]),
         change: &mut [f64],
         work: &mut Lengths,
     ) -> bool {
@@ -41,8 +41,8 @@ impl ChainSolver {
         }
         let count = pairs.len();
         for row in 0..count {
-            work.reduced[row * count + row] += inertia + pull;
-            change[row] = pull * change[row] - work.gradient[row];
+            work.reduced[row * count + row] += inertia + pull[row];
+            change[row] = pull[row] * change[row] - work.gradient[row];
         }
         solve_in_place(&mut work.reduced, change, count)
     }

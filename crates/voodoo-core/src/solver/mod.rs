@@ -65,8 +65,15 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
 
     /// Relative changes of the lengths of `pairs` that the correspondences ask for at `poses`, into `change`, which holds how
-    /// far the lengths are below the ones set. False when the solver knows none.
-    fn lengths(&mut self, _problem: &Problem, _poses: &[Pose], _pairs: &[Pair], _change: &mut [f64]) -> bool {
+    /// far the lengths are below those to which they are drawn by the information `pull`. False when the solver knows none.
+    fn lengths(
+        &mut self,
+        _problem: &Problem,
+        _poses: &[Pose],
+        _pairs: &[Pair],
+        _pull: &[f64],
+        _change: &mut [f64],
+    ) -> bool {
         false
     }
 }

@@ -136,6 +136,7 @@ impl Tracker {
         self.relocalizer.take_note_of_start(itself);
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
+            self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
         }
         true
     }
@@ -147,6 +148,7 @@ impl Tracker {
             self.assessor.doubt_pose();
             self.relocalizer.take_note_of_start(true);
             self.sizes.restart(&self.model, Start::Detected, &self.config);
+            self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
             self.follow(frame, None);
             if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
                 return;
@@ -164,6 +166,7 @@ impl Tracker {
         self.assessor.doubt_pose();
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
+            self.sizes.hear(detection);
         }
         self.follow(frame, Some(share));
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
@@ -203,7 +206,7 @@ impl Tracker {
         // Other configurations of arms and legs.
         if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
-            let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts());
+            let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts() || sizes.unsure());
             match share {
                 None => relocalizer.look(frame, root, doubtful, lost),
                 Some(share) => relocalizer.look_at_share(frame, share, root, lost),
@@ -267,6 +270,9 @@ impl Tracker {
             {
                 // What was learnt of sizes and scene was learnt in the wrong place.
                 return !among && young && self.restart_at_detection();
+            }
+            if !lost && self.relocalizer.agrees() {
+                self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
             }
         }
         if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
