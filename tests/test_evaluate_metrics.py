@@ -206,3 +206,18 @@ def test_joint_angles_are_those_of_a_skeleton_that_is_bent_by_them():
 
 def rest_order():
     return ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+
+
+def test_a_reference_whose_bone_shrinks_by_a_quarter_says_nothing_of_its_end():
+    rng = np.random.default_rng(1)
+    reference = np.repeat(rng.normal(0.0, 0.3, (1, len(metrics.JOINTS), 3)), 20, axis=0)
+    knee, ankle = metrics.JOINTS.index("l_knee"), metrics.JOINTS.index("l_ankle")
+    shank = reference[0, ankle] - reference[0, knee]
+    for frame, factor in ((3, 0.8), (4, 0.7), (5, 1.3), (6, 0.1)):
+        reference[frame, ankle] = reference[frame, knee] + factor * shank
+    reference[9, knee] = np.nan
+    judged = metrics.without_contradictions(reference)
+    left_out = np.isnan(judged).any(axis=2) & ~np.isnan(reference).any(axis=2)
+    assert np.argwhere(left_out).tolist() == [[4, ankle], [5, ankle], [6, ankle]]
+    assert np.array_equal(judged[~left_out], reference[~left_out], equal_nan=True)
+    assert np.isnan(metrics.without_contradictions(np.full_like(reference, np.nan))).all()

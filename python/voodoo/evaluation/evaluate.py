@@ -251,16 +251,17 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     seconds = np.array([step.seconds for step in steps])
     positions = np.array([step.joints for step in steps])
     overlaps = np.array([step.witness.iou for step in steps])
-    reference = _reference_positions(recording, stamps)
-    lag = metrics.best_lag(positions, reference)
+    whole = _reference_positions(recording, stamps)
     exact = None if recording.reference is None else recording.reference.exact
+    reference = metrics.without_contradictions(whole) if exact is False else whole
+    lag = metrics.best_lag(positions, reference)
     errors0 = metrics.joint_errors(positions, reference)
     errors_best = metrics.joint_errors(positions, reference, lag=lag)
     errors = errors_best if exact is False else errors0
     limit = LIMIT_EXACT_M if exact else LIMIT_REFERENCE_M
     searching = np.array([word == SEARCHING for word in status])
     # Who is there and not found is as lost as who is looked for in a wrong place.
-    missed = searching[:, None] & np.isfinite(reference).all(axis=2)
+    missed = searching[:, None] & np.isfinite(whole).all(axis=2)
     class_, lost = metrics.tracking_class(np.where(missed, NOWHERE_M, errors), stamps, limit=limit)
     compared = metrics.shifted(reference, 0 if exact else lag)
     without = metrics.without_offsets(positions, compared)
@@ -270,7 +271,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     about_joints = np.concatenate([step.witness.about_joints for step in steps])
     measured = np.array([step.measured for step in steps])
     angle_error, angle_spread = metrics.angle_error(positions, compared)
-    first_wait, first_error = _first_pose(stamps, status, reference, errors0)
+    first_wait, first_error = _first_pose(stamps, status, whole, errors0)
     far, near = (limb_ends(errors, far=which) for which in (True, False))
     score = Score(
         name=recording.name,
@@ -311,6 +312,9 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         step_s=float(seconds.mean()),
         angle_error_deg=angle_error,
         angle_spread_deg=angle_spread,
+        left_out_share=float(1.0 - np.isfinite(reference).sum() / np.isfinite(whole).sum())
+        if exact is False
+        else np.nan,
     )
     within = np.array([step.witness.within for step in steps])
     sigma = np.array([step.sigma for step in steps])

@@ -27,6 +27,14 @@ MAX_LAG = 5
 STILL_M, STILL_S = 0.02, 0.2
 """A joint of the reference stands still in a frame when it stays this near [m] for so long [s] before and after."""
 
+BONE_OFF = 0.25
+"""A reference's bone is as long as ever within this share: twice what those of Kinect's skeleton vary by."""
+
+_BONES = tuple(
+    (f"{side}_{parent}", f"{side}_{joint}")
+    for parent, joint in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+    for side in ("l", "r")
+)
 _STAMP_TOLERANCE_S = 1e-6
 
 
@@ -80,6 +88,22 @@ def without_offsets(estimated: FloatArray, reference: FloatArray) -> FloatArray:
         if known[:, joint].any():
             differences[:, joint] -= np.median(differences[known[:, joint], joint], axis=0)
     return np.asarray(np.linalg.norm(differences, axis=2))
+
+
+def without_contradictions(reference: FloatArray) -> FloatArray:
+    """A reference skeleton (F, 12, 3) without what it cannot mean: NaN at the far end of a bone that is BONE_OFF longer or shorter
+    than its median over the frames.
+
+    Another tracker's skeleton loses joints, too: in lunges Kinect's hidden ankle lies in the knee. No estimate is asked.
+    """
+    column = {name: index for index, name in enumerate(JOINTS)}
+    judged = reference.copy()
+    for start, end in _BONES:
+        lengths = np.linalg.norm(reference[:, column[end]] - reference[:, column[start]], axis=1)
+        known = np.isfinite(lengths)
+        if known.any():
+            judged[np.abs(lengths / np.median(lengths[known]) - 1.0) > BONE_OFF, column[end]] = np.nan
+    return judged
 
 
 def joint_angles(positions: FloatArray) -> FloatArray:

@@ -44,6 +44,7 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("false_alarm_rate", "nearer limbs not called measured", lambda value: f"{100 * value:.1f} %"),
     ("lost_recall_together", "limbs off by 10 cm, all sequences together", lambda value: f"{100 * value:.1f} %"),
     ("false_alarm_rate_together", "nearer limbs, all sequences together", lambda value: f"{100 * value:.1f} %"),
+    ("left_out_share", "joints of the reference left out, their bones off", lambda value: f"{100 * value:.1f} %"),
     ("step_s", "time of a frame", lambda value: f"{1000 * value:.2f} ms"),
 )
 

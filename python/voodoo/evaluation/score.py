@@ -51,6 +51,7 @@ class Score:
         far_ends, near_ends: how many such joints there were, over all frames.
         step_s: mean time of a frame from measurements to estimate.
         angle_error_deg, angle_spread_deg: of eight joint angles at the same lag, see metrics.angle_error [deg].
+        left_out_share: joints of a reference skeleton that nothing is compared with, see metrics.without_contradictions.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Score:
     step_s: float = np.nan
     angle_error_deg: float = np.nan
     angle_spread_deg: float = np.nan
+    left_out_share: float = np.nan
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -51,7 +51,7 @@ MEANS = (
     "within_5cm", "within_10cm", "depth_within_5cm", "depth_median_m",
     "depth_p95_m", "person_within_5cm", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
     "reference_standing_jitter_m", "degraded_share", "lost_share", "searching_share", "lost_recall", "false_alarm_rate", "step_s",
-    "angle_error_deg", "angle_spread_deg",
+    "angle_error_deg", "angle_spread_deg", "left_out_share",
 )  # fmt: skip
 
 
