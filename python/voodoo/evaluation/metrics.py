@@ -91,8 +91,8 @@ def without_offsets(estimated: FloatArray, reference: FloatArray) -> FloatArray:
 
 
 def without_contradictions(reference: FloatArray) -> FloatArray:
-    """A reference skeleton (F, 12, 3) without what it cannot mean: NaN at the far end of a bone that is BONE_OFF longer or shorter
-    than its median over the frames.
+    """A reference skeleton (F, 12, 3) without what it cannot mean: NaN at the far end of a bone whose length is BONE_OFF off its
+    median over the frames.
 
     Another tracker's skeleton loses joints, too: in lunges Kinect's hidden ankle lies in the knee. No estimate is asked.
     """
