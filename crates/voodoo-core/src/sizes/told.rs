@@ -4,12 +4,17 @@ use crate::body::Body;
 use crate::detect::LENGTHS;
 
 /// Joints by which limbs of those lengths hang on their parents; the trunk is made of what hangs elsewhere.
-const HANGS_BY: [(&str, &str); 5] =
-    [("shoulder", "upper_arm"), ("elbow", "forearm"), ("hip", "thigh"), ("knee", "shank"), ("vc7", "neck")];
+const HANGS_BY: [(&str, &str); 6] = [
+    ("sternoclavicular", "shoulder_width"),
+    ("shoulder", "upper_arm"),
+    ("elbow", "forearm"),
+    ("hip", "thigh"),
+    ("knee", "shank"),
+    ("vc7", "neck"),
+];
 const TRUNK: &str = "trunk";
 /// The sizes are known when the stature is, to this share of it: of sitters and who bend it is known to 4 to 6 %, of others to 2.
 const KNOWN: f64 = 0.03;
-
 /// Points of a limb err alike, so that a frame tells less of its length than it has points: what is told counts for so many of them.
 const COUNTS: f64 = 4.0;
 
