@@ -40,6 +40,12 @@ fn bin_of([b, g, r]: [i32; 3]) -> u16 {
     if luma < DARKEST { bin | DARK } else { bin }
 }
 
+/// Whether a pixel is light enough to have a colour and its bin is one of a `table`'s.
+#[inline(always)]
+pub fn is_among(bin: u16, table: &[bool; BINS]) -> bool {
+    table[usize::from(bin & !DARK)] & (bin & DARK == 0)
+}
+
 /// 1 where a pixel is light enough and its bin is one of a `table`'s, which has [`BINS`].
 ///
 /// # Errors
@@ -49,28 +55,45 @@ pub fn among(bins: &[u16], table: &[bool]) -> Result<Vec<u8>, TrackError> {
     let Ok(table): Result<&[bool; BINS], _> = table.try_into() else {
         return Err(TrackError::measurement("table", "a mark for each of 32768 bins", count.to_string()));
     };
-    Ok(bins.iter().map(|bin| u8::from(table[usize::from(bin & !DARK)] & (bin & DARK == 0))).collect())
+    Ok(bins.iter().map(|bin| u8::from(is_among(*bin, table))).collect())
 }
 
-/// How many pixels of a mask, where it is not zero, are of each bin.
-///
-/// # Errors
-/// [`TrackError::Measurement`] when there are not as many places in the mask as bins.
-pub fn counts(bins: &[u16], mask: &[u8]) -> Result<Vec<f32>, TrackError> {
-    if bins.len() != mask.len() {
-        let found = format!("{} and {}", mask.len(), bins.len());
-        return Err(TrackError::measurement("mask", "as many pixels as the picture has", found));
+/// Counts pixels of two kinds by their bins; its memory is kept.
+#[derive(Clone, Debug, Default)]
+pub struct Counter {
+    /// Of the one kind and of the other; neighbours are alike: two tables of each in turns, so that no count waits for the last.
+    tables: [Vec<[u32; 2]>; 2],
+}
+
+impl Counter {
+    /// Nothing is counted yet.
+    pub fn start(&mut self) {
+        for table in &mut self.tables {
+            table.clear();
+            table.resize(BINS, [0; 2]);
+        }
     }
-    // Neighbours are alike: two tables in turns, so that no count waits for the last.
-    let (mut even, mut odd) = (vec![0_u32; BINS], vec![0_u32; BINS]);
-    let count = |table: &mut [u32], bin: u16, mask: u8| table[usize::from(bin & !DARK)] += u32::from(mask != 0);
-    let ((pairs, last), (masks, last_mask)) = (bins.as_chunks::<2>(), mask.as_chunks::<2>());
-    for ([a, b], [mask_a, mask_b]) in pairs.iter().zip(masks).filter(|(_, mask)| **mask != [0, 0]) {
-        count(&mut even, *a, *mask_a);
-        count(&mut odd, *b, *mask_b);
+
+    /// Counts those pixels that are marked, of which some are of the other kind: bin, mark and kind of each.
+    pub fn count(&mut self, pixels: impl Iterator<Item = (u16, bool, bool)>) {
+        let [even, odd] = &mut self.tables;
+        for (index, (bin, mark, other)) in pixels.enumerate() {
+            let table = if index % 2 == 0 { &mut *even } else { &mut *odd };
+            table[usize::from(bin & !DARK)][usize::from(other)] += u32::from(mark);
+        }
     }
-    last.iter().zip(last_mask).for_each(|(bin, mask)| count(&mut even, *bin, *mask));
-    Ok(even.iter().zip(&odd).map(|(even, odd)| (even + odd) as f32).collect())
+
+    /// Pixels that were counted, and those of the other kind.
+    pub fn pixels(&self) -> [usize; 2] {
+        let sum = |kind: usize| self.tables.iter().flatten().map(|counts| counts[kind] as usize).sum::<usize>();
+        [sum(0) + sum(1), sum(1)]
+    }
+
+    /// How many pixels of the one kind and of the other each bin has.
+    pub fn counts(&self) -> impl Iterator<Item = [f32; 2]> + '_ {
+        let [even, odd] = &self.tables;
+        even.iter().zip(odd).map(|(even, odd)| [0, 1].map(|kind| (even[kind] + odd[kind]) as f32))
+    }
 }
 
 #[cfg(test)]
@@ -111,8 +134,14 @@ mod tests {
             table[usize::from(bin & !DARK)] = true;
         }
         assert_eq!(among(&found, &table).unwrap(), [1, 0, 0, 1]);
-        let shares = counts(&found, &[1, 255, 1, 0]).unwrap();
-        assert_eq!((shares.iter().sum::<f32>(), shares[usize::from(found[0])]), (3.0, 1.0));
-        assert!(among(&found, &table[1..]).is_err() && counts(&found, &[1]).is_err());
+        let mut counter = Counter::default();
+        counter.start();
+        counter.count(
+            found.iter().copied().zip([true, true, true, false]).map(|(bin, mark)| (bin, mark, bin & DARK != 0)),
+        );
+        let counts: Vec<[f32; 2]> = counter.counts().collect();
+        assert_eq!((counter.pixels(), counts[usize::from(found[0])]), ([3, 1], [1.0, 0.0]));
+        assert_eq!(counts[usize::from(found[1] & !DARK)], [0.0, 1.0]);
+        assert!(among(&found, &table[1..]).is_err());
     }
 }

@@ -174,10 +174,12 @@ impl Nearest {
             let (away, depth) = (&mut away[to..to + rest], &mut depth[to..to + rest]);
             let step = CHAMFERS[0] * shift as i32;
             for (((away, depth), other), other_depth) in away.iter_mut().zip(depth).zip(others).zip(depths) {
+                // Chosen by bits: of two places in memory the compiler would choose the address, one by one.
                 let through = *other + step;
-                let nearer = through < *away;
-                *away = if nearer { through } else { *away };
-                *depth = if nearer { *other_depth } else { *depth };
+                let nearer = -i32::from(through < *away);
+                *away = (through & nearer) | (*away & !nearer);
+                let keep = !nearer as u32;
+                *depth = f32::from_bits((other_depth.to_bits() & !keep) | (depth.to_bits() & keep));
             }
             done += shift;
             shift *= 2;
@@ -198,9 +200,18 @@ impl Nearest {
             let (here, least, edges) = (line(row, span), &mut least[..span.len()], &mut edges[span.clone()]);
             let around = line(row.saturating_sub(1), span).iter().zip(here).zip(line(row + 1, span));
             least.iter_mut().zip(around).for_each(|(least, ((a, b), c))| *least = lesser(lesser(*a, *c), *b) + apart);
-            edges.iter_mut().zip(here).zip(&*least).for_each(|((edge, z), least)| *edge = *z > *least);
-            edges[1..].iter_mut().zip(&here[1..]).zip(&*least).for_each(|((edge, z), least)| *edge |= *z > *least);
-            edges.iter_mut().zip(here).zip(&least[1..]).for_each(|((edge, z), least)| *edge |= *z > *least);
+            let end = least.len() - 1;
+            for (place, neighbours) in [(0, [0, end.min(1)]), (end, [end.saturating_sub(1), end])] {
+                edges[place] = here[place] > lesser(least[neighbours[0]], least[neighbours[1]]);
+            }
+            if let (Some(inner), Some(here), Some(second), Some(third)) =
+                (edges.get_mut(1..end), here.get(1..end), least.get(1..), least.get(2..))
+            {
+                let around = least.iter().zip(second).zip(third);
+                for ((edge, z), ((a, b), c)) in inner.iter_mut().zip(here).zip(around) {
+                    *edge = *z > lesser(lesser(*a, *c), *b);
+                }
+            }
         }
     }
 }

@@ -1,8 +1,9 @@
 //! What hangs together in a mask of a picture, and skin's regions.
 
 use crate::error::TrackError;
+use crate::math::widest;
 use crate::observation::chroma;
-use crate::observation::masks::{bounds, closed, opened, smoothed};
+use crate::observation::masks::{bounds, closed, is_empty, opened, smoothed};
 
 /// A region of a mask: pixels that touch, at corners too.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +80,7 @@ fn joined_runs(mask: &[u8], width: usize) -> Vec<Run> {
     let mut above = 0..0;
     for (row, pixels) in mask.chunks_exact(width.max(1)).enumerate() {
         let begin = runs.len();
-        let mut start = 0;
+        let mut start = if is_empty(pixels) { pixels.len() } else { 0 };
         while let Some(next) = pixels[start..].iter().position(|pixel| *pixel != 0) {
             start += next;
             let end = pixels[start..].iter().position(|pixel| *pixel == 0).map_or(width, |length| start + length);
@@ -162,26 +163,44 @@ impl SkinPicture<'_> {
         }
         let seen = smoothed(&chroma::among(self.bins, self.table)?, self.width);
         let mut skin = seen.clone();
-        let within = |skin: &mut [u8]| {
+        self.rule_out(&mut skin);
+        let [rows, columns] = bounds(&skin, self.width);
+        // Single pixels around all of it, where the picture has them, are none.
+        let around = |span: std::ops::Range<usize>, size: usize| span.start.saturating_sub(1)..(span.end + 1).min(size);
+        let (rows, columns) = (around(rows, count / self.width.max(1)), around(columns, self.width));
+        let part: Vec<u8> = rows.clone().flat_map(|row| &skin[row * self.width..][columns.clone()]).copied().collect();
+        let found = joined(&opened(&part, columns.len()), columns.len(), longest);
+        for (row, found) in rows.zip(found.chunks_exact(columns.len().max(1))) {
+            let here = row * self.width + columns.start..row * self.width + columns.end;
+            skin[here.clone()].copy_from_slice(found);
             if let Some(body) = self.body {
-                skin.iter_mut().zip(body).for_each(|(pixel, body)| *pixel &= u8::from(*body));
+                skin[here.clone()].iter_mut().zip(&body[here]).for_each(|(pixel, body)| *pixel &= u8::from(*body));
             }
-        };
-        within(&mut skin);
-        match (self.always, self.before) {
-            (Some(always), Some(before)) => {
-                for ((pixel, always), before) in skin.iter_mut().zip(always).zip(before) {
-                    *pixel &= u8::from((*always < 0.5) | *before);
-                }
-            }
-            (Some(always), None) => {
-                skin.iter_mut().zip(always).for_each(|(pixel, always)| *pixel &= u8::from(*always < 0.5));
-            }
-            (None, _) => {}
         }
-        let mut skin = joined(&opened(&skin, self.width), self.width, longest);
-        within(&mut skin);
         Ok((seen, skin))
+    }
+
+    /// Takes away what cannot be the body's.
+    fn rule_out(&self, skin: &mut [u8]) {
+        widest(
+            #[inline(always)]
+            || {
+                if let Some(body) = self.body {
+                    skin.iter_mut().zip(body).for_each(|(pixel, body)| *pixel &= u8::from(*body));
+                }
+                match (self.always, self.before) {
+                    (Some(always), Some(before)) => {
+                        for ((pixel, always), before) in skin.iter_mut().zip(always).zip(before) {
+                            *pixel &= u8::from((*always < 0.5) | *before);
+                        }
+                    }
+                    (Some(always), None) => {
+                        skin.iter_mut().zip(always).for_each(|(pixel, always)| *pixel &= u8::from(*always < 0.5));
+                    }
+                    (None, _) => {}
+                }
+            },
+        );
     }
 }
 

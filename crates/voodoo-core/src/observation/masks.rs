@@ -74,10 +74,15 @@ fn by_rows(mask: &[u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mu
     found
 }
 
+/// Whether a row of a mask holds nothing; all of it is read at once, which is faster than to look for the first pixel.
+pub fn is_empty(row: &[u8]) -> bool {
+    row.iter().fold(0, |any, pixel| any | pixel) == 0
+}
+
 /// Smallest range of rows and of columns that holds all of a mask.
 pub fn bounds(mask: &[u8], width: usize) -> [std::ops::Range<usize>; 2] {
     let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-    for (index, row) in mask.chunks_exact(width.max(1)).enumerate() {
+    for (index, row) in mask.chunks_exact(width.max(1)).enumerate().filter(|(_, row)| !is_empty(row)) {
         if let Some(first) = row.iter().position(|pixel| *pixel != 0) {
             let last = row.iter().rposition(|pixel| *pixel != 0).unwrap_or(first);
             low = [low[0].min(index), low[1].min(first)];

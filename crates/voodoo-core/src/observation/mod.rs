@@ -9,6 +9,7 @@
 pub mod background;
 mod background_moved;
 mod background_update;
+pub mod body_view;
 pub mod candidates;
 pub mod chroma;
 pub(crate) mod clusters;

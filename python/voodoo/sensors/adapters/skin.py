@@ -16,7 +16,7 @@ from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
 from voodoo.sensors.pixels import FloatArray
-from voodoo.sensors.skin.tracker import SkinTracker
+from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
 
 SKIN = (80, 255, 255)
 """Colour in overlays, BGR."""
@@ -51,14 +51,15 @@ class SkinAdapter(Adapter[ColorImage]):
             then,
             stamp=item.stamp,
             body=view,
-            surface=lambda places: dict(zip(status, tracker.limb_distances(places), strict=True)),
+            surface=lambda places: LimbDistances(status, tracker.limb_distances(places)),
             strangers=partial(_distance, context.others) if context.others else None,
             arm_lost=_hands(status, sites, "forearm", measured=False),
             upper_arm_visible=_hands(status, sites, "upperarm", measured=True),
             head_visible=_heads(status, sites),
             source=item.sensor,
+            moved=context.predicted,
         )
-        context.rays.extend(ray.moved(context.predicted[ray.site] - then[ray.site]) for ray in rays)
+        context.rays.extend(rays)
 
     def learn(self, item: ColorImage, estimate: Estimate, memory: Memory, *, vouched: bool) -> None:
         """Colours and background of the picture."""
