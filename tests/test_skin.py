@@ -8,10 +8,9 @@ import voodoo
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo import MeasurementError
 from voodoo.sensors.body_view import BodyView
-from voodoo.sensors.skin.assignment import assign
 from voodoo.sensors.skin.regions import candidates
 from voodoo.sensors.skin.settings import SkinSettings
-from voodoo.sensors.skin.tracker import SkinTracker
+from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
 
 
 def test_hands_and_face_are_found_and_named():
@@ -77,7 +76,7 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
                 POSE,
                 joints,
                 body=body,
-                surface=lambda places, outside=outside: {"thorax": np.full(len(places), outside)},
+                surface=lambda places, outside=outside: LimbDistances(("thorax",), np.full((1, len(places)), outside)),
             )
         found[outside] = {ray.site: ray for ray in rays}
     assert set(found[0.0]) == {"head_center", "r_hand"}
@@ -157,9 +156,9 @@ def test_lost_tracking_teaches_nothing():
     skin = SkinTracker()
     pose = Pose((160, 60), (110, 120), (210, 120))
     pose.status = "lost"
-    before = skin.colour.skin.copy()
+    before = skin.colours
     skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
-    np.testing.assert_array_equal(before, skin.colour.skin)
+    np.testing.assert_array_equal(before, skin.colours)
     assert not skin.settled
 
 
@@ -171,13 +170,6 @@ def test_candidates_skip_noise_and_doors():
     found, regions = candidates(mask, palm_px=5.4)
     assert [item.pixel for item in found] == [(45.5, 45.5)]
     assert (regions == found[0].region).sum() == found[0].area == 144
-
-
-def test_assignment_is_one_to_one_and_gated():
-    cost = np.array([[0.05, 0.09], [0.06, 0.5], [np.nan, np.inf]])
-    assert sorted(assign(cost, gate=0.2)) == [(0, 1), (1, 0)]  # both get one, although 0 likes 0 best
-    assert assign(cost, gate=0.055) == [(0, 0)]
-    assert assign(np.empty((3, 0)), gate=1.0) == []
 
 
 def test_settings_and_images_are_checked():

@@ -17,6 +17,7 @@ mod estimate;
 mod frame;
 mod ik;
 mod ik_view;
+mod keypoints;
 mod people;
 mod registration;
 mod render;
@@ -46,6 +47,8 @@ mod _core {
     use super::ik::PyChain;
     #[pymodule_export]
     use super::ik_view::PyView;
+    #[pymodule_export]
+    use super::keypoints::{PyKeypointLayout, carried};
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]

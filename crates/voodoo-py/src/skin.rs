@@ -6,9 +6,9 @@ use numpy::{
 use pyo3::prelude::*;
 use voodoo_core::math::Vec3;
 use voodoo_core::observation::chroma::{CHROMA_BINS, LUMA_BINS};
+use voodoo_core::observation::eye::Eye;
 use voodoo_core::skin::candidates::{Candidate, candidates};
 use voodoo_core::skin::cue::{Look, SkinCue, SkinSettings};
-use voodoo_core::skin::eye::Eye;
 use voodoo_core::skin::rules::{Expected, LimbDistances};
 use voodoo_core::skin::teacher::{Pace, Shown, Teacher};
 
@@ -47,7 +47,7 @@ fn eye(world_from_sensor: &PyReadonlyArray2<'_, f64>, intrinsics: [f64; 4]) -> P
 }
 
 /// Two columns of what a function of Python makes of some rows.
-fn pairs<'py, const N: usize>(function: &Bound<'py, PyAny>, rows: &[[f64; N]]) -> PyResult<Vec<[f64; 2]>> {
+pub fn pairs<'py, const N: usize>(function: &Bound<'py, PyAny>, rows: &[[f64; N]]) -> PyResult<Vec<[f64; 2]>> {
     let py = function.py();
     let array = PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), N])?;
     let found: PyReadonlyArray2<'py, f64> = function.call1((array,))?.extract()?;

@@ -96,8 +96,10 @@ class SitePredictor:
                 known = dict(zip(self._names, before, strict=True))
                 before = np.array([known.get(name, _NOWHERE) for name in names])
             velocity = (positions - before) / (stamp - self._stamp)
+            speeds = lengths(velocity)
             # NaN: the site is new.
-            velocity[~(lengths(velocity) <= self.max_speed)] = 0.0
+            if not speeds.max(initial=0.0) <= self.max_speed:
+                velocity[~(speeds <= self.max_speed)] = 0.0
         self._names, self._stamp, self._positions, self._velocity = names, stamp, positions, velocity
 
     def predict(self, stamp: float) -> dict[str, FloatArray]:

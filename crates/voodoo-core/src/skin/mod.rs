@@ -19,7 +19,6 @@ pub mod candidates;
 pub mod colors;
 pub mod cue;
 mod discs;
-pub mod eye;
 mod naming;
 mod outline;
 pub mod rules;

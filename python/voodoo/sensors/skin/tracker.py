@@ -46,7 +46,7 @@ class Followed(NamedTuple):
 
     Args:
         label: the site whose name it has.
-        count: pictures in which it was seen.
+        pictures: in which it was seen.
         stamp: when it was last seen [s].
         velocity: (3,) [m/s].
         far: of each site how far it was from there, squared shares of the gate.
@@ -54,7 +54,7 @@ class Followed(NamedTuple):
     """
 
     label: str | None
-    count: int
+    pictures: int
     stamp: float
     velocity: tuple[float, ...]
     far: tuple[float, ...]
@@ -69,7 +69,9 @@ class SkinTracker:
         self.settings = chosen = settings or SkinSettings()
         self._sites = tuple(chosen.sites)
         # Shoulder, elbow and hand of each site's side.
-        self._arms = [(site, *(f"{site[:1]}_{joint}" for joint in ("shoulder", "elbow", "hand"))) for site in self._sites]
+        self._arms = [
+            (site, *(f"{site[:1]}_{joint}" for joint in ("shoulder", "elbow", "hand"))) for site in self._sites
+        ]
         self._teacher = _core.SkinTeacher()
         self._cue = _core.SkinCue(
             self._sites,
@@ -186,7 +188,9 @@ class SkinTracker:
         others = None if strangers is None else np.asarray(strangers(places), dtype=np.float32)
         noise, focal = self.settings.noise, (camera.fx * camera.fy) ** 0.5
         rays = []
-        for number, origin, direction, place, z in self._cue.name(tuple(limbs), np.asarray(away, dtype=np.float32), others):
+        for number, origin, direction, place, z in self._cue.name(
+            tuple(limbs), np.asarray(away, dtype=np.float32), others
+        ):
             site = self._sites[number]
             bias = self.settings.sites[site]
             if site in head_visible:

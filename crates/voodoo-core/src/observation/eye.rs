@@ -1,4 +1,4 @@
-//! The colour camera that skin is looked for with: where it stands, and without distortion where a place is in its picture.
+//! A camera of pictures: where it stands, and without distortion where a place is in its picture.
 
 use crate::math::Vec3;
 use crate::observation::body_view::Matrix;
