@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,7 +44,9 @@ class SiteGate:
 
     def __copy__(self) -> SiteGate:
         """The same, with a memory of its own."""
-        return replace(self, _last=dict(self._last))
+        twin = SiteGate.__new__(SiteGate)
+        vars(twin).update(vars(self), _last=dict(self._last))
+        return twin
 
     def limit(self, site: str, source: str, stamp: float) -> float:
         """Radius [m] of a site's gate at `stamp` [s]."""

@@ -24,6 +24,7 @@ pub struct Teacher {
     pictures: u32,
     /// How much of the time each pixel shows skin where no skin is.
     always: Vec<f32>,
+    next: Vec<f32>,
     size: [usize; 2],
     away: Vec<u8>,
 }
@@ -105,26 +106,29 @@ impl Teacher {
             self.size = size;
         }
         let (new, old) = (share as f32, 1.0 - share as f32);
-        let (always, away) = (&mut self.always, &self.away);
-        let change = |always: &mut f32, seen: u8, learns: bool| {
-            let changed = f32::from(seen) * new + *always * old;
-            *always = if learns { changed } else { *always };
+        let changed = |always: f32, seen: u8, learns: bool| {
+            let changed = f32::from(seen) * new + always * old;
+            if learns { changed } else { always }
         };
+        // Written where nothing is read: in place the compiler would write under a mask, which takes long.
+        self.next.resize(seen.len(), 0.0);
+        let pixels = self.next.iter_mut().zip(&self.always).zip(seen.iter().zip(&self.away));
         widest(
             #[inline(always)]
             || match before {
                 Some(before) => {
-                    for (((always, seen), away), before) in always.iter_mut().zip(seen).zip(away).zip(before) {
-                        change(always, *seen, (*away != 0) & !*before);
+                    for (((next, always), (seen, away)), before) in pixels.zip(before) {
+                        *next = changed(*always, *seen, (*away != 0) & !*before);
                     }
                 }
                 None => {
-                    for ((always, seen), away) in always.iter_mut().zip(seen).zip(away) {
-                        change(always, *seen, *away != 0);
+                    for ((next, always), (seen, away)) in pixels {
+                        *next = changed(*always, *seen, *away != 0);
                     }
                 }
             },
         );
+        std::mem::swap(&mut self.always, &mut self.next);
     }
 }
 

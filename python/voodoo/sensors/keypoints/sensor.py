@@ -54,6 +54,10 @@ class KeypointReport:
     unseen: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
 
+    def __copy__(self) -> KeypointReport:
+        """Itself: it never changes."""
+        return self
+
 
 @dataclass(frozen=True)
 class KeypointSensor:
@@ -84,9 +88,9 @@ class KeypointSensor:
 
     def __post_init__(self) -> None:
         """Check what does not depend on a picture."""
-        known = [part.site for part in layout_of(self.layout).parts]
-        unknown = sorted(set(self.sites or ()) - set(known))
-        if unknown:
+        parts = layout_of(self.layout).parts
+        if self.sites and (unknown := sorted(set(self.sites) - {part.site for part in parts})):
+            known = [part.site for part in parts]
             raise MeasurementError(f"sites: expected some of {', '.join(known)}, found {', '.join(unknown)}")
         checked_camera(self.camera)
         rigid(self.world_from_sensor)
