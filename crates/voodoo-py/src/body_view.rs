@@ -110,7 +110,7 @@ impl PyStillDepth {
     }
 
     fn __copy__(&self) -> Self {
-        Self(self.0.clone())
+        Self(self.0.twin())
     }
 
     #[getter]

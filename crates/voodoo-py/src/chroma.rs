@@ -52,7 +52,8 @@ pub fn skin_mask<'py>(
         always: always.as_ref().map(|mask| mask.as_slice()).transpose()?,
         before: before.as_ref().map(|mask| mask.as_slice()).transpose()?,
     };
-    let (seen, skin) = py.detach(|| picture.skin(longest)).map_err(|error| error.into_py(py))?;
+    let (mut seen, mut skin) = (Vec::new(), Vec::new());
+    py.detach(|| picture.find(longest, &mut seen, &mut skin)).map_err(|error| error.into_py(py))?;
     Ok((mask_of(py, seen, size)?, mask_of(py, skin, size)?))
 }
 

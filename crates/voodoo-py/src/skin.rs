@@ -149,7 +149,7 @@ impl PySkinCue {
     }
 
     fn __copy__(&self) -> Self {
-        Self(self.0.clone())
+        Self(self.0.twin())
     }
 
     #[getter]
@@ -164,7 +164,7 @@ impl PySkinCue {
 
     #[getter]
     fn candidates(&self) -> Vec<Place> {
-        self.0.candidates.iter().map(told).collect()
+        self.0.candidates().iter().map(told).collect()
     }
 
     #[getter]
@@ -241,10 +241,10 @@ impl PySkinCue {
             settled,
         };
         py.detach(|| self.0.look(&look)).map_err(|error| error.into_py(py))?;
-        if self.0.candidates.is_empty() {
+        if self.0.candidates().is_empty() {
             return Ok(None);
         }
-        let pixels: Vec<[f64; 2]> = self.0.candidates.iter().map(|item| item.pixel).collect();
+        let pixels: Vec<[f64; 2]> = self.0.candidates().iter().map(|item| item.pixel).collect();
         let flat = match lens {
             Some(lens) => pairs(lens, &pixels)?,
             None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),

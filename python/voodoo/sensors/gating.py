@@ -110,7 +110,15 @@ class SitePredictor:
         Raises:
             MeasurementError: no estimate yet.
         """
+        return dict(zip(self._names, self.positions(stamp), strict=True))
+
+    def positions(self, stamp: float) -> FloatArray:
+        """The same of all sites (J, 3) [m].
+
+        Raises:
+            MeasurementError: no estimate yet.
+        """
         if not self._names:
             raise MeasurementError("prediction: expected an estimate first, found none")
         elapsed = self.velocity_share * (stamp - self._stamp) if math.isfinite(self._stamp) else 0.0
-        return dict(zip(self._names, self._positions + elapsed * self._velocity, strict=True))
+        return np.asarray(self._positions + elapsed * self._velocity)

@@ -55,9 +55,25 @@ pub struct StillDepth {
     /// Images are never changed in place: copies share them.
     farthest: Arc<Vec<f32>>,
     last: VecDeque<Arc<Vec<f32>>>,
+    /// Images that are needed no more, once no copy has them.
+    spare: VecDeque<Arc<Vec<f32>>>,
 }
 
 impl StillDepth {
+    /// The same, without memory that it would reuse.
+    pub fn twin(&self) -> Self {
+        let mut twin = self.clone();
+        twin.spare.clear();
+        twin
+    }
+
+    /// Memory for an image.
+    fn image(&mut self) -> Vec<f32> {
+        let mut image = self.spare.pop_front().and_then(|spare| Arc::try_unwrap(spare).ok()).unwrap_or_default();
+        image.clear();
+        image
+    }
+
     /// Takes up an image, metres, 0 = no return, of so many rows and columns; a camera that has moved starts anew.
     ///
     /// Of every pixel whether it shows what may be the scene, and whether something before what was seen there once; none as long
@@ -75,14 +91,16 @@ impl StillDepth {
         } else {
             // A NaN stays one.
             let farther = |(far, z): (&f32, &f32)| if *far > *z || far.is_nan() { *far } else { *z };
-            self.farthest = Arc::new(self.farthest.iter().zip(&z).map(farther).collect());
+            let mut farthest = self.image();
+            farthest.extend(self.farthest.iter().zip(&z).map(farther));
+            self.spare.push_back(std::mem::replace(&mut self.farthest, Arc::new(farthest)));
         }
         let found = match self.last.front() {
             Some(then) if self.last.len() == STAYS => Some(still(&z, &self.farthest, then, size[1])?),
             _ => None,
         };
         if self.last.len() == STAYS {
-            self.last.pop_front();
+            self.spare.extend(self.last.pop_front());
         }
         self.last.push_back(Arc::new(z));
         Ok(found)
@@ -153,7 +171,8 @@ impl Beside<'_> {
         }
         let (low, high) = self.bounds();
         let [rows, columns] = self.window(low, high).map(|span| span.start.div_ceil(step)..span.end.div_ceil(step));
-        let depth = self.metres();
+        let mut scene = scene;
+        let depth = self.metres(scene.as_mut().map_or_else(Vec::new, |scene| scene.image()));
         let window = Window { depth: &depth, size, rays: self.rays, camera: self.size, step, rows, columns };
         let (points, pixels) = window.within(low, high, &self.world_from_depth, &self.color_from_depth)?;
         let standing = match scene {
@@ -165,20 +184,21 @@ impl Beside<'_> {
         Ok(Nearby { points, still, moved })
     }
 
-    fn metres(&self) -> Vec<f32> {
-        let scale = self.metres_per_unit as f32;
-        let ([_, width], step) = (self.size, self.step.max(1));
-        fn scaled<T: Copy>(pixels: &[T], width: usize, step: usize, to: impl Fn(T) -> f32) -> Vec<f32> {
-            if step == 1 {
-                return pixels.iter().map(|pixel| to(*pixel)).collect();
+    /// Every step-th row and column, metres, into memory.
+    fn metres(&self, mut metres: Vec<f32>) -> Vec<f32> {
+        let (scale, width, step) = (self.metres_per_unit as f32, self.size[1].max(1), self.step.max(1));
+        fn every<T: Copy>(pixels: &[T], width: usize, step: usize) -> impl Iterator<Item = T> {
+            pixels.chunks(width).step_by(step).flat_map(move |row| row.iter().step_by(step)).copied()
+        }
+        match (self.image, step) {
+            (DepthPixels::U16(pixels), 1) => metres.extend(pixels.iter().map(|pixel| f32::from(*pixel) * scale)),
+            (DepthPixels::U16(pixels), _) => {
+                metres.extend(every(pixels, width, step).map(|pixel| f32::from(pixel) * scale));
             }
-            let rows = pixels.chunks(width.max(1)).step_by(step);
-            rows.flat_map(|row| row.iter().step_by(step)).map(|pixel| to(*pixel)).collect()
+            (DepthPixels::F32(pixels), 1) => metres.extend(pixels.iter().map(|pixel| pixel * scale)),
+            (DepthPixels::F32(pixels), _) => metres.extend(every(pixels, width, step).map(|pixel| pixel * scale)),
         }
-        match self.image {
-            DepthPixels::U16(pixels) => scaled(pixels, width, step, |pixel| f32::from(pixel) * scale),
-            DepthPixels::F32(pixels) => scaled(pixels, width, step, |pixel| pixel * scale),
-        }
+        metres
     }
 
     fn in_depth(&self, place: [f64; 3]) -> [f64; 3] {
@@ -245,5 +265,63 @@ impl Nearby {
         let still = self.still.map(|still| projected.inside.iter().map(|index| still[inside(index)]).collect());
         let pixels = projected.inside.iter().map(|index| pixels[inside(index)]).collect();
         Ok(BodyView { size, mask, pixels, depths, still, before })
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    const LEVEL: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+    #[test]
+    fn a_scene_is_known_after_some_pictures_and_copies_have_their_own() {
+        let mut scene = StillDepth::default();
+        for count in 0..9 {
+            let twin = scene.twin();
+            let found = scene.see(vec![3.0; 12], [3, 4], &LEVEL).unwrap();
+            assert_eq!(found.is_some(), count >= STAYS, "{count}");
+            assert_eq!(twin.last.len(), count.min(STAYS));
+        }
+        let twin = scene.twin();
+        let mut hand = vec![3.0; 12];
+        hand[5] = 2.0;
+        hand[11] = f32::NAN;
+        let (still, before) = scene.see(hand, [3, 4], &LEVEL).unwrap().unwrap();
+        assert_eq!((still[5], before[5], still[0]), (false, true, true));
+        assert!(scene.farthest()[11].is_nan() && twin.farthest() == [3.0; 12]);
+        let moved = [[1.0, 0.0, 0.0, 0.01], LEVEL[1], LEVEL[2], LEVEL[3]];
+        assert!(scene.see(vec![3.0; 12], [3, 4], &moved).unwrap().is_none());
+    }
+
+    #[test]
+    fn the_body_is_looked_for_in_its_box_alone() {
+        let mut image = vec![4000_u16; 24 * 16];
+        (6..10).for_each(|row| image[row * 24 + 8..row * 24 + 12].fill(2000));
+        let rays: Vec<[f32; 2]> =
+            (0..16).flat_map(|v| (0..24).map(move |u| [(u as f32 - 11.5) / 20.0, (v as f32 - 7.5) / 20.0])).collect();
+        let beside = Beside {
+            image: DepthPixels::U16(&image),
+            metres_per_unit: 0.001,
+            size: [16, 24],
+            intrinsics: Some([20.0, 20.0, 11.5, 7.5]),
+            rays: &rays,
+            world_from_depth: LEVEL,
+            color_from_depth: LEVEL,
+            step: 1,
+            margin: 0.3,
+            joints: &[[-0.2, 0.0, 1.9], [-0.1, 0.1, 2.0], [-0.1, 0.1, 2.2]],
+        };
+        assert_eq!(beside.away(), 2.0);
+        let nearby = beside.nearby(None).unwrap();
+        assert_eq!(nearby.points.len(), 16);
+        let pixels = nearby.projected([20.0, 20.0, 11.5, 7.5]);
+        let view = nearby.view(pixels, &vec![false; 24 * 16], 1, [16, 24]).unwrap();
+        assert_eq!(view.mask.iter().filter(|pixel| **pixel).count(), 36);
+        assert!((view.depths[0] - 2.0).abs() < 1e-6 && view.mask[5 * 24 + 7] && !view.mask[4 * 24 + 7]);
+        let coarse = Beside { step: 2, intrinsics: None, ..beside };
+        assert_eq!(coarse.nearby(None).unwrap().points.len(), 4);
+        assert!(Beside { size: [16, 23], ..beside }.nearby(None).is_err());
     }
 }

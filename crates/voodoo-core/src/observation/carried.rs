@@ -106,7 +106,7 @@ mod tests {
             share: 1.0,
             max_speed: 8.0,
         };
-        let points = [[0.1, 1.0, 0.0], [0.0, 0.0, 0.0], [5.0, 5.0, 5.0]];
+        let points = [[0.1, 1.0, 0.0], [0.0, 0.2, 0.0], [5.0, 5.0, 5.0]];
         assert_eq!(carrying.around(&points), [0, 1]);
         let mut moved = points;
         carrying.carry(&mut moved, &[0, 1], &[0.1, 0.3]);

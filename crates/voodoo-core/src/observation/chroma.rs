@@ -17,7 +17,14 @@ const DARK: u16 = 1 << 15;
 /// The bin of every pixel (blue, green, red), and a mark of dark ones: luma and chroma as ITU-R BT.601 has them, rounded to whole
 /// numbers of eight bits.
 pub fn bins(image: &[[u8; 3]]) -> Vec<u16> {
-    let mut found = vec![0; image.len()];
+    let mut found = Vec::new();
+    find_bins(image, &mut found);
+    found
+}
+
+/// The same, into `found`.
+pub fn find_bins(image: &[[u8; 3]], found: &mut Vec<u16>) {
+    found.resize(image.len(), 0);
     widest(
         #[inline(always)]
         || {
@@ -26,7 +33,6 @@ pub fn bins(image: &[[u8; 3]]) -> Vec<u16> {
             }
         },
     );
-    found
 }
 
 #[inline(always)]
@@ -46,16 +52,65 @@ pub fn is_among(bin: u16, table: &[bool; BINS]) -> bool {
     table[usize::from(bin & !DARK)] & (bin & DARK == 0)
 }
 
-/// 1 where a pixel is light enough and its bin is one of a `table`'s, which has [`BINS`].
+/// 1 where a pixel is light enough and its bin is one of a `table`'s, which has [`BINS`]; into `found`.
 ///
 /// # Errors
 /// [`TrackError::Measurement`] when the table has another size.
-pub fn among(bins: &[u16], table: &[bool]) -> Result<Vec<u8>, TrackError> {
+pub fn find_among(bins: &[u16], table: &[bool], found: &mut Vec<u8>) -> Result<(), TrackError> {
     let count = table.len();
     let Ok(table): Result<&[bool; BINS], _> = table.try_into() else {
         return Err(TrackError::measurement("table", "a mark for each of 32768 bins", count.to_string()));
     };
-    Ok(bins.iter().map(|bin| u8::from(is_among(*bin, table))).collect())
+    let within = Chroma::of(table);
+    found.clear();
+    found.resize(bins.len(), 0);
+    widest(
+        #[inline(always)]
+        || {
+            for (bins, found) in bins.chunks(BLOCK).zip(found.chunks_mut(BLOCK)) {
+                if within.any(bins) {
+                    found.iter_mut().zip(bins).for_each(|(found, bin)| *found = u8::from(is_among(*bin, table)));
+                }
+            }
+        },
+    );
+    Ok(())
+}
+
+/// Pixels that are looked up one by one only if one of them has about the right chroma.
+const BLOCK: usize = 64;
+
+/// Least and greatest Cr and Cb of a table's bins.
+struct Chroma {
+    cr: [u16; 2],
+    cb: [u16; 2],
+}
+
+impl Chroma {
+    fn of(table: &[bool; BINS]) -> Self {
+        let mut found = Self { cr: [u16::MAX, 0], cb: [u16::MAX, 0] };
+        for (column, luma) in table.as_chunks::<LUMA_BINS>().0.iter().enumerate() {
+            if luma.iter().fold(false, |any, marked| any | marked) {
+                let (cr, cb) = ((column / CHROMA_BINS) as u16, (column % CHROMA_BINS) as u16);
+                found.cr = [found.cr[0].min(cr), found.cr[1].max(cr)];
+                found.cb = [found.cb[0].min(cb), found.cb[1].max(cb)];
+            }
+        }
+        found
+    }
+
+    /// Whether some of these bins are in between.
+    #[inline(always)]
+    fn any(&self, bins: &[u16]) -> bool {
+        let width = |[low, high]: [u16; 2]| high.wrapping_sub(low);
+        let (cr_width, cb_width) = (width(self.cr), width(self.cb));
+        let inside = |bin: &u16| {
+            let (cr, cb) = (bin >> 9, bin >> 3 & 63);
+            // Below the least the difference is large.
+            (cr.wrapping_sub(self.cr[0]) <= cr_width) & (cb.wrapping_sub(self.cb[0]) <= cb_width)
+        };
+        self.cr[0] <= self.cr[1] && bins.iter().fold(false, |any, bin| any | inside(bin))
+    }
 }
 
 /// Counts pixels of two kinds by their bins; its memory is kept.
@@ -66,33 +121,23 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Nothing is counted yet.
-    pub fn start(&mut self) {
-        for table in &mut self.tables {
-            table.clear();
-            table.resize(BINS, [0; 2]);
-        }
-    }
-
-    /// Counts those pixels that are marked, of which some are of the other kind: bin, mark and kind of each.
+    /// Counts pixels that are marked, of which some are of the other kind: bin, mark and kind of each.
     pub fn count(&mut self, pixels: impl Iterator<Item = (u16, bool, bool)>) {
         let [even, odd] = &mut self.tables;
+        even.resize(BINS, [0; 2]);
+        odd.resize(BINS, [0; 2]);
         for (index, (bin, mark, other)) in pixels.enumerate() {
             let table = if index % 2 == 0 { &mut *even } else { &mut *odd };
             table[usize::from(bin & !DARK)][usize::from(other)] += u32::from(mark);
         }
     }
 
-    /// Pixels that were counted, and those of the other kind.
-    pub fn pixels(&self) -> [usize; 2] {
-        let sum = |kind: usize| self.tables.iter().flatten().map(|counts| counts[kind] as usize).sum::<usize>();
-        [sum(0) + sum(1), sum(1)]
-    }
-
-    /// How many pixels of the one kind and of the other each bin has.
-    pub fn counts(&self) -> impl Iterator<Item = [f32; 2]> + '_ {
-        let [even, odd] = &self.tables;
-        even.iter().zip(odd).map(|(even, odd)| [0, 1].map(|kind| (even[kind] + odd[kind]) as f32))
+    /// Tells of each bin how many pixels of the one kind and of the other it has, and forgets them.
+    pub fn take(&mut self, mut tell: impl FnMut(usize, [u32; 2])) {
+        let [even, odd] = &mut self.tables;
+        for (bin, (even, odd)) in even.iter_mut().zip(odd).enumerate() {
+            tell(bin, [0, 1].map(|kind| std::mem::take(&mut even[kind]) + std::mem::take(&mut odd[kind])));
+        }
     }
 }
 
@@ -133,15 +178,19 @@ mod tests {
         for bin in &found[..2] {
             table[usize::from(bin & !DARK)] = true;
         }
-        assert_eq!(among(&found, &table).unwrap(), [1, 0, 0, 1]);
+        let mut marks = Vec::new();
+        find_among(&found, &table, &mut marks).unwrap();
+        assert_eq!(marks, [1, 0, 0, 1]);
         let mut counter = Counter::default();
-        counter.start();
-        counter.count(
-            found.iter().copied().zip([true, true, true, false]).map(|(bin, mark)| (bin, mark, bin & DARK != 0)),
-        );
-        let counts: Vec<[f32; 2]> = counter.counts().collect();
-        assert_eq!((counter.pixels(), counts[usize::from(found[0])]), ([3, 1], [1.0, 0.0]));
-        assert_eq!(counts[usize::from(found[1] & !DARK)], [0.0, 1.0]);
-        assert!(among(&found, &table[1..]).is_err());
+        let marked = found.iter().copied().zip([true, true, true, false]);
+        counter.count(marked.map(|(bin, mark)| (bin, mark, bin & DARK != 0)));
+        let mut counts = vec![[0; 2]; BINS];
+        counter.take(|bin, found| counts[bin] = found);
+        assert_eq!((counts[usize::from(found[0])], counts[usize::from(found[1] & !DARK)]), ([1, 0], [0, 1]));
+        assert_eq!(counts.iter().flatten().sum::<u32>(), 3);
+        counter.take(|_, found| assert_eq!(found, [0; 2]));
+        find_among(&found, &[false; BINS], &mut marks).unwrap();
+        assert_eq!(marks, [0; 4]);
+        assert!(find_among(&found, &table[1..], &mut marks).is_err());
     }
 }

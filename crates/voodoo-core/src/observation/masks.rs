@@ -40,8 +40,16 @@ fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) 
 
 /// What most of each pixel and its eight neighbours are; beyond the border a picture goes on as it ends.
 pub fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
-    by_rows(
-        mask,
+    let mut found = Vec::new();
+    smooth(mask, width, &mut found);
+    found
+}
+
+/// The same, into `found`.
+pub fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
+    found.resize(mask.len(), 0);
+    fill_rows(
+        found,
         width,
         #[inline(always)]
         |index, row, found| {
@@ -61,8 +69,14 @@ pub fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
 }
 
 /// A mask made row by row: `make` gets the number of a row, working memory for one, and the row to fill.
-fn by_rows(mask: &[u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mut [u8])) -> Vec<u8> {
-    let (mut row, mut found) = (vec![0; width], vec![0; mask.len()]);
+fn by_rows(mask: &[u8], width: usize, make: impl FnMut(usize, &mut [u8], &mut [u8])) -> Vec<u8> {
+    let mut found = vec![0; mask.len()];
+    fill_rows(&mut found, width, make);
+    found
+}
+
+fn fill_rows(found: &mut [u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mut [u8])) {
+    let mut row = vec![0; width];
     widest(
         #[inline(always)]
         || {
@@ -71,7 +85,15 @@ fn by_rows(mask: &[u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mu
             }
         },
     );
-    found
+}
+
+/// A part of a mask of so many columns.
+pub fn cut(mask: &[u8], width: usize, rows: &std::ops::Range<usize>, columns: &std::ops::Range<usize>) -> Vec<u8> {
+    let mut part = Vec::with_capacity(rows.len() * columns.len());
+    for row in rows.clone() {
+        part.extend_from_slice(&mask[row * width..][columns.clone()]);
+    }
+    part
 }
 
 /// Whether a row of a mask holds nothing; all of it is read at once, which is faster than to look for the first pixel.

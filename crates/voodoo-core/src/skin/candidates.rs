@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::observation::mask_regions::{Region, regions};
-use crate::observation::masks::bounds;
+use crate::observation::masks::{bounds, cut};
 use crate::observation::registration::Labels;
 use crate::skin::outline::Cutout;
 
@@ -43,7 +43,7 @@ pub fn candidates(skin: &[u8], width: usize, palm: f64) -> (Vec<Candidate>, Labe
     let largest = MOST_FACES * PI * (FACE / PALM * palm).powi(2);
     // Regions are numbered by two by two pixels: the part begins with whole ones.
     let [rows, columns] = bounds(skin, width).map(|span| span.start / 2 * 2..span.end);
-    let part: Vec<u8> = rows.clone().flat_map(|row| &skin[row * width..][columns.clone()]).copied().collect();
+    let part = cut(skin, width, &rows, &columns);
     let (regions, values) = regions(&part, columns.len());
     let labels = Labels { first: [rows.start, columns.start], size: [rows.len(), columns.len()], values };
     let mut found = Vec::new();

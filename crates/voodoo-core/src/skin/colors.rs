@@ -93,7 +93,13 @@ impl Default for SkinColors {
 }
 
 fn sum(values: &[f32]) -> f64 {
-    values.iter().map(|value| f64::from(*value)).sum()
+    // Several sums, so that none waits for the last.
+    let (blocks, rest) = values.as_chunks::<8>();
+    let mut sums = [0.0_f64; 8];
+    for block in blocks {
+        sums.iter_mut().zip(block).for_each(|(sum, value)| *sum += f64::from(*value));
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|value| f64::from(*value)).sum::<f64>()
 }
 
 impl SkinColors {
@@ -125,11 +131,13 @@ impl SkinColors {
             values.clear();
             values.resize(BINS, 0.0);
         }
+        let mut seen = BINS..0;
         for found in places {
             // So few pixels are counted without rounding.
             found.iter().for_each(|bin| shares[usize::from(*bin)] += 1.0);
             let planes = smooth(shares, work);
             let count = found.len() as f32;
+            seen = seen.start.min(planes.start)..seen.end.max(planes.end);
             for ((most, shown), share) in
                 most[planes.clone()].iter_mut().zip(&mut shown[planes.clone()]).zip(&mut shares[planes])
             {
@@ -138,7 +146,7 @@ impl SkinColors {
                 *most = most.max(smoothed);
             }
         }
-        let total = sum(shown);
+        let total = sum(&shown[seen.clone()]);
         if total < IN_COMMON {
             return false;
         }
@@ -173,20 +181,23 @@ impl SkinColors {
 
     /// Shares of bins where no skin is; half of them of the body's clothes, where it is known.
     fn count_rest(&mut self, lesson: &Lesson, shares: &mut [f32]) {
-        self.counter.start();
         let outside = lesson.outside.iter().map(|outside| *outside != 0);
         let pixels = lesson.bins.iter().copied().zip(outside);
+        let mut all = lesson.outside.iter().map(|outside| u32::from(*outside)).sum::<u32>();
+        let mut clothes = 0;
         match lesson.body {
-            Some(body) => self.counter.count(pixels.zip(body).map(|((bin, outside), body)| (bin, outside, *body))),
+            Some(body) => {
+                clothes =
+                    lesson.outside.iter().zip(body).map(|(outside, body)| u32::from(*outside & u8::from(*body))).sum();
+                self.counter.count(pixels.zip(body).map(|((bin, outside), body)| (bin, outside, *body)));
+            }
             None => self.counter.count(pixels.map(|(bin, outside)| (bin, outside, false))),
         }
-        let [all, clothes] = self.counter.pixels().map(|count| count as f32);
-        for (share, [other, inside]) in shares.iter_mut().zip(self.counter.counts()) {
-            *share = (other + inside) / all.max(1.0);
-            if clothes > 0.0 {
-                *share = 0.5 * *share + 0.5 * (inside / clothes);
-            }
-        }
+        all = all.max(1);
+        self.counter.take(|bin, [other, inside]| {
+            let share = (other + inside) as f32 / all as f32;
+            shares[bin] = if clothes > 0 { 0.5 * share + 0.5 * (inside as f32 / clothes as f32) } else { share };
+        });
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::body_view::BodyView;
-use crate::observation::chroma::bins;
+use crate::observation::chroma::find_bins;
 use crate::observation::mask_regions::SkinPicture;
 use crate::observation::registration::Labels;
 use crate::skin::blobs::{Blobs, Sight};
@@ -85,7 +85,7 @@ pub struct Look<'a> {
 pub struct Picture {
     /// Rows and columns.
     pub size: [usize; 2],
-    /// Of each pixel's colour, see [`bins`].
+    /// Of each pixel's colour, see [`crate::observation::chroma::bins`].
     pub bins: Vec<u16>,
     /// 1 where it has skin's colour.
     pub seen: Vec<u8>,
@@ -110,6 +110,20 @@ pub struct FoundSite {
     pub depth: f64,
 }
 
+/// What was found in a picture, before names are given.
+#[derive(Clone, Debug, Default)]
+struct Looked {
+    candidates: Vec<Candidate>,
+    labels: Arc<Labels>,
+    expected: Vec<Expected>,
+    sights: Vec<Sight>,
+    /// Of the sights along the optical axis, metres.
+    depths: Vec<f64>,
+    origin: Vec3,
+    stamp: f64,
+    focal: f64,
+}
+
 /// The skin cue of one camera: what changes from picture to picture.
 #[derive(Clone, Debug)]
 pub struct SkinCue {
@@ -119,17 +133,10 @@ pub struct SkinCue {
     pub blobs: Blobs,
     /// The last picture.
     pub picture: Arc<Picture>,
-    /// Its candidates.
-    pub candidates: Vec<Candidate>,
     /// Pairs of a site's and a candidate's number.
     pub assigned: Vec<(usize, usize)>,
-    labels: Arc<Labels>,
-    expected: Vec<Expected>,
-    sights: Vec<Sight>,
-    depths: Vec<f64>,
-    origin: Vec3,
-    stamp: f64,
-    focal: f64,
+    looked: Looked,
+    spare: Option<Arc<Picture>>,
 }
 
 impl SkinCue {
@@ -139,16 +146,22 @@ impl SkinCue {
             blobs: Blobs::new(settings.sites.len()),
             settings,
             picture: Arc::default(),
-            candidates: Vec::new(),
             assigned: Vec::new(),
-            labels: Arc::default(),
-            expected: Vec::new(),
-            sights: Vec::new(),
-            depths: Vec::new(),
-            origin: Vec3::ZERO,
-            stamp: 0.0,
-            focal: 1.0,
+            looked: Looked::default(),
+            spare: None,
         }
+    }
+
+    /// Where in the last picture a head or a hand may be.
+    pub fn candidates(&self) -> &[Candidate] {
+        &self.looked.candidates
+    }
+
+    /// The same, without memory that it would reuse.
+    pub fn twin(&self) -> Self {
+        let mut twin = self.clone();
+        twin.spare = None;
+        twin
     }
 
     /// Looks for regions of skin; their candidates are then known.
@@ -157,30 +170,34 @@ impl SkinCue {
     /// [`TrackError::Measurement`] when sizes do not fit together.
     pub fn look(&mut self, look: &Look) -> Result<(), TrackError> {
         let palm = PALM * look.focal / nearest(look.expected);
-        let bins = bins(look.image);
+        // The last picture but one is needed no more.
+        let mut picture = self.spare.take().and_then(|spare| Arc::try_unwrap(spare).ok()).unwrap_or_default();
+        find_bins(look.image, &mut picture.bins);
         let body = look.body.filter(|body| body.size == look.size);
         if look.body.is_some() && body.is_none() {
             return Err(TrackError::measurement("body", "a view of the picture's size", format!("{:?}", look.size)));
         }
-        let picture = SkinPicture {
-            bins: &bins,
+        let Picture { bins, seen, skin, .. } = &mut picture;
+        let looked = SkinPicture {
+            bins,
             width: look.size[1],
             table: &look.teacher.colors.table[..],
             body: body.map(|body| &body.mask[..]),
             always: look.teacher.always(look.size),
             before: body.and_then(|body| body.before.as_deref()),
         };
-        let (seen, skin) = picture.skin(LONGEST_JOINED * palm)?;
-        (self.candidates, self.labels) = if look.settled && !look.expected.is_empty() {
-            let (found, labels) = candidates(&skin, look.size[1], palm);
+        looked.find(LONGEST_JOINED * palm, seen, skin)?;
+        (self.looked.candidates, self.looked.labels) = if look.settled && !look.expected.is_empty() {
+            let (found, labels) = candidates(skin, look.size[1], palm);
             (found, Arc::new(labels))
         } else {
             Default::default()
         };
-        self.picture = Arc::new(Picture { size: look.size, bins, seen, skin, body: body.cloned() });
-        self.expected = look.expected.to_vec();
+        (picture.size, picture.body) = (look.size, body.cloned());
+        self.spare = Some(std::mem::replace(&mut self.picture, Arc::new(picture)));
+        self.looked.expected = look.expected.to_vec();
         self.assigned.clear();
-        (self.stamp, self.focal) = (look.stamp, look.focal);
+        (self.looked.stamp, self.looked.focal) = (look.stamp, look.focal);
         Ok(())
     }
 
@@ -191,25 +208,25 @@ impl SkinCue {
     /// # Errors
     /// [`TrackError::Measurement`] when there are not as many directions as candidates.
     pub fn place(&mut self, directions: &[Vec3], origin: Vec3, axis: Vec3) -> Result<&[Sight], TrackError> {
-        if directions.len() != self.candidates.len() {
-            let found = format!("{} for {}", directions.len(), self.candidates.len());
+        if directions.len() != self.looked.candidates.len() {
+            let found = format!("{} for {}", directions.len(), self.looked.candidates.len());
             return Err(TrackError::measurement("directions", "one for each candidate", found));
         }
-        let nearest = nearest(&self.expected);
+        let nearest = nearest(&self.looked.expected);
         let looked = match &self.picture.body {
             Some(body) => {
-                let places: Vec<_> = self.candidates.iter().map(|item| (item.pixel, item.region)).collect();
-                let radius = LOOKED_AT * PALM * self.focal / nearest;
-                body.measured().nearest_surfaces(&self.labels, &places, radius)?
+                let places: Vec<_> = self.looked.candidates.iter().map(|item| (item.pixel, item.region)).collect();
+                let radius = LOOKED_AT * PALM * self.looked.focal / nearest;
+                body.measured().nearest_surfaces(&self.looked.labels, &places, radius)?
             }
             None => vec![None; directions.len()],
         };
-        self.origin = origin;
-        (self.sights, self.depths) = (Vec::new(), Vec::new());
-        for ((direction, item), found) in directions.iter().zip(&self.candidates).zip(looked) {
+        self.looked.origin = origin;
+        (self.looked.sights, self.looked.depths) = (Vec::new(), Vec::new());
+        for ((direction, item), found) in directions.iter().zip(&self.looked.candidates).zip(looked) {
             let z = found.map_or(nearest, |(z, _)| z);
-            self.depths.push(z);
-            self.sights.push(Sight {
+            self.looked.depths.push(z);
+            self.looked.sights.push(Sight {
                 direction: *direction,
                 place: origin + *direction * (z / direction.dot(axis)),
                 deep: found.is_some(),
@@ -218,8 +235,8 @@ impl SkinCue {
                 still: found.is_some_and(|(_, still)| still),
             });
         }
-        self.blobs.follow(&self.sights, self.stamp);
-        Ok(&self.sights)
+        self.blobs.follow(&self.looked.sights, self.looked.stamp);
+        Ok(&self.looked.sights)
     }
 
     /// Which of the candidates each site is, and on which ray it was seen.
@@ -230,19 +247,19 @@ impl SkinCue {
     /// # Errors
     /// [`TrackError::Measurement`] when there are not as many distances as candidates.
     pub fn name(&mut self, limbs: &LimbDistances, strangers: Option<&[f32]>) -> Result<Vec<FoundSite>, TrackError> {
-        let count = self.sights.len();
+        let count = self.looked.sights.len();
         if limbs.away.len() != limbs.names.len() * count || strangers.is_some_and(|others| others.len() != count) {
             let found = format!("{} of {} limbs for {count}", limbs.away.len(), limbs.names.len());
             return Err(TrackError::measurement("distances", "one for each limb and candidate", found));
         }
         let specks: Vec<bool> = self
-            .candidates
+            .candidates()
             .iter()
-            .zip(&self.depths)
-            .map(|(item, z)| (item.area as f64) < SPECK * PI * (PALM * self.focal / z).powi(2))
+            .zip(&self.looked.depths)
+            .map(|(item, z)| (item.area as f64) < SPECK * PI * (PALM * self.looked.focal / z).powi(2))
             .collect();
         let seen = Seen {
-            sights: &self.sights,
+            sights: &self.looked.sights,
             blobs: &self.blobs.items[..count],
             specks: &specks,
             limbs,
@@ -250,21 +267,22 @@ impl SkinCue {
         };
         let theirs = |index: usize| {
             let known = strangers.filter(|_| !limbs.names.is_empty());
-            known.is_some_and(|others| self.sights[index].deep && others[index] < limbs.nearest(index))
+            known.is_some_and(|others| self.looked.sights[index].deep && others[index] < limbs.nearest(index))
         };
         let theirs: Vec<bool> = (0..count).map(theirs).collect();
-        let mut choices: Vec<Choice> = self.expected.iter().map(|site| self.choice(site, &seen, &theirs)).collect();
+        let mut choices: Vec<Choice> =
+            self.looked.expected.iter().map(|site| self.choice(site, &seen, &theirs)).collect();
         // Names are given below; what could be a piece of a hand is known before.
         let pieces: Vec<Vec<bool>> = choices.iter().map(|choice| self.pieces(choice)).collect();
         let rules =
             Rules { gate: self.settings.gate, growth: self.settings.growth, ambiguity: self.settings.ambiguity };
-        let named = self.blobs.name(&mut choices, &rules, self.stamp);
+        let named = self.blobs.name(&mut choices, &rules, self.looked.stamp);
         let taken: Vec<usize> = named.iter().map(|(_, column)| *column).collect();
         let free = |row: usize, column: &usize| pieces[row][*column] && !taken.contains(column);
-        self.assigned = named.iter().map(|(row, column)| (self.expected[*row].site, *column)).collect();
+        self.assigned = named.iter().map(|(row, column)| (self.looked.expected[*row].site, *column)).collect();
         let found = |&(row, column): &(usize, usize)| {
             let pieces: Vec<usize> = (0..count).filter(|column| free(row, column)).collect();
-            self.found(&self.expected[row], column, &pieces)
+            self.found(&self.looked.expected[row], column, &pieces)
         };
         Ok(named.iter().map(found).collect())
     }
@@ -275,8 +293,9 @@ impl SkinCue {
     }
 
     fn choice(&self, site: &Expected, seen: &Seen, theirs: &[bool]) -> Choice {
-        let inside: Vec<Vec3> = self.sights.iter().map(|sight| self.inside(site, sight)).collect();
+        let inside: Vec<Vec3> = self.looked.sights.iter().map(|sight| self.inside(site, sight)).collect();
         let distance: Vec<f64> = self
+            .looked
             .sights
             .iter()
             .zip(&inside)
@@ -284,7 +303,7 @@ impl SkinCue {
                 if sight.deep {
                     return inside.distance(site.place);
                 }
-                let offset = site.place - self.origin;
+                let offset = site.place - self.looked.origin;
                 (offset - offset.dot(sight.direction).max(0.0) * sight.direction).length()
             })
             .collect();
@@ -302,23 +321,23 @@ impl SkinCue {
     }
 
     fn pieces(&self, choice: &Choice) -> Vec<bool> {
-        let marks = choice.allowed.iter().zip(&choice.elsewhere).zip(&self.sights);
+        let marks = choice.allowed.iter().zip(&choice.elsewhere).zip(&self.looked.sights);
         marks.map(|((allowed, elsewhere), sight)| *allowed > 0 && !elsewhere && sight.deep).collect()
     }
 
     fn found(&self, site: &Expected, column: usize, pieces: &[usize]) -> FoundSite {
-        let sight = &self.sights[column];
+        let sight = &self.looked.sights[column];
         let mut direction = sight.direction;
         let mut place = sight.deep.then(|| self.inside(site, sight));
         if let (Some(whole), false) = (place, site.head) {
-            let pieces = pieces.iter().map(|piece| self.inside(site, &self.sights[*piece]));
+            let pieces = pieces.iter().map(|piece| self.inside(site, &self.looked.sights[*piece]));
             let middle = of_pieces(whole, pieces, site.place);
-            direction = (middle - self.origin).normalize();
+            direction = (middle - self.looked.origin).normalize();
             place = Some(middle);
         }
         let shift = site.to_palm();
         let place = place.map(|place| place + shift);
-        FoundSite { site: site.site, origin: self.origin + shift, direction, place, depth: site.depth }
+        FoundSite { site: site.site, origin: self.looked.origin + shift, direction, place, depth: site.depth }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is learnt from pictures: the colours of skin, and what always has them where no head or hand is.
 
-use crate::math::widest;
 use crate::observation::chroma::bins;
+use crate::observation::masks::is_empty;
 use crate::skin::candidates::{FACE, PALM};
 use crate::skin::colors::{Lesson, SkinColors};
 use crate::skin::cue::Picture;
@@ -14,6 +14,9 @@ const WITHIN: f64 = 0.8;
 /// Sites that far outside a picture are not looked at, pixels.
 const OUTSIDE: f64 = 1e4;
 
+/// Pixels that are passed over together where none of them ever had skin's colour.
+const BLOCK: usize = 64;
+
 /// Colours and background of one camera's pictures.
 #[derive(Clone, Debug, Default)]
 pub struct Teacher {
@@ -24,7 +27,8 @@ pub struct Teacher {
     pictures: u32,
     /// How much of the time each pixel shows skin where no skin is.
     always: Vec<f32>,
-    next: Vec<f32>,
+    /// Which blocks of pixels ever showed any.
+    shown: Vec<bool>,
     size: [usize; 2],
     away: Vec<u8>,
 }
@@ -104,31 +108,28 @@ impl Teacher {
         if self.size != size || self.always.len() != seen.len() {
             self.always = vec![0.0; seen.len()];
             self.size = size;
+            self.shown.clear();
         }
         let (new, old) = (share as f32, 1.0 - share as f32);
-        let changed = |always: f32, seen: u8, learns: bool| {
-            let changed = f32::from(seen) * new + always * old;
-            if learns { changed } else { always }
-        };
-        // Written where nothing is read: in place the compiler would write under a mask, which takes long.
-        self.next.resize(seen.len(), 0.0);
-        let pixels = self.next.iter_mut().zip(&self.always).zip(seen.iter().zip(&self.away));
-        widest(
-            #[inline(always)]
-            || match before {
-                Some(before) => {
-                    for (((next, always), (seen, away)), before) in pixels.zip(before) {
-                        *next = changed(*always, *seen, (*away != 0) & !*before);
-                    }
-                }
-                None => {
-                    for ((next, always), (seen, away)) in pixels {
-                        *next = changed(*always, *seen, *away != 0);
-                    }
-                }
-            },
-        );
-        std::mem::swap(&mut self.always, &mut self.next);
+        self.shown.resize(seen.len().div_ceil(BLOCK), false);
+        let blocks = self.always.chunks_mut(BLOCK).zip(seen.chunks(BLOCK)).zip(&mut self.shown);
+        for (block, ((always, seen), shown)) in blocks.enumerate() {
+            // What never showed skin has nothing to forget.
+            *shown |= !is_empty(seen);
+            if !*shown {
+                continue;
+            }
+            let here = block * BLOCK..block * BLOCK + always.len();
+            let mut learns = [0; BLOCK];
+            learns[..always.len()].copy_from_slice(&self.away[here.clone()]);
+            if let Some(before) = before {
+                learns.iter_mut().zip(&before[here]).for_each(|(learns, before)| *learns &= u8::from(!*before));
+            }
+            for ((always, seen), learns) in always.iter_mut().zip(seen).zip(&learns) {
+                let (share, kept) = if *learns != 0 { (new, old) } else { (0.0, 1.0) };
+                *always = *always * kept + f32::from(*seen) * share;
+            }
+        }
     }
 }
 
