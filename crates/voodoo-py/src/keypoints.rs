@@ -12,6 +12,7 @@ use crate::body_view::rows_of;
 use crate::errors::exception;
 use crate::skin::pairs;
 
+type Seen = ((f64, f64), f64);
 type Sight<'py> = ((f64, f64), Bound<'py, PyArray1<f64>>, f64, f64, f64);
 
 #[pyclass(name = "KeypointLayout", module = "voodoo._core", frozen)]
@@ -34,7 +35,7 @@ impl PyKeypointLayout {
     }
 
     /// Pixel and confidence of each part; none where it is not seen.
-    fn pixels(&self, keypoints: PyReadonlyArray2<'_, f64>, least: f64) -> PyResult<Vec<Option<((f64, f64), f64)>>> {
+    fn pixels(&self, keypoints: PyReadonlyArray2<'_, f64>, least: f64) -> PyResult<Vec<Option<Seen>>> {
         let keypoints = rows("keypoints", &keypoints)?;
         let seen = self.0.iter().map(|part| part.pixel(keypoints, least));
         Ok(seen.map(|seen| seen.map(|seen| ((seen.pixel[0], seen.pixel[1]), seen.confidence))).collect())

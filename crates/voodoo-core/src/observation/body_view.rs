@@ -11,9 +11,9 @@ use crate::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
 use crate::observation::still::still;
 
 /// A pose whose entries change by less is that of a camera that stands.
-const STANDS: f64 = 1e-3;
+const CAMERA_STANDS: f64 = 1e-3;
 /// Over so many pictures the depth of a still surface hardly changes.
-const STAYS: usize = 6;
+const STAYS_PICTURES: usize = 6;
 /// A 4x4 transform, row by row.
 pub type Matrix = [[f64; 4]; 4];
 
@@ -83,7 +83,7 @@ impl StillDepth {
     /// [`TrackError::Measurement`] when the image is not of that size.
     pub fn see(&mut self, z: Vec<f32>, size: [usize; 2], pose: &Matrix) -> Result<Option<Standing>, TrackError> {
         let entries = self.pose.as_flattened().iter().zip(pose.as_flattened());
-        let moved = entries.into_iter().any(|(before, now)| !((before - now).abs() <= STANDS));
+        let moved = entries.into_iter().any(|(before, now)| !((before - now).abs() <= CAMERA_STANDS));
         if self.farthest.is_empty() || moved || self.size != size || self.farthest.len() != z.len() {
             (self.size, self.pose) = (size, *pose);
             self.farthest = Arc::new(z.clone());
@@ -96,10 +96,10 @@ impl StillDepth {
             self.spare.push_back(std::mem::replace(&mut self.farthest, Arc::new(farthest)));
         }
         let found = match self.last.front() {
-            Some(then) if self.last.len() == STAYS => Some(still(&z, &self.farthest, then, size[1])?),
+            Some(then) if self.last.len() == STAYS_PICTURES => Some(still(&z, &self.farthest, then, size[1])?),
             _ => None,
         };
-        if self.last.len() == STAYS {
+        if self.last.len() == STAYS_PICTURES {
             self.spare.extend(self.last.pop_front());
         }
         self.last.push_back(Arc::new(z));
@@ -281,8 +281,8 @@ mod tests {
         for count in 0..9 {
             let twin = scene.twin();
             let found = scene.see(vec![3.0; 12], [3, 4], &LEVEL).unwrap();
-            assert_eq!(found.is_some(), count >= STAYS, "{count}");
-            assert_eq!(twin.last.len(), count.min(STAYS));
+            assert_eq!(found.is_some(), count >= STAYS_PICTURES, "{count}");
+            assert_eq!(twin.last.len(), count.min(STAYS_PICTURES));
         }
         let twin = scene.twin();
         let mut hand = vec![3.0; 12];

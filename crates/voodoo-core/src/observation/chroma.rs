@@ -2,6 +2,7 @@
 
 use crate::error::TrackError;
 use crate::math::widest;
+use crate::observation::masks::PIXEL_BLOCK;
 
 /// Bins of either axis of chroma, Cr and Cb, and of luma: coarse, to part a face from a dark poster of the same hue.
 pub const CHROMA_BINS: usize = 64;
@@ -67,7 +68,7 @@ pub fn find_among(bins: &[u16], table: &[bool], found: &mut Vec<u8>) -> Result<(
     widest(
         #[inline(always)]
         || {
-            for (bins, found) in bins.chunks(BLOCK).zip(found.chunks_mut(BLOCK)) {
+            for (bins, found) in bins.chunks(PIXEL_BLOCK).zip(found.chunks_mut(PIXEL_BLOCK)) {
                 if within.any(bins) {
                     found.iter_mut().zip(bins).for_each(|(found, bin)| *found = u8::from(is_among(*bin, table)));
                 }
@@ -76,9 +77,6 @@ pub fn find_among(bins: &[u16], table: &[bool], found: &mut Vec<u8>) -> Result<(
     );
     Ok(())
 }
-
-/// Pixels that are looked up one by one only if one of them has about the right chroma.
-const BLOCK: usize = 64;
 
 /// Least and greatest Cr and Cb of a table's bins.
 struct Chroma {

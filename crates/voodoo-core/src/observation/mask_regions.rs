@@ -2,7 +2,7 @@
 
 use crate::error::TrackError;
 use crate::observation::chroma;
-use crate::observation::masks::{bounds, closed, cut, is_empty, opened, smooth};
+use crate::observation::masks::{PIXEL_BLOCK, bounds, closed, cut, is_empty, opened, smooth};
 
 /// A region of a mask: pixels that touch, at corners too.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,9 +129,6 @@ pub fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
     result
 }
 
-/// Pixels that are passed over together where none is of skin's colour.
-const BLOCK: usize = 64;
-
 /// What skin is looked for in: a picture, and where it may be.
 #[derive(Clone, Copy, Debug)]
 pub struct SkinPicture<'a> {
@@ -185,8 +182,8 @@ impl SkinPicture<'_> {
 
     /// Takes away what cannot be the body's.
     fn rule_out(&self, skin: &mut [u8]) {
-        for (block, pixels) in skin.chunks_mut(BLOCK).enumerate().filter(|(_, pixels)| !is_empty(pixels)) {
-            let here = block * BLOCK..block * BLOCK + pixels.len();
+        for (block, pixels) in skin.chunks_mut(PIXEL_BLOCK).enumerate().filter(|(_, pixels)| !is_empty(pixels)) {
+            let here = block * PIXEL_BLOCK..block * PIXEL_BLOCK + pixels.len();
             if let Some(body) = self.body {
                 pixels.iter_mut().zip(&body[here.clone()]).for_each(|(pixel, body)| *pixel &= u8::from(*body));
             }

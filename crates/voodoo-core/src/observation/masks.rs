@@ -87,6 +87,9 @@ fn fill_rows(found: &mut [u8], width: usize, mut make: impl FnMut(usize, &mut [u
     );
 }
 
+/// Pixels that are passed over together where none of them holds anything: two registers of AVX2.
+pub const PIXEL_BLOCK: usize = 64;
+
 /// A part of a mask of so many columns.
 pub fn cut(mask: &[u8], width: usize, rows: &std::ops::Range<usize>, columns: &std::ops::Range<usize>) -> Vec<u8> {
     let mut part = Vec::with_capacity(rows.len() * columns.len());

@@ -126,12 +126,14 @@ fn gate<'a>(
     }
 }
 
+/// Sums with numbers of a picture's size have no digits left for fractions of them: three times 2^51.
+const NO_FRACTION: f64 = (1_u64 << 52) as f64 + (1_u64 << 51) as f64;
+
 /// A number rounded to the nearest whole one, of two the even one, by the digits that a large sum has no room for; numbers beyond
 /// 2^51 stay large.
 #[inline(always)]
 fn nearest_whole(value: f64) -> f64 {
-    const LARGE: f64 = (1_u64 << 52) as f64 + (1_u64 << 51) as f64;
-    (value + LARGE) - LARGE
+    (value + NO_FRACTION) - NO_FRACTION
 }
 
 /// Points in a picture of so many rows and columns.
@@ -260,7 +262,7 @@ const ONE_SURFACE: f64 = 0.1;
 /// Fewer points around a place than this are no surface: one or two may be stray returns.
 const FEWEST_POINTS: usize = 3;
 /// Points of a list whose bounds are looked at together.
-const STRETCH: usize = 64;
+const POINTS_TOGETHER: usize = 64;
 
 /// Numbers of regions in a part of a picture, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -302,15 +304,15 @@ impl MeasuredPixels<'_> {
         }
         self.check(None)?;
         // Neighbours in the list are near each other: most stretches of it are nowhere near a place.
-        let stretches: Vec<[[f64; 2]; 2]> = self.places.chunks(STRETCH).map(bounds_of).collect();
+        let stretches: Vec<[[f64; 2]; 2]> = self.places.chunks(POINTS_TOGETHER).map(bounds_of).collect();
         let look = |(place, region): &([f64; 2], i32)| {
             let (mut near, mut chosen) = (Vec::new(), Vec::new());
             let far = |[low, high]: &[[f64; 2]; 2]| {
                 (0..2).any(|axis| low[axis] > place[axis] + radius || high[axis] < place[axis] - radius)
             };
             for (stretch, _) in stretches.iter().enumerate().filter(|(_, bounds)| !far(bounds)) {
-                let first = stretch * STRETCH;
-                let last = (first + STRETCH).min(self.places.len());
+                let first = stretch * POINTS_TOGETHER;
+                let last = (first + POINTS_TOGETHER).min(self.places.len());
                 for (index, other) in (first..).zip(&self.places[first..last]) {
                     if is_near(other, place, radius) {
                         near.push(index);

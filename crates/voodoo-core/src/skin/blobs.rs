@@ -8,11 +8,11 @@ use crate::math::Vec3;
 use crate::skin::assignment::{Costs, assign};
 
 /// A region is at most this far from where its motion would have it, from one picture to the next, metres.
-const JUMP: f64 = 0.12;
+const BLOB_JUMP: f64 = 0.12;
 /// The same for a region that was seen once: nothing is known about its motion.
-const UNKNOWN: f64 = 0.24;
+const UNKNOWN_JUMP: f64 = 0.24;
 /// What is within this share of the possible motion went on as expected.
-const NEAR: f64 = 0.5;
+const AS_EXPECTED: f64 = 0.5;
 /// A region that was not seen for so long has lost its name, seconds.
 const FORGET: f64 = 0.25;
 /// No hand moves faster, metres a second.
@@ -22,7 +22,7 @@ const UNSEEN_SPEED: f64 = 2.0;
 /// Pictures come about this far apart, seconds: so long a region that was seen in the last one may have been away.
 const PERIOD: f64 = 1.0 / 30.0;
 /// Two candidates this near are one hand, metres.
-pub(super) const SAME: f64 = 0.09;
+pub(super) const ONE_HAND: f64 = 0.09;
 
 /// A candidate in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +91,7 @@ impl Blob {
     }
 
     fn limit(&self, stamp: f64) -> f64 {
-        let jump = if self.count > 1 { JUMP } else { UNKNOWN };
+        let jump = if self.count > 1 { BLOB_JUMP } else { UNKNOWN_JUMP };
         jump + UNSEEN_SPEED * (stamp - self.stamp - PERIOD).max(0.0)
     }
 
@@ -131,7 +131,7 @@ impl Blobs {
             }
         }
         let pairs = assign(&cost, 1.0, None);
-        let near = |&(row, column): &(usize, usize)| cost.at(row, column) < NEAR;
+        let near = |&(row, column): &(usize, usize)| cost.at(row, column) < AS_EXPECTED;
         let kept: Vec<i32> = pairs
             .iter()
             .filter(|pair| self.items[pair.0].label.is_some() && near(pair))
@@ -157,7 +157,7 @@ impl Blobs {
             }
             blob.velocity *= 0.5;
             let limit = blob.limit(stamp);
-            match sights.iter().position(|sight| blob.apart(sight, stamp) * limit <= SAME) {
+            match sights.iter().position(|sight| blob.apart(sight, stamp) * limit <= ONE_HAND) {
                 Some(same) => blob.merge(&mut found[same]),
                 None => found.push(blob),
             }

@@ -9,7 +9,7 @@ use crate::skin::discs::Disc;
 /// Share of the old histograms that a picture leaves.
 const FORGETTING: f32 = 0.86;
 /// Pictures after which that holds: the first make the general skin this person's.
-const SETTLED: u32 = 5;
+const SETTLED_PICTURES: u32 = 5;
 /// The share that those leave.
 const FORGETTING_AT_FIRST: f32 = 0.5;
 /// Skin has to be this many times as likely as the rest.
@@ -21,7 +21,7 @@ const LUMA_SPREAD: f64 = 0.7;
 /// And along either axis of chroma.
 const CHROMA_SPREAD: f64 = 0.8;
 /// Bins to either side that smoothing reaches.
-const REACH: usize = 2;
+const SMOOTHED_BINS: usize = 2;
 /// Two places that share less of their colours than this do not both show skin.
 const IN_COMMON: f64 = 0.1;
 /// Middle of the chroma (Cr, Cb) of human skin of any tone under white light, of 256.
@@ -131,13 +131,13 @@ impl SkinColors {
             values.clear();
             values.resize(BINS, 0.0);
         }
-        let mut seen = BINS..0;
+        let (mut first, mut end) = (BINS, 0);
         for found in places {
             // So few pixels are counted without rounding.
             found.iter().for_each(|bin| shares[usize::from(*bin)] += 1.0);
             let planes = smooth(shares, work);
             let count = found.len() as f32;
-            seen = seen.start.min(planes.start)..seen.end.max(planes.end);
+            (first, end) = (first.min(planes.start), end.max(planes.end));
             for ((most, shown), share) in
                 most[planes.clone()].iter_mut().zip(&mut shown[planes.clone()]).zip(&mut shares[planes])
             {
@@ -146,11 +146,11 @@ impl SkinColors {
                 *most = most.max(smoothed);
             }
         }
-        let total = sum(&shown[seen.clone()]);
+        let total = sum(&shown[first..end]);
         if total < IN_COMMON {
             return false;
         }
-        let keep = if self.pictures >= SETTLED { FORGETTING } else { FORGETTING_AT_FIRST };
+        let keep = if self.pictures >= SETTLED_PICTURES { FORGETTING } else { FORGETTING_AT_FIRST };
         let total = total as f32;
         for (skin, shown) in self.skin.iter_mut().zip(&*shown) {
             *skin = keep * *skin + (1.0 - keep) * (shown / total);
@@ -221,8 +221,8 @@ fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
     };
     // Most colours are seen nowhere: only planes with some, and those around, hold anything.
     let holds: Vec<bool> = values.chunks_exact(PLANE).map(|plane| plane.iter().any(|value| *value != 0.0)).collect();
-    let first = holds.iter().position(|holds| *holds).unwrap_or(CHROMA_BINS).saturating_sub(REACH);
-    let end = holds.iter().rposition(|holds| *holds).map_or(first, |last| (last + 1 + REACH).min(CHROMA_BINS));
+    let first = holds.iter().position(|holds| *holds).unwrap_or(CHROMA_BINS).saturating_sub(SMOOTHED_BINS);
+    let end = holds.iter().rposition(|holds| *holds).map_or(first, |last| (last + 1 + SMOOTHED_BINS).min(CHROMA_BINS));
     let weighed = |[a, b, c, d, e]: [f32; 5]| far * (a + e) + near * (b + d) + here * c;
     widest(
         #[inline(always)]
@@ -256,7 +256,7 @@ fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
 }
 
 /// Shares of a bin two and one bins away, and of itself, of a Gaussian bell.
-fn kernel(spread: f64) -> [f64; REACH + 1] {
+fn kernel(spread: f64) -> [f64; SMOOTHED_BINS + 1] {
     let bell = [2.0, 1.0, 0.0].map(|away: f64| (-0.5 * (away / spread).powi(2)).exp());
     bell.map(|value| value / (2.0 * (bell[0] + bell[1]) + bell[2]))
 }
@@ -296,7 +296,7 @@ mod tests {
             let apart = |index: usize, each: usize, count: usize| (index / each % count).abs_diff(place / each % count);
             for (index, value) in values.iter().enumerate() {
                 let far = apart(index, PLANE, 64).max(apart(index, LUMA_BINS, 64)).max(apart(index, 1, 8));
-                assert!((*value > 0.0) == (far <= REACH), "{place}: {index}");
+                assert!((*value > 0.0) == (far <= SMOOTHED_BINS), "{place}: {index}");
             }
         }
     }

@@ -12,6 +12,7 @@ use crate::observation::registration::Labels;
 use crate::skin::blobs::{Blobs, Sight};
 use crate::skin::candidates::{Candidate, PALM, candidates};
 use crate::skin::naming::{Choice, Rules};
+use crate::skin::picture::Picture;
 use crate::skin::rules::{Expected, LimbDistances, Seen, of_pieces};
 use crate::skin::teacher::Teacher;
 
@@ -78,21 +79,6 @@ pub struct Look<'a> {
     pub expected: &'a [Expected],
     /// Whether enough was learnt to tell skin.
     pub settled: bool,
-}
-
-/// A picture, as skin was looked for in it.
-#[derive(Clone, Debug, Default)]
-pub struct Picture {
-    /// Rows and columns.
-    pub size: [usize; 2],
-    /// Of each pixel's colour, see [`crate::observation::chroma::bins`].
-    pub bins: Vec<u16>,
-    /// 1 where it has skin's colour.
-    pub seen: Vec<u8>,
-    /// 1 where that may be the body's.
-    pub skin: Vec<u8>,
-    /// What a depth camera saw.
-    pub body: Option<Arc<BodyView>>,
 }
 
 /// A site that was found in a picture.

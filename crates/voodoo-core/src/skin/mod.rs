@@ -21,5 +21,6 @@ pub mod cue;
 mod discs;
 mod naming;
 mod outline;
+pub mod picture;
 pub mod rules;
 pub mod teacher;

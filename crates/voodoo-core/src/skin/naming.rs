@@ -1,14 +1,14 @@
 //! Which of the skin regions that are followed is the head and which a hand.
 
 use crate::skin::assignment::{Costs, assign};
-use crate::skin::blobs::{Blob, Blobs, SAME};
+use crate::skin::blobs::{Blob, Blobs, ONE_HAND};
 
 /// Time over which agreement with the model is averaged, seconds.
 const AGREEMENT: f64 = 0.15;
 /// Pictures a second for which that holds.
 const RATE: f64 = 30.0;
 /// What a region's distance can add to that average at most, shares of the gate: one that is farther is no worse.
-const FARTHEST: f64 = 2.0;
+const FARTHEST_GATES: f64 = 2.0;
 /// Cost of keeping a name at the edge of the gate.
 const HELD: f64 = 0.3;
 /// And at most: a region that keeps its name costs less than none.
@@ -21,7 +21,7 @@ const NONE: f64 = 0.8;
 /// another limb.
 const DOUBT: f64 = 0.25;
 /// See [`DOUBT`], shares of the gate.
-const APART: f64 = 1.25;
+const DOUBTED_APART: f64 = 1.25;
 /// Pictures farther apart than this count as this, seconds: doubt needs several.
 const LONGEST: f64 = 0.1;
 /// Pictures in which a region was seen before it may be named from afar.
@@ -105,14 +105,14 @@ impl Blob {
     /// How long it has spoken against being a site: on another limb, or its name without the body going there.
     fn waver(&mut self, choice: &Choice, column: usize, gate: f64, elapsed: f64) {
         let named = self.label == Some(choice.site) && self.sight.deep;
-        let against = choice.elsewhere[column] || (named && choice.distance[column] > APART * gate);
+        let against = choice.elsewhere[column] || (named && choice.distance[column] > DOUBTED_APART * gate);
         let doubt = &mut self.doubt[choice.site];
         *doubt = (*doubt + if against { elapsed } else { -elapsed }).clamp(0.0, 2.0 * DOUBT);
     }
 
     /// Takes a distance from a site into the average.
     fn agree(&mut self, site: usize, distance: f64, gate: f64) {
-        let sample = (distance / gate).min(FARTHEST).powi(2);
+        let sample = (distance / gate).min(FARTHEST_GATES).powi(2);
         let share = if self.count == 1 { 1.0 } else { 1.0 - (-1.0 / (RATE * AGREEMENT)).exp() };
         let far = &mut self.far[site];
         *far = (1.0 - share) * if far.is_nan() { sample } else { *far } + share * sample;
@@ -144,7 +144,7 @@ fn price(
         return (blob.count >= OLD_ENOUGH && near < rules.gate).then_some(TAKEN + far);
     }
     let rival = |other: &usize| {
-        able(*other) && blobs[*other].label.is_none() && blobs[*other].sight.place.distance(blob.sight.place) > SAME
+        able(*other) && blobs[*other].label.is_none() && blobs[*other].sight.place.distance(blob.sight.place) > ONE_HAND
     };
     let rivals = (0..blobs.len()).filter(rival).map(|other| choice.distance[other]);
     let clear = rivals.fold(f64::INFINITY, f64::min) >= (rules.ambiguity * near).max(RIVAL * rules.gate);

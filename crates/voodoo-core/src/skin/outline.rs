@@ -13,7 +13,7 @@ pub(super) struct Cutout {
 /// At most so many tips of a region are looked at: two hands do not join more.
 const MOST_TIPS: usize = 4;
 /// A tip is farther out than all of the outline within this, radii of a palm.
-const AROUND: f64 = 2.5;
+const TIP_ALONE: f64 = 2.5;
 /// A tip is this far from the region's middle, radii of a palm: a palm has none.
 const FAR_OUT: f64 = 1.5;
 /// Two tips are this far apart, radii of a palm.
@@ -21,7 +21,7 @@ const TIPS_APART: f64 = 3.0;
 /// A hand at a tip reaches this far from it, radii of a palm.
 const HAND_AT_TIP: f64 = 3.2;
 /// Columns and rows from a pixel to its eight neighbours, counter-clockwise in the picture.
-const STEPS: [[i32; 2]; 8] = [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]];
+const NEIGHBOUR_STEPS: [[i32; 2]; 8] = [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]];
 
 impl Cutout {
     fn is(&self, [u, v]: [i32; 2]) -> bool {
@@ -34,7 +34,7 @@ impl Cutout {
     pub fn border(&self) -> Vec<[i32; 2]> {
         let Some(first) = self.mask.iter().position(|pixel| *pixel != 0) else { return Vec::new() };
         let start = [(first % self.width) as i32, (first / self.width) as i32];
-        let step = |[u, v]: [i32; 2], turn: usize| [u + STEPS[turn & 7][0], v + STEPS[turn & 7][1]];
+        let step = |[u, v]: [i32; 2], turn: usize| [u + NEIGHBOUR_STEPS[turn & 7][0], v + NEIGHBOUR_STEPS[turn & 7][1]];
         // Clockwise from the left, where nothing is, to the last pixel of the round.
         let Some(to_last) = (5..12).rev().find(|turn| self.is(step(start, *turn))) else { return vec![start] };
         let last = step(start, to_last);
@@ -119,7 +119,7 @@ impl Cutout {
             .iter()
             .map(|[u, v]| (f64::from(*u) - self.middle[0]).powi(2) + (f64::from(*v) - self.middle[1]).powi(2))
             .collect();
-        let reach = ((AROUND * palm).round_ties_even() as usize).min(count / 2);
+        let reach = ((TIP_ALONE * palm).round_ties_even() as usize).min(count / 2);
         let least = (FAR_OUT * palm).powi(2);
         let is_peak = |index: &usize| {
             away[*index] >= least

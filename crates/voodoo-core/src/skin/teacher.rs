@@ -1,21 +1,18 @@
 //! What is learnt from pictures: the colours of skin, and what always has them where no head or hand is.
 
 use crate::observation::chroma::bins;
-use crate::observation::masks::is_empty;
+use crate::observation::masks::{PIXEL_BLOCK, is_empty};
 use crate::skin::candidates::{FACE, PALM};
 use crate::skin::colors::{Lesson, SkinColors};
-use crate::skin::cue::Picture;
 use crate::skin::discs::Disc;
+use crate::skin::picture::Picture;
 
 /// No skin is learnt, and no background, within so many radii of a face or palm.
-const AROUND: f64 = 2.5;
+const NOTHING_LEARNT: f64 = 2.5;
 /// Skin is learnt within this share of it.
 const WITHIN: f64 = 0.8;
 /// Sites that far outside a picture are not looked at, pixels.
-const OUTSIDE: f64 = 1e4;
-
-/// Pixels that are passed over together where none of them ever had skin's colour.
-const BLOCK: usize = 64;
+const FAR_OUTSIDE: f64 = 1e4;
 
 /// Colours and background of one camera's pictures.
 #[derive(Clone, Debug, Default)]
@@ -75,14 +72,14 @@ impl Teacher {
         for site in sites {
             let radius = (if site.head { FACE } else { PALM }) * pace.focal / site.depth;
             let middle = site.pixel.map(f64::round_ties_even);
-            if !middle.iter().all(|place| -OUTSIDE < *place && *place < OUTSIDE) {
+            if !middle.iter().all(|place| -FAR_OUTSIDE < *place && *place < FAR_OUTSIDE) {
                 continue;
             }
             let disc = |share: f64, least: f64| Disc {
                 middle: middle.map(|place| place as i64),
                 radius: (share * radius).round_ties_even().max(least) as i64,
             };
-            disc(AROUND, 2.0).fill(&mut self.away, size, 0);
+            disc(NOTHING_LEARNT, 2.0).fill(&mut self.away, size, 0);
             if site.found || !settled {
                 discs.push(disc(WITHIN, 1.0));
             }
@@ -111,16 +108,16 @@ impl Teacher {
             self.shown.clear();
         }
         let (new, old) = (share as f32, 1.0 - share as f32);
-        self.shown.resize(seen.len().div_ceil(BLOCK), false);
-        let blocks = self.always.chunks_mut(BLOCK).zip(seen.chunks(BLOCK)).zip(&mut self.shown);
+        self.shown.resize(seen.len().div_ceil(PIXEL_BLOCK), false);
+        let blocks = self.always.chunks_mut(PIXEL_BLOCK).zip(seen.chunks(PIXEL_BLOCK)).zip(&mut self.shown);
         for (block, ((always, seen), shown)) in blocks.enumerate() {
             // What never showed skin has nothing to forget.
             *shown |= !is_empty(seen);
             if !*shown {
                 continue;
             }
-            let here = block * BLOCK..block * BLOCK + always.len();
-            let mut learns = [0; BLOCK];
+            let here = block * PIXEL_BLOCK..block * PIXEL_BLOCK + always.len();
+            let mut learns = [0; PIXEL_BLOCK];
             learns[..always.len()].copy_from_slice(&self.away[here.clone()]);
             if let Some(before) = before {
                 learns.iter_mut().zip(&before[here]).for_each(|(learns, before)| *learns &= u8::from(!*before));
