@@ -1,5 +1,7 @@
 """Skin colour that stays with its owner."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import voodoo
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo import MeasurementError
 from voodoo.sensors.body_view import BodyView
+from voodoo.sensors.pixels import in_sensor, ray_distance
 from voodoo.sensors.skin.regions import candidates
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
@@ -21,6 +24,25 @@ def test_hands_and_face_are_found_and_named():
     assert {ray.site for ray in rays} == {"head_center", "l_hand", "r_hand"}
     for site, pixel in zip(("head_center", "l_hand", "r_hand"), moved, strict=True):
         assert pixel_error(skin, site, pixel) < 2.0
+
+
+def test_a_lens_that_distorts_is_looked_through():
+    bent = replace(CAMERA, distortion=(0.05, -0.02, 0.001, 0.0))
+    head, left, right = (160, 60), (110, 120), (210, 120)
+    pose = Pose(head, left, right)
+    names = ("head_center", "l_hand", "r_hand")
+    points = np.array([pose.joints[name] for name in names])
+    seen = [tuple(pixel) for pixel in bent.project(in_sensor(POSE, points)).round().astype(int).tolist()]
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    skin, body = SkinTracker(), BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
+    for seed in range(8):
+        image = picture(*seen, seed=seed)
+        rays = skin.observe(image, bent, POSE, pose.joints, body=body)
+        skin.learn(image, bent, POSE, pose)
+    assert [ray.site for ray in rays] == list(names)
+    for ray in rays:  # behind the skin, on the ray through the undistorted pixel
+        assert ray_distance(ray.origin, ray.direction, pose.joints[ray.site]) < 0.01
+        assert np.linalg.norm(ray.place - pose.joints[ray.site]) < 0.09
 
 
 def test_a_hidden_hand_gets_no_ray_and_the_other_keeps_its_own():
