@@ -145,7 +145,8 @@ def test_masks_and_regions_are_those_of_opencv(seed):
     body, before = chance.random((2, height, width)) < [[[0.9]], [[0.5]]]
     always = chance.uniform(0.0, 0.6, mask.shape).astype(np.float32)
     seen, skin = _core.skin_mask(bins, table, longest=3.0 * palm, body=body, always=always, before=before)
-    found = cv2.medianBlur(_core.bins_among(bins, table), 3).view(bool)
+    light = table[bins & 32767] & (bins < 32768)
+    found = cv2.medianBlur(light.astype(np.uint8), 3).view(bool)
     np.testing.assert_array_equal(seen, found)
     found = found & body & ((always < 0.5) | before)
     opened = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)).view(bool)
@@ -183,14 +184,15 @@ def test_each_place_is_looked_at_among_the_points_of_its_region():
     inside = (u >= 0) & (v >= 0) & (u < 41) & (v < 41)
     of = np.where(inside, labels[v * inside, u * inside], -1)
     places = [((20.0, 20.0), 7), ((20.0, 20.0), 0), ((20.0, 20.0), 5), ((90.0, 90.0), 7)]
-    found = _core.nearest_surfaces(pixels, depths, None, labels=labels, places=places, radius=8.0)
+    view = _core.BodyView(np.ones((41, 41), bool), pixels, depths)
+    found = view.look_at(labels, places, 8.0)
     alone = [
         _core.nearest_surface(pixels, depths, None, pixel=place, radius=8.0, among=of == region)
         for place, region in places
     ]
     assert found == alone == [(3.0, False), (2.0, False), (2.0, False), None]
-    with pytest.raises(MeasurementError, match="depths: expected"):
-        _core.nearest_surfaces(pixels, depths[1:], None, labels=labels, places=places, radius=8.0)
+    with pytest.raises(MeasurementError, match="pixels: expected"):
+        _core.BodyView(np.ones((41, 41), bool), pixels, depths[1:])
 
 
 def test_bins_are_those_of_opencv():
@@ -201,14 +203,8 @@ def test_bins_are_those_of_opencv():
     bins = _core.color_bins(image)
     number = (cr >> 2) * 512 + (cb >> 2) * 8 + (luma >> 5)
     np.testing.assert_array_equal(bins, number + 32768 * (luma < 30))
-    table, mask = chance.random(32768) < 0.3, (chance.random((90, 70)) < 0.5).astype(np.uint8)
-    np.testing.assert_array_equal(_core.bins_among(bins, table), table[number] & (luma >= 30))
-    counts = np.bincount(number[mask > 0], minlength=32768)
-    np.testing.assert_array_equal(_core.bin_counts(bins, mask), counts)
     with pytest.raises(MeasurementError, match="table: expected"):
-        _core.bins_among(bins, table[1:])
-    with pytest.raises(MeasurementError, match="mask: expected"):
-        _core.bin_counts(bins, mask[1:])
+        _core.skin_mask(bins, np.ones(32767, bool), longest=1.0)
     with pytest.raises(MeasurementError, match="image: expected shape"):
         _core.color_bins(np.zeros((4, 4, 4), np.uint8))
 

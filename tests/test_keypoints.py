@@ -11,7 +11,6 @@ from voodoo.recordings.keypoint_files import read_openpose_json
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints import KeypointSensor, nearest_person, site_pixels, window_depth
-from voodoo.sensors.occlusion import body_before
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5, (-0.1, 0.02, 0.0, 0.0))
 # 3 m in front of the person, 1 m high, looking along world y
@@ -138,7 +137,7 @@ def test_what_the_body_hides_is_a_guess():
     joints = dict(track.estimate.joints)
     names = ("l_hip", "r_hip", "l_wrist")
     beside = (3.0, 0.0, 0.9)  # at the person's left
-    left, right, wrist = body_before([joints[name] for name in names], beside, track.distance)
+    left, right, wrist = track.body_before([joints[name] for name in names], beside)
     assert left < 0.12 < 0.20 < right  # the pelvis lies before the other hip
     assert wrist < 0.05
     before = dict(zip(names, (left, right, wrist), strict=True))

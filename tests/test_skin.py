@@ -1,5 +1,7 @@
 """Skin colour that stays with its owner."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -8,10 +10,10 @@ import voodoo
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo import MeasurementError
 from voodoo.sensors.body_view import BodyView
-from voodoo.sensors.skin.assignment import assign
+from voodoo.sensors.pixels import in_sensor, ray_distance
 from voodoo.sensors.skin.regions import candidates
 from voodoo.sensors.skin.settings import SkinSettings
-from voodoo.sensors.skin.tracker import SkinTracker
+from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
 
 
 def test_hands_and_face_are_found_and_named():
@@ -22,6 +24,25 @@ def test_hands_and_face_are_found_and_named():
     assert {ray.site for ray in rays} == {"head_center", "l_hand", "r_hand"}
     for site, pixel in zip(("head_center", "l_hand", "r_hand"), moved, strict=True):
         assert pixel_error(skin, site, pixel) < 2.0
+
+
+def test_a_lens_that_distorts_is_looked_through():
+    bent = replace(CAMERA, distortion=(0.05, -0.02, 0.001, 0.0))
+    head, left, right = (160, 60), (110, 120), (210, 120)
+    pose = Pose(head, left, right)
+    names = ("head_center", "l_hand", "r_hand")
+    points = np.array([pose.joints[name] for name in names])
+    seen = [tuple(pixel) for pixel in bent.project(in_sensor(POSE, points)).round().astype(int).tolist()]
+    grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
+    skin, body = SkinTracker(), BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
+    for seed in range(8):
+        image = picture(*seen, seed=seed)
+        rays = skin.observe(image, bent, POSE, pose.joints, body=body)
+        skin.learn(image, bent, POSE, pose)
+    assert [ray.site for ray in rays] == list(names)
+    for ray in rays:  # behind the skin, on the ray through the undistorted pixel
+        assert ray_distance(ray.origin, ray.direction, pose.joints[ray.site]) < 0.01
+        assert np.linalg.norm(ray.place - pose.joints[ray.site]) < 0.09
 
 
 def test_a_hidden_hand_gets_no_ray_and_the_other_keeps_its_own():
@@ -77,7 +98,7 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
                 POSE,
                 joints,
                 body=body,
-                surface=lambda places, outside=outside: {"thorax": np.full(len(places), outside)},
+                surface=lambda places, outside=outside: LimbDistances(("thorax",), np.full((1, len(places)), outside)),
             )
         found[outside] = {ray.site: ray for ray in rays}
     assert set(found[0.0]) == {"head_center", "r_hand"}
@@ -157,9 +178,9 @@ def test_lost_tracking_teaches_nothing():
     skin = SkinTracker()
     pose = Pose((160, 60), (110, 120), (210, 120))
     pose.status = "lost"
-    before = skin.colour.skin.copy()
+    before = skin.colours
     skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
-    np.testing.assert_array_equal(before, skin.colour.skin)
+    np.testing.assert_array_equal(before, skin.colours)
     assert not skin.settled
 
 
@@ -171,13 +192,6 @@ def test_candidates_skip_noise_and_doors():
     found, regions = candidates(mask, palm_px=5.4)
     assert [item.pixel for item in found] == [(45.5, 45.5)]
     assert (regions == found[0].region).sum() == found[0].area == 144
-
-
-def test_assignment_is_one_to_one_and_gated():
-    cost = np.array([[0.05, 0.09], [0.06, 0.5], [np.nan, np.inf]])
-    assert sorted(assign(cost, gate=0.2)) == [(0, 1), (1, 0)]  # both get one, although 0 likes 0 best
-    assert assign(cost, gate=0.055) == [(0, 0)]
-    assert assign(np.empty((3, 0)), gate=1.0) == []
 
 
 def test_settings_and_images_are_checked():

@@ -257,12 +257,8 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
                     front_end.step(RecordedFrame(plain.stamp, (*items, spoiled)))
                 assert (front_end.frozen, front_end.reports, front_end.rays) == before
             estimate = front_end.step(seen if index % 2 else plain)
-            blobs = [
-                (blob.label, blob.count, blob.stamp, blob.velocity.tolist(), blob.far, blob.doubt)
-                for skin in front_end.skin.values()
-                for blob in skin.blobs.items
-            ]
-            scenes = [scene._farthest.sum() for scene in front_end.memory.all("scene").values()]
+            blobs = [skin.followed for skin in front_end.skin.values()]
+            scenes = [scene.farthest.sum() for scene in front_end.memory.all("scene").values()]
             steps.append(
                 repr((estimate.sources, front_end.frozen, front_end.reports, front_end._gate._last, blobs, scenes))
             )

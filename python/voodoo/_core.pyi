@@ -1,7 +1,7 @@
 """The compiled core. Arrays are NumPy; lengths in metres, times in seconds, angles in radians."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Protocol, final
 
 import numpy as np
@@ -9,33 +9,37 @@ import numpy.typing as npt
 
 __all__ = [
     "Body",
+    "BodyView",
     "Chain",
     "ClosestPoints",
     "Detection",
     "Detector",
     "Estimate",
     "Frame",
+    "KeypointLayout",
     "People",
     "PersonCandidate",
+    "SkinCue",
+    "SkinTeacher",
+    "StillDepth",
     "TaperedEllipticCylinder",
     "Tracker",
     "View",
     "__version__",
     "_estimate",
-    "bin_counts",
-    "bins_among",
+    "body_view",
+    "carried",
     "color_bins",
     "config_fields",
     "joined_mask",
     "mask_regions",
     "nearest_surface",
-    "nearest_surfaces",
     "person_candidates",
     "points_within",
     "render_depth",
     "shown",
+    "skin_candidates",
     "skin_mask",
-    "still_scene",
 ]
 
 __version__: str
@@ -111,20 +115,6 @@ def color_bins(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint16]:
         MeasurementError: another shape.
     """
 
-def bins_among(bins: npt.NDArray[np.uint16], table: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-    """(H, W): 1 where a pixel is light enough and its bin is one of those that a table (32768,) names.
-
-    Raises:
-        MeasurementError: a table of another size.
-    """
-
-def bin_counts(bins: npt.NDArray[np.uint16], mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
-    """How many pixels of a mask (H, W), where it is not 0, are of each bin (32768,).
-
-    Raises:
-        MeasurementError: a mask of another size.
-    """
-
 def shown(
     pixels: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
@@ -182,40 +172,6 @@ def mask_regions(
     """What hangs together in a mask (H, W), at corners too: (H, W) the number of its region in each pixel, from 1; and rows,
     columns (from and up to), area [px] and middle (u, v) of each region."""
 
-def still_scene(
-    now: npt.NDArray[np.float32], farthest: npt.NDArray[np.float32], then: npt.NDArray[np.float32]
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """(H, W): where a depth image shows what may be the still scene; (H, W): where something before what was seen there once.
-
-    Args:
-        now: (H, W) [m], 0 = no return.
-        farthest: (H, W) the farthest that was ever seen [m].
-        then: (H, W) an image some pictures ago [m].
-
-    Raises:
-        MeasurementError: images of different sizes.
-    """
-
-def nearest_surfaces(
-    pixels: npt.NDArray[np.float64],
-    depths: npt.NDArray[np.float64],
-    still: npt.NDArray[np.bool_] | None,
-    *,
-    labels: npt.NDArray[np.int32],
-    places: Sequence[tuple[tuple[float, float], int]],
-    radius: float,
-) -> list[tuple[float, bool] | None]:
-    """`nearest_surface` of each of some places in an image, among the points in its region if there are enough.
-
-    Args:
-        pixels, depths, still, radius: as of `nearest_surface`.
-        labels: (H, W) numbers of regions.
-        places: (u, v) and the number of its region, each.
-
-    Raises:
-        MeasurementError: arrays that do not belong together.
-    """
-
 def nearest_surface(
     pixels: npt.NDArray[np.float64],
     depths: npt.NDArray[np.float64],
@@ -237,6 +193,236 @@ def nearest_surface(
 
     Raises:
         MeasurementError: other shapes.
+    """
+
+def skin_candidates(
+    mask: npt.NDArray[np.bool_], palm_px: float
+) -> tuple[list[tuple[tuple[float, float], int, int, bool]], npt.NDArray[np.int32]]:
+    """Where in a skin mask (H, W) a head or a hand may be: pixel, region, area [px], whether it may be a hand; (H, W) the number
+    of its region in each pixel. See voodoo.sensors.skin.regions."""
+
+@final
+class BodyView:
+    """What a depth camera saw of the body, in the picture of a colour camera beside it.
+
+    Args:
+        mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
+        pixels: (N, 2) of the points in the picture.
+        depths: (N,) of the points along the colour camera's optical axis [m].
+        still: (N,) whether nothing behind a point was ever seen there: it may be the scene. None: not known.
+        before: (H, W) of the picture: True where something is before what was seen there once. None: not known.
+
+    Raises:
+        MeasurementError: shapes that do not belong together.
+    """
+
+    def __new__(
+        cls,
+        mask: npt.NDArray[np.bool_],
+        pixels: npt.NDArray[np.float64],
+        depths: npt.NDArray[np.float64],
+        still: npt.NDArray[np.bool_] | None = None,
+        before: npt.NDArray[np.bool_] | None = None,
+    ) -> BodyView: ...
+    @property
+    def mask(self) -> npt.NDArray[np.bool_]: ...
+    @property
+    def pixels(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def depths(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def still(self) -> npt.NDArray[np.bool_] | None: ...
+    @property
+    def before(self) -> npt.NDArray[np.bool_] | None: ...
+    def look_at(
+        self, labels: npt.NDArray[np.int32], places: Sequence[tuple[tuple[float, float], int]], radius: float
+    ) -> list[tuple[float, bool] | None]:
+        """Depth [m] of the nearest surface within `radius` pixels of each place (u, v), and whether most of it is still; None
+        with less than three points there. Where three of them are in its region, by its number among `labels` (H, W) of the
+        picture, only those count."""
+
+@final
+class StillDepth:
+    """What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind
+    which nothing was ever seen. A table's edge does not become a hand.
+
+    The surface of a person who has not moved yet looks the same, so this only tells what has moved.
+    """
+
+    def __new__(cls) -> StillDepth: ...
+    def __copy__(self) -> StillDepth: ...
+    @property
+    def farthest(self) -> npt.NDArray[np.float32]: ...
+    def see(
+        self, z: npt.NDArray[np.float32], world_from_sensor: npt.NDArray[np.float64]
+    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]] | None:
+        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew.
+
+        Returns:
+            (H, W): True where the image shows what may be the scene; (H, W): True where it shows something before what
+            was seen there once. None as long as too little was seen.
+        """
+
+def body_view(
+    depth: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
+    rays: npt.NDArray[np.float32],
+    joints: npt.NDArray[np.float64],
+    *,
+    metres_per_unit: float,
+    intrinsics: tuple[float, float, float, float] | None,
+    world_from_depth: npt.NDArray[np.float64],
+    color_from_depth: npt.NDArray[np.float64],
+    color_intrinsics: tuple[float, float, float, float],
+    project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+    beyond: Callable[[float], npt.NDArray[np.bool_]],
+    reach: int,
+    step: int,
+    margin: float,
+    scene: StillDepth | None,
+) -> BodyView:
+    """See voodoo.sensors.body_view.
+
+    Args:
+        depth: (H, W).
+        rays: (H, W, 2) x/z, y/z of its pixels.
+        joints: (N, 3) of the body in the world [m].
+        metres_per_unit: of `depth`.
+        intrinsics: (fx, fy, cx, cy) of the depth camera; None: its lens distorts.
+        world_from_depth, color_from_depth: (4, 4).
+        color_intrinsics: (fx, fy, cx, cy) of the colour camera.
+        project: pixels (N, 2) of points (N, 3) in the colour camera's frame, if its lens distorts.
+        beyond: where the depth camera does not look (H, W) at a distance from it [m], in the colour picture.
+        reach: what is within so many rows and columns of a point belongs to it.
+        step: every step-th row and column of the depth image is used.
+        margin: enlargement of the box around the body [m].
+        scene: takes up the image.
+
+    Raises:
+        MeasurementError: shapes that do not belong together.
+    """
+
+@final
+class SkinTeacher:
+    """What one camera's pictures taught of skin; see voodoo.sensors.skin."""
+
+    def __new__(cls) -> SkinTeacher: ...
+    @property
+    def learnt(self) -> int: ...
+    @property
+    def skin(self) -> npt.NDArray[np.float32]: ...
+    def learn(
+        self,
+        cue: SkinCue,
+        image: npt.NDArray[np.uint8] | None,
+        places: npt.NDArray[np.float64],
+        *,
+        world_from_sensor: npt.NDArray[np.float64],
+        intrinsics: tuple[float, float, float, float],
+        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        half_life: float,
+        every: int,
+        settled: int,
+    ) -> None: ...
+
+@final
+class SkinCue:
+    """Regions of skin in one camera's pictures, followed and named; see voodoo.sensors.skin."""
+
+    def __new__(
+        cls,
+        sites: Sequence[str],
+        *,
+        gate: float,
+        growth: float,
+        lost_gate: float,
+        widest_gate: float,
+        unexplained: float,
+        ambiguity: float,
+    ) -> SkinCue: ...
+    def __copy__(self) -> SkinCue: ...
+    @property
+    def mask(self) -> npt.NDArray[np.bool_] | None: ...
+    @property
+    def candidates(self) -> list[tuple[tuple[float, float], int, int, bool]]: ...
+    @property
+    def assigned(self) -> list[tuple[int, int]]: ...
+    @property
+    def followed(self) -> list[tuple[int | None, int, float, list[float], list[float], list[float]]]: ...
+    def look(
+        self,
+        teacher: SkinTeacher,
+        image: npt.NDArray[np.uint8],
+        joints: npt.NDArray[np.float64],
+        *,
+        stamp: float,
+        world_from_sensor: npt.NDArray[np.float64],
+        intrinsics: tuple[float, float, float, float],
+        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        body: BodyView | None,
+        settled: bool,
+        arm_lost: Sequence[bool],
+        upper_arm_visible: Sequence[bool],
+    ) -> npt.NDArray[np.float64] | None: ...
+    def name(
+        self,
+        limbs: Sequence[str],
+        away: npt.NDArray[np.float32],
+        strangers: npt.NDArray[np.float32] | None = None,
+    ) -> list[tuple[int, npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64] | None, float]]: ...
+
+@final
+class KeypointLayout:
+    """A network's keypoints: of each site the keypoints with their shares, and its spread [m]."""
+
+    def __new__(cls, parts: Sequence[tuple[Sequence[tuple[int, float]], float]]) -> KeypointLayout: ...
+    def pixels(
+        self, keypoints: npt.NDArray[np.float64], least: float
+    ) -> list[tuple[tuple[float, float], float] | None]: ...
+    def nearest(
+        self,
+        people: Sequence[npt.NDArray[np.float64]],
+        places: npt.NDArray[np.float64],
+        *,
+        world_from_sensor: npt.NDArray[np.float64],
+        intrinsics: tuple[float, float, float, float],
+        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        least: float,
+    ) -> int | None: ...
+    def sights(
+        self,
+        keypoints: npt.NDArray[np.float64],
+        places: npt.NDArray[np.float64],
+        *,
+        world_from_sensor: npt.NDArray[np.float64],
+        intrinsics: tuple[float, float, float, float],
+        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        noise: float,
+        least: float,
+    ) -> list[tuple[tuple[float, float], npt.NDArray[np.float64], float, float, float] | None]: ...
+
+def carried(
+    points: npt.NDArray[np.float64],
+    poses: npt.NDArray[np.float64],
+    before: npt.NDArray[np.float64],
+    *,
+    interval: float,
+    elapsed: float,
+    near: float,
+    share: float,
+    max_speed: float,
+    distances: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float32]],
+) -> npt.NDArray[np.float64]:
+    """Points (N, 3) of the world that go on with the limb they lie on; see voodoo.sensors.motion.
+
+    Args:
+        points: (N, 3) [m].
+        poses, before: (L, 4, 4) of the limbs.
+        interval: time between them [s].
+        elapsed: for so long points go on [s].
+        near: points farther than this from every limb stay [m].
+        share: of the limbs' velocity that is believed.
+        max_speed: points of a limb that is faster stay [m/s].
+        distances: of places (N, 3) from each limb, (L, N) [m].
     """
 
 def _estimate(
@@ -670,6 +856,9 @@ class Tracker:
     def _set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None: ...
     def distance(self, points: _Points) -> npt.NDArray[np.float32]: ...
     def limb_distances(self, points: _Points) -> npt.NDArray[np.float32]: ...
+    def body_before(
+        self, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]: ...
     def scale(self, factor: float) -> None: ...
     def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None: ...
     def _add_limb(
@@ -701,6 +890,9 @@ class People:
     def wants_colors(self) -> bool: ...
     def only(self, ids: Sequence[int] | None) -> None: ...
     def limb_distances(self, id: int, points: _Points) -> npt.NDArray[np.float32] | None: ...
+    def body_before(
+        self, id: int, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64] | None: ...
     def estimate(self, id: int) -> Estimate | None: ...
     def body(self, id: int) -> Body | None: ...
 

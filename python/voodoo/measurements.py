@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from voodoo.model.camera import Camera
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+_LARGEST = float(np.finfo(np.float64).max)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,14 +82,20 @@ class LaserScan:
     def points(self) -> FloatArray:
         """Valid returns as (N, 3) points [m] in the laser's frame (z = 0), in the order of the rays."""
         ranges = self.ranges.astype(np.float64)
-        valid = np.isfinite(ranges) & (ranges >= self.range_min) & (ranges <= self.range_max)
-        angles = self.angle_min + self.angle_increment * np.flatnonzero(valid)
-        ranges = ranges[valid]
-        return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles), np.zeros(len(ranges))])
+        # What is not finite fails a comparison, or is beyond every range.
+        valid = (ranges >= self.range_min) & (ranges <= min(self.range_max, _LARGEST))
+        return ranges[valid, None] * _beams(self.angle_min, self.angle_increment, len(ranges))[valid]
 
     def __repr__(self) -> str:
         """One line with the number of rays."""
         return f"LaserScan({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.ranges)} rays)"
+
+
+@lru_cache(maxsize=8)
+def _beams(angle_min: float, angle_increment: float, count: int) -> FloatArray:
+    """Unit vectors (N, 3) of a planar laser's rays."""
+    angles = angle_min + angle_increment * np.arange(count)
+    return np.column_stack([np.cos(angles), np.sin(angles), np.zeros(count)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

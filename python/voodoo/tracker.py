@@ -191,6 +191,19 @@ class Tracker:
         """
         return self._core.limb_distances(points)
 
+    def body_before(self, sites: npt.ArrayLike, camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Length of body (N,) [m] that lies between each of some places and a camera: a network guesses what the body hides.
+
+        Args:
+            sites: (N, 3) in the world, inside the posed body.
+            camera: focal point (3,).
+
+        Raises:
+            MeasurementError: no pose yet, or another shape.
+        """
+        places = np.asarray(sites, dtype=np.float64).reshape(-1, 3)
+        return self._core.body_before(places, np.asarray(camera, dtype=np.float64))
+
     def scale(self, factor: float) -> None:
         """Scale the whole body by a factor above zero without losing the track.
 

@@ -68,6 +68,7 @@ pub mod regions;
 pub mod relocalize;
 pub mod shape;
 pub mod sizes;
+pub mod skin;
 pub mod solver;
 pub mod terms;
 #[cfg(test)]

@@ -24,30 +24,6 @@ pub fn color_bins<'py>(py: Python<'py>, image: PyReadonlyArray3<'py, u8>) -> Ima
     PyArray1::from_vec(py, py.detach(|| chroma::bins(pixels))).reshape([height, width])
 }
 
-/// 1 where a pixel's bin is one of a table's.
-#[pyfunction]
-pub fn bins_among<'py>(
-    py: Python<'py>,
-    bins: PyReadonlyArray2<'py, u16>,
-    table: PyReadonlyArray1<'py, bool>,
-) -> Image<'py, u8> {
-    let (pixels, table) = (bins.as_slice()?, table.as_slice()?);
-    let found = py.detach(|| chroma::among(pixels, table)).map_err(|error| error.into_py(py))?;
-    PyArray1::from_vec(py, found).reshape(bins.dims())
-}
-
-/// How many pixels of a mask are of each bin.
-#[pyfunction]
-pub fn bin_counts<'py>(
-    py: Python<'py>,
-    bins: PyReadonlyArray2<'py, u16>,
-    mask: PyReadonlyArray2<'py, u8>,
-) -> PyResult<Bound<'py, PyArray1<f32>>> {
-    let (pixels, mask) = (bins.as_slice()?, mask.as_slice()?);
-    let found = py.detach(|| chroma::counts(pixels, mask)).map_err(|error| error.into_py(py))?;
-    Ok(PyArray1::from_vec(py, found))
-}
-
 type Mask<'py> = Bound<'py, PyArray2<bool>>;
 
 fn mask_of<'py>(py: Python<'py>, pixels: Vec<u8>, size: [usize; 2]) -> PyResult<Mask<'py>> {
@@ -76,7 +52,8 @@ pub fn skin_mask<'py>(
         always: always.as_ref().map(|mask| mask.as_slice()).transpose()?,
         before: before.as_ref().map(|mask| mask.as_slice()).transpose()?,
     };
-    let (seen, skin) = py.detach(|| picture.skin(longest)).map_err(|error| error.into_py(py))?;
+    let (mut seen, mut skin) = (Vec::new(), Vec::new());
+    py.detach(|| picture.find(longest, &mut seen, &mut skin)).map_err(|error| error.into_py(py))?;
     Ok((mask_of(py, seen, size)?, mask_of(py, skin, size)?))
 }
 

@@ -7,6 +7,7 @@
 mod arguments;
 mod arrays;
 mod body;
+mod body_view;
 mod borrowed;
 mod chroma;
 mod config;
@@ -16,10 +17,12 @@ mod estimate;
 mod frame;
 mod ik;
 mod ik_view;
+mod keypoints;
 mod people;
 mod registration;
 mod render;
 mod shape;
+mod skin;
 mod tracker;
 
 use pyo3::prelude::*;
@@ -29,7 +32,9 @@ mod _core {
     #[pymodule_export]
     use super::body::PyBody;
     #[pymodule_export]
-    use super::chroma::{bin_counts, bins_among, color_bins, joined_mask, mask_regions, skin_mask};
+    use super::body_view::{PyBodyView, PyStillDepth, body_view};
+    #[pymodule_export]
+    use super::chroma::{color_bins, joined_mask, mask_regions, skin_mask};
     #[pymodule_export]
     use super::config::config_fields;
     #[pymodule_export]
@@ -43,13 +48,17 @@ mod _core {
     #[pymodule_export]
     use super::ik_view::PyView;
     #[pymodule_export]
+    use super::keypoints::{PyKeypointLayout, carried};
+    #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
-    use super::registration::{nearest_surface, nearest_surfaces, points_within, shown, still_scene};
+    use super::registration::{nearest_surface, points_within, shown};
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
+    #[pymodule_export]
+    use super::skin::{PySkinCue, PySkinTeacher, skin_candidates};
     #[pymodule_export]
     use super::tracker::PyTracker;
 

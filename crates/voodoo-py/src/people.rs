@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray2;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,7 +18,7 @@ use crate::config::config;
 use crate::errors::IntoPy;
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
-use crate::tracker::site_positions;
+use crate::tracker::{places, site_positions};
 
 #[pyclass(name = "People", module = "voodoo._core")]
 pub struct PyPeople {
@@ -114,6 +114,19 @@ impl PyPeople {
         let Some((_, tracker)) = self.people.there().find(|(there, _)| *there == id) else { return Ok(None) };
         let distances = tracker.limb_distances(view.slice()?).map_err(|error| error.into_py(py))?;
         PyArray2::from_vec2(py, &distances).map(Some).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Length of body of a person who is there between each of some places and a camera's focal point, metres.
+    fn body_before<'py>(
+        &self,
+        id: usize,
+        sites: PyReadonlyArray2<'py, f64>,
+        camera: [f64; 3],
+    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let (py, places) = (sites.py(), places(&sites)?);
+        let Some((_, tracker)) = self.people.there().find(|(there, _)| *there == id) else { return Ok(None) };
+        let found = tracker.body_before(&places, Vec3::from_array(camera)).map_err(|error| error.into_py(py))?;
+        Ok(Some(PyArray1::from_vec(py, found)))
     }
 
     /// The last estimate of a person who is there.

@@ -6,7 +6,6 @@ use numpy::{
 use pyo3::prelude::*;
 use voodoo_core::error::TrackError;
 use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
-use voodoo_core::observation::still::still;
 
 use crate::errors::{IntoPy, exception};
 
@@ -95,40 +94,6 @@ pub fn nearest_surface<'py>(
     let among = among.as_ref().map(|marks| marks.as_slice()).transpose()?;
     let measured = MeasuredPixels { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
     measured.nearest_surface(pixel, radius, among).map_err(|error| error.into_py(py))
-}
-
-/// Depth of the nearest surface around each of some places in a picture and whether most of it is still; none with too few points.
-#[pyfunction]
-#[pyo3(signature = (pixels, depths, still, *, labels, places, radius))]
-pub fn nearest_surfaces<'py>(
-    py: Python<'py>,
-    pixels: PyReadonlyArray2<'py, f64>,
-    depths: PyReadonlyArray1<'py, f64>,
-    still: Option<PyReadonlyArray1<'py, bool>>,
-    labels: PyReadonlyArray2<'py, i32>,
-    places: Vec<([f64; 2], i32)>,
-    radius: f64,
-) -> PyResult<Vec<Option<(f64, bool)>>> {
-    columns(py, "pixels", &pixels, 2)?;
-    let still = still.as_ref().map(|marks| marks.as_slice()).transpose()?;
-    let measured = MeasuredPixels { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still };
-    let (image, size) = (labels.as_slice()?, labels.dims());
-    let image = (image, [size[0], size[1]]);
-    py.detach(|| measured.nearest_surfaces(image, &places, radius)).map_err(|error| error.into_py(py))
-}
-
-/// Where a depth image shows what may be the scene, and where something before what was seen there once.
-#[pyfunction]
-pub fn still_scene<'py>(
-    py: Python<'py>,
-    now: PyReadonlyArray2<'py, f32>,
-    farthest: PyReadonlyArray2<'py, f32>,
-    then: PyReadonlyArray2<'py, f32>,
-) -> PyResult<(Marks<'py>, Marks<'py>)> {
-    let size = now.dims();
-    let (now, farthest, then) = (now.as_slice()?, farthest.as_slice()?, then.as_slice()?);
-    let (stays, before) = py.detach(|| still(now, farthest, then, size[1])).map_err(|error| error.into_py(py))?;
-    Ok((PyArray1::from_vec(py, stays).reshape(size)?, PyArray1::from_vec(py, before).reshape(size)?))
 }
 
 fn columns(py: Python<'_>, name: &str, array: &PyReadonlyArray2<'_, f64>, count: usize) -> PyResult<()> {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,7 +44,9 @@ class SiteGate:
 
     def __copy__(self) -> SiteGate:
         """The same, with a memory of its own."""
-        return replace(self, _last=dict(self._last))
+        twin = SiteGate.__new__(SiteGate)
+        vars(twin).update(vars(self), _last=dict(self._last))
+        return twin
 
     def limit(self, site: str, source: str, stamp: float) -> float:
         """Radius [m] of a site's gate at `stamp` [s]."""
@@ -96,8 +98,10 @@ class SitePredictor:
                 known = dict(zip(self._names, before, strict=True))
                 before = np.array([known.get(name, _NOWHERE) for name in names])
             velocity = (positions - before) / (stamp - self._stamp)
+            speeds = lengths(velocity)
             # NaN: the site is new.
-            velocity[~(lengths(velocity) <= self.max_speed)] = 0.0
+            if not speeds.max(initial=0.0) <= self.max_speed:
+                velocity[~(speeds <= self.max_speed)] = 0.0
         self._names, self._stamp, self._positions, self._velocity = names, stamp, positions, velocity
 
     def predict(self, stamp: float) -> dict[str, FloatArray]:
@@ -106,7 +110,15 @@ class SitePredictor:
         Raises:
             MeasurementError: no estimate yet.
         """
+        return dict(zip(self._names, self.positions(stamp), strict=True))
+
+    def positions(self, stamp: float) -> FloatArray:
+        """The same of all sites (J, 3) [m].
+
+        Raises:
+            MeasurementError: no estimate yet.
+        """
         if not self._names:
             raise MeasurementError("prediction: expected an estimate first, found none")
         elapsed = self.velocity_share * (stamp - self._stamp) if math.isfinite(self._stamp) else 0.0
-        return dict(zip(self._names, self._positions + elapsed * self._velocity, strict=True))
+        return np.asarray(self._positions + elapsed * self._velocity)

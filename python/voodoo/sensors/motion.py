@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.sensors.pixels import FloatArray
 
 _SAME_S = 1e-3
@@ -59,24 +60,15 @@ class LimbMotion:
         """
         if self._before is None or self._poses is None or not self.moves(elapsed):
             return points
-        interval, poses = self._before
-        origins = self._poses[:, :3, 3]
-        # No limb is longer than a metre: what is far from all of them needs no distances.
-        low, high = origins.min(axis=0) - 1.0, origins.max(axis=0) + 1.0
-        around = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
-        if not len(around):
-            return points
-        away = distances(points[around])
-        if len(away) != len(poses):
-            return points
-        limb = np.asarray(away.argmin(axis=0))
-        on_body = away[limb, np.arange(len(around))] < self.near
-        chosen, limb = around[on_body], limb[on_body]
-        # What the last interval did to a place on a limb, a second: (L, 3, 4).
-        moves = (self._poses @ np.linalg.inv(poses) - np.eye(4))[:, :3] / interval * self.velocity_share
-        moves = moves[limb]
-        velocity = np.einsum("nij,nj->ni", moves[:, :, :3], points[chosen]) + moves[:, :, 3]
-        steady = np.linalg.norm(velocity, axis=1) < self.max_speed * self.velocity_share
-        result = points.copy()
-        result[chosen[steady]] += np.clip(elapsed, -self.longest, self.longest) * velocity[steady]
-        return result
+        interval, before = self._before
+        return _core.carried(
+            np.ascontiguousarray(points, dtype=np.float64),
+            self._poses,
+            before,
+            interval=interval,
+            elapsed=min(max(elapsed, -self.longest), self.longest),
+            near=self.near,
+            share=self.velocity_share,
+            max_speed=self.max_speed,
+            distances=lambda places: np.asarray(distances(places), dtype=np.float32),
+        )

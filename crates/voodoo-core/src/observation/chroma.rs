@@ -2,6 +2,7 @@
 
 use crate::error::TrackError;
 use crate::math::widest;
+use crate::observation::masks::PIXEL_BLOCK;
 
 /// Bins of either axis of chroma, Cr and Cb, and of luma: coarse, to part a face from a dark poster of the same hue.
 pub const CHROMA_BINS: usize = 64;
@@ -17,7 +18,14 @@ const DARK: u16 = 1 << 15;
 /// The bin of every pixel (blue, green, red), and a mark of dark ones: luma and chroma as ITU-R BT.601 has them, rounded to whole
 /// numbers of eight bits.
 pub fn bins(image: &[[u8; 3]]) -> Vec<u16> {
-    let mut found = vec![0; image.len()];
+    let mut found = Vec::new();
+    find_bins(image, &mut found);
+    found
+}
+
+/// The same, into `found`.
+pub fn find_bins(image: &[[u8; 3]], found: &mut Vec<u16>) {
+    found.resize(image.len(), 0);
     widest(
         #[inline(always)]
         || {
@@ -26,7 +34,6 @@ pub fn bins(image: &[[u8; 3]]) -> Vec<u16> {
             }
         },
     );
-    found
 }
 
 #[inline(always)]
@@ -40,37 +47,96 @@ fn bin_of([b, g, r]: [i32; 3]) -> u16 {
     if luma < DARKEST { bin | DARK } else { bin }
 }
 
-/// 1 where a pixel is light enough and its bin is one of a `table`'s, which has [`BINS`].
+/// Whether a pixel is light enough to have a colour and its bin is one of a `table`'s.
+#[inline(always)]
+pub fn is_among(bin: u16, table: &[bool; BINS]) -> bool {
+    table[usize::from(bin & !DARK)] & (bin & DARK == 0)
+}
+
+/// 1 where a pixel is light enough and its bin is one of a `table`'s, which has [`BINS`]; into `found`.
 ///
 /// # Errors
 /// [`TrackError::Measurement`] when the table has another size.
-pub fn among(bins: &[u16], table: &[bool]) -> Result<Vec<u8>, TrackError> {
+pub fn find_among(bins: &[u16], table: &[bool], found: &mut Vec<u8>) -> Result<(), TrackError> {
     let count = table.len();
     let Ok(table): Result<&[bool; BINS], _> = table.try_into() else {
         return Err(TrackError::measurement("table", "a mark for each of 32768 bins", count.to_string()));
     };
-    Ok(bins.iter().map(|bin| u8::from(table[usize::from(bin & !DARK)] & (bin & DARK == 0))).collect())
+    let within = Chroma::of(table);
+    found.clear();
+    found.resize(bins.len(), 0);
+    widest(
+        #[inline(always)]
+        || {
+            for (bins, found) in bins.chunks(PIXEL_BLOCK).zip(found.chunks_mut(PIXEL_BLOCK)) {
+                if within.any(bins) {
+                    found.iter_mut().zip(bins).for_each(|(found, bin)| *found = u8::from(is_among(*bin, table)));
+                }
+            }
+        },
+    );
+    Ok(())
 }
 
-/// How many pixels of a mask, where it is not zero, are of each bin.
-///
-/// # Errors
-/// [`TrackError::Measurement`] when there are not as many places in the mask as bins.
-pub fn counts(bins: &[u16], mask: &[u8]) -> Result<Vec<f32>, TrackError> {
-    if bins.len() != mask.len() {
-        let found = format!("{} and {}", mask.len(), bins.len());
-        return Err(TrackError::measurement("mask", "as many pixels as the picture has", found));
+/// Least and greatest Cr and Cb of a table's bins.
+struct Chroma {
+    cr: [u16; 2],
+    cb: [u16; 2],
+}
+
+impl Chroma {
+    fn of(table: &[bool; BINS]) -> Self {
+        let mut found = Self { cr: [u16::MAX, 0], cb: [u16::MAX, 0] };
+        for (column, luma) in table.as_chunks::<LUMA_BINS>().0.iter().enumerate() {
+            if luma.iter().fold(false, |any, marked| any | marked) {
+                let (cr, cb) = ((column / CHROMA_BINS) as u16, (column % CHROMA_BINS) as u16);
+                found.cr = [found.cr[0].min(cr), found.cr[1].max(cr)];
+                found.cb = [found.cb[0].min(cb), found.cb[1].max(cb)];
+            }
+        }
+        found
     }
-    // Neighbours are alike: two tables in turns, so that no count waits for the last.
-    let (mut even, mut odd) = (vec![0_u32; BINS], vec![0_u32; BINS]);
-    let count = |table: &mut [u32], bin: u16, mask: u8| table[usize::from(bin & !DARK)] += u32::from(mask != 0);
-    let ((pairs, last), (masks, last_mask)) = (bins.as_chunks::<2>(), mask.as_chunks::<2>());
-    for ([a, b], [mask_a, mask_b]) in pairs.iter().zip(masks).filter(|(_, mask)| **mask != [0, 0]) {
-        count(&mut even, *a, *mask_a);
-        count(&mut odd, *b, *mask_b);
+
+    /// Whether some of these bins are in between.
+    #[inline(always)]
+    fn any(&self, bins: &[u16]) -> bool {
+        let width = |[low, high]: [u16; 2]| high.wrapping_sub(low);
+        let (cr_width, cb_width) = (width(self.cr), width(self.cb));
+        let inside = |bin: &u16| {
+            let (cr, cb) = (bin >> 9, bin >> 3 & 63);
+            // Below the least the difference is large.
+            (cr.wrapping_sub(self.cr[0]) <= cr_width) & (cb.wrapping_sub(self.cb[0]) <= cb_width)
+        };
+        self.cr[0] <= self.cr[1] && bins.iter().fold(false, |any, bin| any | inside(bin))
     }
-    last.iter().zip(last_mask).for_each(|(bin, mask)| count(&mut even, *bin, *mask));
-    Ok(even.iter().zip(&odd).map(|(even, odd)| (even + odd) as f32).collect())
+}
+
+/// Counts pixels of two kinds by their bins; its memory is kept.
+#[derive(Clone, Debug, Default)]
+pub struct Counter {
+    /// Of the one kind and of the other; neighbours are alike: two tables of each in turns, so that no count waits for the last.
+    tables: [Vec<[u32; 2]>; 2],
+}
+
+impl Counter {
+    /// Counts pixels that are marked, of which some are of the other kind: bin, mark and kind of each.
+    pub fn count(&mut self, pixels: impl Iterator<Item = (u16, bool, bool)>) {
+        let [even, odd] = &mut self.tables;
+        even.resize(BINS, [0; 2]);
+        odd.resize(BINS, [0; 2]);
+        for (index, (bin, mark, other)) in pixels.enumerate() {
+            let table = if index % 2 == 0 { &mut *even } else { &mut *odd };
+            table[usize::from(bin & !DARK)][usize::from(other)] += u32::from(mark);
+        }
+    }
+
+    /// Tells of each bin how many pixels of the one kind and of the other it has, and forgets them.
+    pub fn take(&mut self, mut tell: impl FnMut(usize, [u32; 2])) {
+        let [even, odd] = &mut self.tables;
+        for (bin, (even, odd)) in even.iter_mut().zip(odd).enumerate() {
+            tell(bin, [0, 1].map(|kind| std::mem::take(&mut even[kind]) + std::mem::take(&mut odd[kind])));
+        }
+    }
 }
 
 #[cfg(test)]
@@ -110,9 +176,19 @@ mod tests {
         for bin in &found[..2] {
             table[usize::from(bin & !DARK)] = true;
         }
-        assert_eq!(among(&found, &table).unwrap(), [1, 0, 0, 1]);
-        let shares = counts(&found, &[1, 255, 1, 0]).unwrap();
-        assert_eq!((shares.iter().sum::<f32>(), shares[usize::from(found[0])]), (3.0, 1.0));
-        assert!(among(&found, &table[1..]).is_err() && counts(&found, &[1]).is_err());
+        let mut marks = Vec::new();
+        find_among(&found, &table, &mut marks).unwrap();
+        assert_eq!(marks, [1, 0, 0, 1]);
+        let mut counter = Counter::default();
+        let marked = found.iter().copied().zip([true, true, true, false]);
+        counter.count(marked.map(|(bin, mark)| (bin, mark, bin & DARK != 0)));
+        let mut counts = vec![[0; 2]; BINS];
+        counter.take(|bin, found| counts[bin] = found);
+        assert_eq!((counts[usize::from(found[0])], counts[usize::from(found[1] & !DARK)]), ([1, 0], [0, 1]));
+        assert_eq!(counts.iter().flatten().sum::<u32>(), 3);
+        counter.take(|_, found| assert_eq!(found, [0; 2]));
+        find_among(&found, &[false; BINS], &mut marks).unwrap();
+        assert_eq!(marks, [0; 4]);
+        assert!(find_among(&found, &table[1..], &mut marks).is_err());
     }
 }

@@ -44,13 +44,11 @@ pub fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -> Vec<b
         #[inline(always)]
         || {
             for (row, span) in spans.iter().enumerate() {
-                let measured = &depth[row * width..][span.clone()];
-                filled.pass_on::<false>(row, span);
-                filled.measure(row, span, measured);
+                filled.pass_on::<false>(row, span, Some(&depth[row * width..][span.clone()]));
                 filled.along::<false>(row, span, far, &mut copy);
             }
             for (row, span) in spans.iter().enumerate().rev() {
-                filled.pass_on::<true>(row, span);
+                filled.pass_on::<true>(row, span, None);
                 filled.along::<true>(row, span, far, &mut copy);
             }
             filled.edges(rows, width, apart, &mut edges, &spans);
@@ -88,31 +86,58 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// What `COUNT` pixels have from neighbours in these rows, which start at places and are a step away.
+    /// What `COUNT` pixels have from neighbours in these rows, which start at places and are a step away; measured pixels, where some are
+    /// given, are their own.
+    ///
+    /// All is read and then chosen by bits: of two places in memory the compiler would choose the address, one by one.
     #[inline(always)]
-    fn nearer<const COUNT: usize>(&self, starts: &[(usize, i32); 7], at: usize, away: &mut [i32], depth: &mut [f32]) {
+    fn nearer<const COUNT: usize>(
+        &self,
+        starts: &[(usize, i32); 7],
+        at: usize,
+        (away, depth): (&mut [i32], &mut [f32]),
+        measured: Option<&[f32]>,
+    ) {
         let (mut least, mut found) = ([NOTHING; COUNT], [0.0; COUNT]);
         least.copy_from_slice(&away[at..at + COUNT]);
         found.copy_from_slice(&depth[at..at + COUNT]);
+        let mut found = found.map(f32::to_bits);
         for (start, step) in starts {
             let from = start + self.first + at;
-            let (others, depths) = (&self.away[from..from + COUNT], &self.depth[from..from + COUNT]);
+            let (mut others, mut depths) = ([0; COUNT], [0.0; COUNT]);
+            others.copy_from_slice(&self.away[from..from + COUNT]);
+            depths.copy_from_slice(&self.depth[from..from + COUNT]);
             for lane in 0..COUNT {
                 let through = others[lane] + step;
-                let nearer = through < least[lane];
-                least[lane] = if nearer { through } else { least[lane] };
-                found[lane] = if nearer { depths[lane] } else { found[lane] };
+                let keep = bits(through >= least[lane]);
+                least[lane] = least[lane].min(through);
+                found[lane] = (found[lane] & keep) | (depths[lane].to_bits() & !keep);
+            }
+        }
+        if let Some(measured) = measured {
+            let mut here = [0.0; COUNT];
+            here.copy_from_slice(&measured[at..at + COUNT]);
+            for lane in 0..COUNT {
+                let keep = bits(!here[lane].is_finite());
+                least[lane] &= keep as i32;
+                found[lane] = (found[lane] & keep) | (here[lane].to_bits() & !keep);
             }
         }
         away[at..at + COUNT].copy_from_slice(&least);
-        depth[at..at + COUNT].copy_from_slice(&found);
+        depth[at..at + COUNT].copy_from_slice(&found.map(f32::from_bits));
     }
 }
 
+/// All ones or all zeros.
+#[inline(always)]
+fn bits(condition: bool) -> u32 {
+    u32::from(condition).wrapping_neg()
+}
+
 impl Nearest {
-    /// What a row's pixels have from the two rows above, or below, with all columns the other way round.
+    /// What a row's pixels have from the two rows above, or below, with all columns the other way round; and what was measured in them.
     #[inline(always)]
-    fn pass_on<const BACK: bool>(&mut self, row: usize, span: &Range<usize>) {
+    fn pass_on<const BACK: bool>(&mut self, row: usize, span: &Range<usize>, measured: Option<&[f32]>) {
         let stride = self.stride;
         let row = row + BORDER;
         let split = if BACK { (row + 1) * stride } else { row * stride };
@@ -133,22 +158,10 @@ impl Nearest {
         match away.len().checked_sub(BLOCK) {
             Some(last) => {
                 for at in (0..last).step_by(BLOCK).chain([last]) {
-                    rows.nearer::<BLOCK>(&starts, at, away, depth);
+                    rows.nearer::<BLOCK>(&starts, at, (away, depth), measured);
                 }
             }
-            None => (0..away.len()).for_each(|at| rows.nearer::<1>(&starts, at, away, depth)),
-        }
-    }
-
-    /// Measured pixels are their own.
-    #[inline(always)]
-    fn measure(&mut self, row: usize, span: &Range<usize>, measured: &[f32]) {
-        let start = (row + BORDER) * self.stride + BORDER;
-        let (away, depth) = (&mut self.away[start..][span.clone()], &mut self.depth[start..][span.clone()]);
-        for ((away, depth), measured) in away.iter_mut().zip(depth.iter_mut()).zip(measured) {
-            let known = measured.is_finite();
-            *away = if known { 0 } else { *away };
-            *depth = if known { *measured } else { *depth };
+            None => (0..away.len()).for_each(|at| rows.nearer::<1>(&starts, at, (away, depth), measured)),
         }
     }
 
@@ -167,17 +180,23 @@ impl Nearest {
         let (mut done, mut shift) = (0, 1);
         while done < far && shift < span.len() {
             let rest = span.len() - shift;
-            let (others, depths) = (&mut copy.0[..rest], &mut copy.1[..rest]);
+            // Written where nothing is read: in place the compiler would write under a mask, which takes long.
+            let (others, depths) = (&mut copy.0[..span.len()], &mut copy.1[..span.len()]);
+            others.copy_from_slice(away);
+            depths.copy_from_slice(depth);
             let (from, to) = if BACK { (shift, 0) } else { (0, shift) };
-            others.copy_from_slice(&away[from..from + rest]);
-            depths.copy_from_slice(&depth[from..from + rest]);
+            let (own, own_depths) = (&others[to..to + rest], &depths[to..to + rest]);
+            let (others, depths) = (&others[from..from + rest], &depths[from..from + rest]);
             let (away, depth) = (&mut away[to..to + rest], &mut depth[to..to + rest]);
             let step = CHAMFERS[0] * shift as i32;
-            for (((away, depth), other), other_depth) in away.iter_mut().zip(depth).zip(others).zip(depths) {
-                let through = *other + step;
-                let nearer = through < *away;
-                *away = if nearer { through } else { *away };
-                *depth = if nearer { *other_depth } else { *depth };
+            for (away, (own, other)) in away.iter_mut().zip(own.iter().zip(others)) {
+                *away = (*own).min(*other + step);
+            }
+            for ((depth, (own, other)), (own_depth, other_depth)) in
+                depth.iter_mut().zip(own.iter().zip(others)).zip(own_depths.iter().zip(depths))
+            {
+                let keep = bits(*other + step >= *own);
+                *depth = f32::from_bits((own_depth.to_bits() & keep) | (other_depth.to_bits() & !keep));
             }
             done += shift;
             shift *= 2;
@@ -198,9 +217,18 @@ impl Nearest {
             let (here, least, edges) = (line(row, span), &mut least[..span.len()], &mut edges[span.clone()]);
             let around = line(row.saturating_sub(1), span).iter().zip(here).zip(line(row + 1, span));
             least.iter_mut().zip(around).for_each(|(least, ((a, b), c))| *least = lesser(lesser(*a, *c), *b) + apart);
-            edges.iter_mut().zip(here).zip(&*least).for_each(|((edge, z), least)| *edge = *z > *least);
-            edges[1..].iter_mut().zip(&here[1..]).zip(&*least).for_each(|((edge, z), least)| *edge |= *z > *least);
-            edges.iter_mut().zip(here).zip(&least[1..]).for_each(|((edge, z), least)| *edge |= *z > *least);
+            let end = least.len() - 1;
+            for (place, neighbours) in [(0, [0, end.min(1)]), (end, [end.saturating_sub(1), end])] {
+                edges[place] = here[place] > lesser(least[neighbours[0]], least[neighbours[1]]);
+            }
+            if let (Some(inner), Some(here), Some(second), Some(third)) =
+                (edges.get_mut(1..end), here.get(1..end), least.get(1..), least.get(2..))
+            {
+                let around = least.iter().zip(second).zip(third);
+                for ((edge, z), ((a, b), c)) in inner.iter_mut().zip(here).zip(around) {
+                    *edge = *z > lesser(lesser(*a, *c), *b);
+                }
+            }
         }
     }
 }

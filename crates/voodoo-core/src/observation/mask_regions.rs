@@ -2,7 +2,7 @@
 
 use crate::error::TrackError;
 use crate::observation::chroma;
-use crate::observation::masks::{bounds, closed, opened, smoothed};
+use crate::observation::masks::{PIXEL_BLOCK, bounds, closed, cut, is_empty, opened, smooth};
 
 /// A region of a mask: pixels that touch, at corners too.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +79,7 @@ fn joined_runs(mask: &[u8], width: usize) -> Vec<Run> {
     let mut above = 0..0;
     for (row, pixels) in mask.chunks_exact(width.max(1)).enumerate() {
         let begin = runs.len();
-        let mut start = 0;
+        let mut start = if is_empty(pixels) { pixels.len() } else { 0 };
         while let Some(next) = pixels[start..].iter().position(|pixel| *pixel != 0) {
             start += next;
             let end = pixels[start..].iter().position(|pixel| *pixel == 0).map_or(width, |length| start + length);
@@ -114,7 +114,7 @@ fn first(runs: &[Run], mut index: usize) -> usize {
 pub fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
     let mut result = mask.to_vec();
     let [rows, columns] = bounds(mask, width);
-    let part: Vec<u8> = rows.clone().flat_map(|row| &mask[row * width..][columns.clone()]).copied().collect();
+    let part = cut(mask, width, &rows, &columns);
     let (regions, mut labels) = regions(&part, columns.len());
     let length = |(low, high): (usize, usize)| (high - low) as f64;
     let small: Vec<bool> =
@@ -147,12 +147,12 @@ pub struct SkinPicture<'a> {
 }
 
 impl SkinPicture<'_> {
-    /// Pixels of skin's colour, single ones removed; and of those the ones that may be the body's, in regions at least three
-    /// pixels wide, with gaps closed between regions no longer than `longest`.
+    /// Pixels of skin's colour, single ones removed, into `seen`; and of those the ones that may be the body's, in regions at least
+    /// three pixels wide, with gaps closed between regions no longer than `longest`, into `skin`.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when sizes do not fit together.
-    pub fn skin(&self, longest: f64) -> Result<(Vec<u8>, Vec<u8>), TrackError> {
+    pub fn find(&self, longest: f64, seen: &mut Vec<u8>, skin: &mut Vec<u8>) -> Result<(), TrackError> {
         let count = self.bins.len();
         let whole = if self.width > 0 { count.is_multiple_of(self.width) } else { count == 0 };
         let masks = [self.body, self.before].into_iter().flatten().map(<[_]>::len);
@@ -160,28 +160,43 @@ impl SkinPicture<'_> {
             let found = format!("{count} pixels in rows of {} and masks of another size", self.width);
             return Err(TrackError::measurement("skin", "a picture and masks of its size", found));
         }
-        let seen = smoothed(&chroma::among(self.bins, self.table)?, self.width);
-        let mut skin = seen.clone();
-        let within = |skin: &mut [u8]| {
+        chroma::find_among(self.bins, self.table, skin)?;
+        smooth(skin, self.width, seen);
+        skin.copy_from_slice(seen);
+        self.rule_out(skin);
+        let [rows, columns] = bounds(skin, self.width);
+        // Single pixels around all of it, where the picture has them, are none.
+        let around = |span: std::ops::Range<usize>, size: usize| span.start.saturating_sub(1)..(span.end + 1).min(size);
+        let (rows, columns) = (around(rows, count / self.width.max(1)), around(columns, self.width));
+        let part = cut(skin, self.width, &rows, &columns);
+        let found = joined(&opened(&part, columns.len()), columns.len(), longest);
+        for (row, found) in rows.zip(found.chunks_exact(columns.len().max(1))) {
+            let here = row * self.width + columns.start..row * self.width + columns.end;
+            skin[here.clone()].copy_from_slice(found);
             if let Some(body) = self.body {
-                skin.iter_mut().zip(body).for_each(|(pixel, body)| *pixel &= u8::from(*body));
+                skin[here.clone()].iter_mut().zip(&body[here]).for_each(|(pixel, body)| *pixel &= u8::from(*body));
             }
-        };
-        within(&mut skin);
-        match (self.always, self.before) {
-            (Some(always), Some(before)) => {
-                for ((pixel, always), before) in skin.iter_mut().zip(always).zip(before) {
-                    *pixel &= u8::from((*always < 0.5) | *before);
-                }
-            }
-            (Some(always), None) => {
-                skin.iter_mut().zip(always).for_each(|(pixel, always)| *pixel &= u8::from(*always < 0.5));
-            }
-            (None, _) => {}
         }
-        let mut skin = joined(&opened(&skin, self.width), self.width, longest);
-        within(&mut skin);
-        Ok((seen, skin))
+        Ok(())
+    }
+
+    /// Takes away what cannot be the body's.
+    fn rule_out(&self, skin: &mut [u8]) {
+        for (block, pixels) in skin.chunks_mut(PIXEL_BLOCK).enumerate().filter(|(_, pixels)| !is_empty(pixels)) {
+            let here = block * PIXEL_BLOCK..block * PIXEL_BLOCK + pixels.len();
+            if let Some(body) = self.body {
+                pixels.iter_mut().zip(&body[here.clone()]).for_each(|(pixel, body)| *pixel &= u8::from(*body));
+            }
+            let Some(always) = self.always.map(|always| &always[here.clone()]) else { continue };
+            match self.before.map(|before| &before[here]) {
+                Some(before) => {
+                    for ((pixel, always), before) in pixels.iter_mut().zip(always).zip(before) {
+                        *pixel &= u8::from((*always < 0.5) | *before);
+                    }
+                }
+                None => pixels.iter_mut().zip(always).for_each(|(pixel, always)| *pixel &= u8::from(*always < 0.5)),
+            }
+        }
     }
 }
 
@@ -207,14 +222,18 @@ mod tests {
         assert_eq!(joined(&mask, 7, 1.0), mask);
         let (bins, table) = (vec![0; 12], vec![true; chroma::BINS]);
         let picture = SkinPicture { bins: &bins, width: 4, table: &table, body: None, always: None, before: None };
-        assert_eq!(picture.skin(3.0).unwrap(), (vec![1; 12], vec![1; 12]));
+        let look = |picture: SkinPicture| {
+            let (mut seen, mut skin) = (Vec::new(), Vec::new());
+            picture.find(3.0, &mut seen, &mut skin).map(|()| (seen, skin))
+        };
+        assert_eq!(look(picture).unwrap(), (vec![1; 12], vec![1; 12]));
         let body = [true, true, true, false].repeat(3);
-        assert_eq!(SkinPicture { body: Some(&body), ..picture }.skin(3.0).unwrap().1[..4], [1, 1, 1, 0]);
+        assert_eq!(look(SkinPicture { body: Some(&body), ..picture }).unwrap().1[..4], [1, 1, 1, 0]);
         let always = [0.6; 12];
-        assert_eq!(SkinPicture { always: Some(&always), ..picture }.skin(3.0).unwrap().1, [0; 12]);
+        assert_eq!(look(SkinPicture { always: Some(&always), ..picture }).unwrap().1, [0; 12]);
         let before = SkinPicture { always: Some(&always), before: Some(&body), ..picture };
-        assert_eq!(before.skin(3.0).unwrap().1[..4], [1, 1, 1, 0]);
-        assert!(SkinPicture { width: 5, ..picture }.skin(3.0).is_err());
-        assert!(SkinPicture { body: Some(&body[1..]), ..picture }.skin(3.0).is_err());
+        assert_eq!(look(before).unwrap().1[..4], [1, 1, 1, 0]);
+        assert!(look(SkinPicture { width: 5, ..picture }).is_err());
+        assert!(look(SkinPicture { body: Some(&body[1..]), ..picture }).is_err());
     }
 }

@@ -40,8 +40,16 @@ fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) 
 
 /// What most of each pixel and its eight neighbours are; beyond the border a picture goes on as it ends.
 pub fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
-    by_rows(
-        mask,
+    let mut found = Vec::new();
+    smooth(mask, width, &mut found);
+    found
+}
+
+/// The same, into `found`.
+pub fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
+    found.resize(mask.len(), 0);
+    fill_rows(
+        found,
         width,
         #[inline(always)]
         |index, row, found| {
@@ -61,8 +69,14 @@ pub fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
 }
 
 /// A mask made row by row: `make` gets the number of a row, working memory for one, and the row to fill.
-fn by_rows(mask: &[u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mut [u8])) -> Vec<u8> {
-    let (mut row, mut found) = (vec![0; width], vec![0; mask.len()]);
+fn by_rows(mask: &[u8], width: usize, make: impl FnMut(usize, &mut [u8], &mut [u8])) -> Vec<u8> {
+    let mut found = vec![0; mask.len()];
+    fill_rows(&mut found, width, make);
+    found
+}
+
+fn fill_rows(found: &mut [u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mut [u8])) {
+    let mut row = vec![0; width];
     widest(
         #[inline(always)]
         || {
@@ -71,13 +85,29 @@ fn by_rows(mask: &[u8], width: usize, mut make: impl FnMut(usize, &mut [u8], &mu
             }
         },
     );
-    found
+}
+
+/// Pixels that are passed over together where none of them holds anything: two registers of AVX2.
+pub const PIXEL_BLOCK: usize = 64;
+
+/// A part of a mask of so many columns.
+pub fn cut(mask: &[u8], width: usize, rows: &std::ops::Range<usize>, columns: &std::ops::Range<usize>) -> Vec<u8> {
+    let mut part = Vec::with_capacity(rows.len() * columns.len());
+    for row in rows.clone() {
+        part.extend_from_slice(&mask[row * width..][columns.clone()]);
+    }
+    part
+}
+
+/// Whether a row of a mask holds nothing; all of it is read at once, which is faster than to look for the first pixel.
+pub fn is_empty(row: &[u8]) -> bool {
+    row.iter().fold(0, |any, pixel| any | pixel) == 0
 }
 
 /// Smallest range of rows and of columns that holds all of a mask.
 pub fn bounds(mask: &[u8], width: usize) -> [std::ops::Range<usize>; 2] {
     let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-    for (index, row) in mask.chunks_exact(width.max(1)).enumerate() {
+    for (index, row) in mask.chunks_exact(width.max(1)).enumerate().filter(|(_, row)| !is_empty(row)) {
         if let Some(first) = row.iter().position(|pixel| *pixel != 0) {
             let last = row.iter().rposition(|pixel| *pixel != 0).unwrap_or(first);
             low = [low[0].min(index), low[1].min(first)];

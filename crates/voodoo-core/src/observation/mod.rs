@@ -9,12 +9,16 @@
 pub mod background;
 mod background_moved;
 mod background_update;
+pub mod body_view;
 pub mod candidates;
+pub mod carried;
 pub mod chroma;
 pub(crate) mod clusters;
 pub mod depth_view;
+pub mod eye;
 pub mod far_edges;
 pub mod frame;
+pub mod keypoints;
 pub mod mask_regions;
 pub mod masks;
 pub mod observer;

@@ -67,6 +67,8 @@ impl Window<'_> {
     ) -> Result<(Vec<[f64; 3]>, Vec<isize>), TrackError> {
         self.check()?;
         let to_world = world_from_sensor.map(|row| row.map(|entry| entry as f32));
+        // Values of single precision are between these where they are between the corners.
+        let (low, high) = (low.map(below), high.map(|value| -below(-value)));
         let (mut points, mut pixels) = (Vec::new(), Vec::new());
         let mut inside = vec![false; self.columns.len()];
         for row in self.rows.clone() {
@@ -98,12 +100,18 @@ impl Window<'_> {
     }
 }
 
+/// The greatest value of single precision that is not above another one.
+fn below(value: f64) -> f32 {
+    let near = value as f32;
+    if f64::from(near) > value { near.next_down() } else { near }
+}
+
 /// Which depths along rays are returns from within a box (world, metres).
 #[inline(always)]
 fn gate<'a>(
     inside: &mut [bool],
     pixels: impl Iterator<Item = (&'a f32, &'a [f32; 2])>,
-    (low, high): ([f64; 3], [f64; 3]),
+    (low, high): ([f32; 3], [f32; 3]),
     to_world: &[[f32; 4]; 4],
 ) {
     for (inside, (z, ray)) in inside.iter_mut().zip(pixels) {
@@ -111,11 +119,21 @@ fn gate<'a>(
         let mut passes = z.is_finite() & (*z > 0.0);
         for axis in 0..3 {
             let turn = &to_world[axis];
-            let place = f64::from(turn[0] * x + turn[1] * y + turn[2] * z + turn[3]);
+            let place = turn[0] * x + turn[1] * y + turn[2] * z + turn[3];
             passes &= (place > low[axis]) & (place < high[axis]);
         }
         *inside = passes;
     }
+}
+
+/// Sums with numbers of a picture's size have no digits left for fractions of them: three times 2^51.
+const NO_FRACTION: f64 = (1_u64 << 52) as f64 + (1_u64 << 51) as f64;
+
+/// A number rounded to the nearest whole one, of two the even one, by the digits that a large sum has no room for; numbers beyond
+/// 2^51 stay large.
+#[inline(always)]
+fn nearest_whole(value: f64) -> f64 {
+    (value + NO_FRACTION) - NO_FRACTION
 }
 
 /// Points in a picture of so many rows and columns.
@@ -156,9 +174,9 @@ impl ProjectedPoints {
         let mut cells = Vec::with_capacity(places.len());
         let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
         for (index, place) in places.iter().enumerate() {
-            let [u, v] = place.map(f64::round_ties_even);
+            let [u, v] = place.map(nearest_whole);
             if u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64 {
-                let cell = [v as usize, u as usize];
+                let cell = [v as i64 as usize, u as i64 as usize];
                 inside.push(index as isize);
                 cells.push(cell);
                 low = [0, 1].map(|axis| low[axis].min(cell[axis]));
@@ -243,35 +261,70 @@ pub struct MeasuredPixels<'a> {
 const ONE_SURFACE: f64 = 0.1;
 /// Fewer points around a place than this are no surface: one or two may be stray returns.
 const FEWEST_POINTS: usize = 3;
+/// Points of a list whose bounds are looked at together.
+const POINTS_TOGETHER: usize = 64;
+
+/// Numbers of regions in a part of a picture, row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Labels {
+    /// First row and column.
+    pub first: [usize; 2],
+    /// Rows and columns.
+    pub size: [usize; 2],
+    /// A number for each pixel.
+    pub values: Vec<i32>,
+}
+
+impl Labels {
+    /// That of the pixel around a place (column, row); -1 outside.
+    fn at(&self, place: &[f64; 2]) -> i32 {
+        let [u, v] = place.map(nearest_whole);
+        let [row, column] = [(v, 0), (u, 1)].map(|(value, axis)| value - self.first[axis] as f64);
+        let inside = row >= 0.0 && column >= 0.0 && row < self.size[0] as f64 && column < self.size[1] as f64;
+        if inside { self.values[row as i64 as usize * self.size[1] + column as i64 as usize] } else { -1 }
+    }
+}
 
 impl MeasuredPixels<'_> {
-    /// [`Self::nearest_surface`] of each of some places of an image of so many rows and columns, by the points in its region, as
-    /// `labels` number it, if there are enough.
+    /// [`Self::nearest_surface`] of each of some places of a picture, by the points in its region, as `labels` number it, if there are
+    /// enough.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when arrays do not belong together.
     pub fn nearest_surfaces(
         &self,
-        (labels, [height, width]): (&[i32], [usize; 2]),
+        labels: &Labels,
         places: &[([f64; 2], i32)],
         radius: f64,
     ) -> Result<Vec<Option<(f64, bool)>>, TrackError> {
-        if height.checked_mul(width) != Some(labels.len()) {
-            let found = format!("{} for {height} rows of {width}", labels.len());
+        let [height, width] = labels.size;
+        if height.checked_mul(width) != Some(labels.values.len()) {
+            let found = format!("{} for {height} rows of {width}", labels.values.len());
             return Err(TrackError::measurement("labels", "one for every pixel", found));
         }
-        let label = |place: &[f64; 2]| {
-            let [u, v] = place.map(f64::round_ties_even);
-            let inside = u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
-            if inside { labels[v as usize * width + u as usize] } else { -1 }
+        self.check(None)?;
+        // Neighbours in the list are near each other: most stretches of it are nowhere near a place.
+        let stretches: Vec<[[f64; 2]; 2]> = self.places.chunks(POINTS_TOGETHER).map(bounds_of).collect();
+        let look = |(place, region): &([f64; 2], i32)| {
+            let (mut near, mut chosen) = (Vec::new(), Vec::new());
+            let far = |[low, high]: &[[f64; 2]; 2]| {
+                (0..2).any(|axis| low[axis] > place[axis] + radius || high[axis] < place[axis] - radius)
+            };
+            for (stretch, _) in stretches.iter().enumerate().filter(|(_, bounds)| !far(bounds)) {
+                let first = stretch * POINTS_TOGETHER;
+                let last = (first + POINTS_TOGETHER).min(self.places.len());
+                for (index, other) in (first..).zip(&self.places[first..last]) {
+                    if is_near(other, place, radius) {
+                        near.push(index);
+                        if labels.at(other) == *region {
+                            chosen.push(index);
+                        }
+                    }
+                }
+            }
+            self.surface_of(near, chosen)
         };
-        let of: Vec<i32> = self.places.iter().map(label).collect();
-        let mut among = vec![false; of.len()];
-        let mut look = |(place, region): &([f64; 2], i32)| {
-            among.iter_mut().zip(&of).for_each(|(among, label)| *among = label == region);
-            self.nearest_surface(*place, radius, Some(&among))
-        };
-        places.iter().map(&mut look).collect()
+        Ok(places.iter().map(look).collect())
     }
 
     /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
@@ -285,32 +338,55 @@ impl MeasuredPixels<'_> {
         radius: f64,
         among: Option<&[bool]>,
     ) -> Result<Option<(f64, bool)>, TrackError> {
-        let count = self.places.len();
-        let marks = [self.still, among];
-        if self.depths.len() != count || marks.iter().flatten().any(|marks| marks.len() != count) {
-            let found = format!("{} depths, {:?} marks", self.depths.len(), marks.map(|marks| marks.map(<[_]>::len)));
-            return Err(TrackError::measurement("depths", "as many depths, and marks, as pixels", found));
-        }
+        self.check(among)?;
         let (mut near, mut chosen) = (Vec::new(), Vec::new());
-        for (index, other) in self.places.iter().enumerate() {
-            let (u, v) = (other[0] - place[0], other[1] - place[1]);
-            if u * u + v * v < radius * radius {
-                near.push(index);
-                if among.is_some_and(|among| among[index]) {
-                    chosen.push(index);
-                }
+        for (index, _) in self.places.iter().enumerate().filter(|(_, other)| is_near(other, &place, radius)) {
+            near.push(index);
+            if among.is_some_and(|among| among[index]) {
+                chosen.push(index);
             }
         }
+        Ok(self.surface_of(near, chosen))
+    }
+
+    fn check(&self, among: Option<&[bool]>) -> Result<(), TrackError> {
+        let (count, marks) = (self.places.len(), [self.still, among]);
+        if self.depths.len() == count && marks.iter().flatten().all(|marks| marks.len() == count) {
+            return Ok(());
+        }
+        let found = format!("{} depths, {:?} marks", self.depths.len(), marks.map(|marks| marks.map(<[_]>::len)));
+        Err(TrackError::measurement("depths", "as many depths, and marks, as pixels", found))
+    }
+
+    /// The nearest surface of points that are near, or of those of them that are chosen, if there are enough.
+    fn surface_of(&self, mut near: Vec<usize>, chosen: Vec<usize>) -> Option<(f64, bool)> {
         if chosen.len() >= FEWEST_POINTS {
             near = chosen;
         }
         if near.len() < FEWEST_POINTS {
-            return Ok(None);
+            return None;
         }
         near.sort_unstable_by(|a, b| self.depths[*a].total_cmp(&self.depths[*b]));
         let fifth = self.depths[near[(near.len() - 1) / 5]];
         near.retain(|index| (self.depths[*index] - fifth).abs() < ONE_SURFACE);
         let still = self.still.map_or(0, |still| near.iter().filter(|index| still[**index]).count());
-        Ok(near.get(near.len() / 2).map(|middle| (self.depths[*middle], 2 * still > near.len())))
+        near.get(near.len() / 2).map(|middle| (self.depths[*middle], 2 * still > near.len()))
     }
+}
+
+fn is_near(other: &[f64; 2], place: &[f64; 2], radius: f64) -> bool {
+    let (u, v) = (other[0] - place[0], other[1] - place[1]);
+    u * u + v * v < radius * radius
+}
+
+/// Least and greatest columns and rows; NaN counts nowhere.
+fn bounds_of(places: &[[f64; 2]]) -> [[f64; 2]; 2] {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for place in places {
+        for axis in 0..2 {
+            low[axis] = if place[axis] < low[axis] { place[axis] } else { low[axis] };
+            high[axis] = if place[axis] > high[axis] { place[axis] } else { high[axis] };
+        }
+    }
+    [low, high]
 }

@@ -210,7 +210,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// True when `q` is strictly inside the solid.
-    fn contains(&self, q: Vec3) -> bool {
+    pub(crate) fn contains(&self, q: Vec3) -> bool {
         q.z > 0.0 && q.z < self.length && self.ellipse_sign(q) < 0.0
     }
 }

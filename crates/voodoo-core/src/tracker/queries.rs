@@ -10,6 +10,10 @@ use crate::observation::frame::{Frame, PointSlice};
 use crate::regions::{Posed, RegionLine, Regions};
 use crate::shape::SurfaceBatch;
 
+/// So much of a line of sight is looked at, metres: more than a trunk's width, and half a forearm's.
+const LOOKED_THROUGH: f64 = 0.75;
+/// At so many places.
+const PLACES: usize = 30;
 /// Distances in single precision are off by less: metres, and share of a distance.
 const ROUNDING: f64 = 1e-3;
 
@@ -112,6 +116,32 @@ impl Tracker {
             }
         }
         Ok(least)
+    }
+
+    /// Length of body between each of some places, inside the body as it is posed, and a camera's focal point, world, metres: what the
+    /// body hides a network guesses, with no less confidence.
+    pub fn body_before(&self, sites: &[Vec3], camera: Vec3) -> Result<Vec<f64>, TrackError> {
+        if !self.is_started() {
+            return Err(TrackError::NotInitialised);
+        }
+        let poses: Vec<Pose> = self.motion.world_from_limb().collect();
+        let limbs = || self.model.body.limbs().iter().zip(&poses);
+        let hidden = |site: &Vec3| {
+            let towards = camera - *site;
+            let reach = towards.length().min(LOOKED_THROUGH);
+            let direction = towards / towards.length().max(1e-9);
+            let mut inside = [false; PLACES];
+            for (limb, world_from_limb) in limbs() {
+                let limb_from_world = world_from_limb.inverse();
+                let (start, along) = (limb_from_world.transform_point(*site), limb_from_world.rotation * direction);
+                for (step, inside) in inside.iter_mut().enumerate() {
+                    let far = (step as f64 + 0.5) / PLACES as f64 * reach;
+                    *inside = *inside || limb.shape.contains(start + far * along);
+                }
+            }
+            inside.iter().filter(|inside| **inside).count() as f64 / PLACES as f64 * reach
+        };
+        Ok(sites.iter().map(hidden).collect())
     }
 
     /// World points in the working frame of the posed body.

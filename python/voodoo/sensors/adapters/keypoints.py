@@ -13,7 +13,6 @@ from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.keypoints.sensor import KeypointReport, KeypointSensor
 from voodoo.sensors.keypoints.sites import nearest_person
-from voodoo.sensors.occlusion import body_before
 
 KEYPOINT = (255, 120, 255)
 """Colour in overlays, BGR."""
@@ -53,7 +52,7 @@ class KeypointsAdapter(Adapter[KeypointImage]):
         joints = context.tracker.estimate.joints
         sites = [part.site for part in layout_of(item.layout).parts if part.site in joints]
         places = [joints[site] for site in sites]
-        hidden = body_before(places, item.root_from_sensor[:3, 3], context.tracker.distance)
+        hidden = context.tracker.body_before(places, item.root_from_sensor[:3, 3])
         report, rays, points = sensor.observe(
             person,
             stamp=context.stamp,

@@ -16,7 +16,7 @@ from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
 from voodoo.sensors.pixels import FloatArray
-from voodoo.sensors.skin.tracker import SkinTracker
+from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
 
 SKIN = (80, 255, 255)
 """Colour in overlays, BGR."""
@@ -41,7 +41,7 @@ class SkinAdapter(Adapter[ColorImage]):
         skin = context.memory.get(self.kind, item.sensor, lambda: SkinTracker(context.settings.skin))
         # The picture is older or newer than the frame: the ray is moved along with its site.
         then = context.predictor.predict(item.stamp)
-        view = _body_view(item, then, context)
+        view = _body_view(item, context)
         sites = skin.settings.sites if view is not None else ()
         tracker, status = context.tracker, context.tracker.estimate.limb_status
         rays = skin.observe(
@@ -51,14 +51,15 @@ class SkinAdapter(Adapter[ColorImage]):
             then,
             stamp=item.stamp,
             body=view,
-            surface=lambda places: dict(zip(status, tracker.limb_distances(places), strict=True)),
+            surface=lambda places: LimbDistances(status, tracker.limb_distances(places)),
             strangers=partial(_distance, context.others) if context.others else None,
             arm_lost=_hands(status, sites, "forearm", measured=False),
             upper_arm_visible=_hands(status, sites, "upperarm", measured=True),
             head_visible=_heads(status, sites),
             source=item.sensor,
+            moved=context.predicted,
         )
-        context.rays.extend(ray.moved(context.predicted[ray.site] - then[ray.site]) for ray in rays)
+        context.rays.extend(rays)
 
     def learn(self, item: ColorImage, estimate: Estimate, memory: Memory, *, vouched: bool) -> None:
         """Colours and background of the picture."""
@@ -98,7 +99,7 @@ class SkinAdapter(Adapter[ColorImage]):
             log.send(f"{path}/picture/skin", rr.Points2D(places, radii=3.0, colors=(0, 255, 255)))
 
 
-def _body_view(item: ColorImage, then: dict[str, FloatArray], context: Context) -> BodyView | None:
+def _body_view(item: ColorImage, context: Context) -> BodyView | None:
     """What the frame's first depth camera sees of the body, in this picture; None without one."""
     depth = next(iter(context.depth_images), None)
     if depth is None:
@@ -110,7 +111,7 @@ def _body_view(item: ColorImage, then: dict[str, FloatArray], context: Context) 
         metres_per_unit=depth.metres_per_unit,
         color_camera=item.camera,
         world_from_color=item.root_from_sensor,
-        joints=list(then.values()),
+        joints=context.predictor.positions(item.stamp),
         step=max(depth.camera.width // 200, 1),
         scene=context.memory.get(SCENE, depth.sensor, StillDepth),
     )

@@ -17,10 +17,16 @@ from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.gating import SiteGate
-from voodoo.sensors.keypoints.sites import MIN_CONFIDENCE, SitePixel, check_confidence, site_pixels
+from voodoo.sensors.keypoints.sites import (
+    MIN_CONFIDENCE,
+    check_confidence,
+    checked_rows,
+    compiled,
+    expected_places,
+)
 from voodoo.sensors.keypoints.surface import DepthArray, behind_surface, window_depth
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import checked_camera, in_sensor, ray_distance, world_rays
+from voodoo.sensors.pixels import checked_camera, normalized
 from voodoo.sensors.rays import SiteRay, add_rays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -47,6 +53,10 @@ class KeypointReport:
     points: tuple[str, ...] = ()
     unseen: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
+
+    def __copy__(self) -> KeypointReport:
+        """Itself: it never changes."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -78,9 +88,9 @@ class KeypointSensor:
 
     def __post_init__(self) -> None:
         """Check what does not depend on a picture."""
-        known = [part.site for part in layout_of(self.layout).parts]
-        unknown = sorted(set(self.sites or ()) - set(known))
-        if unknown:
+        parts = layout_of(self.layout).parts
+        if self.sites and (unknown := sorted(set(self.sites) - {part.site for part in parts})):
+            known = [part.site for part in parts]
             raise MeasurementError(f"sites: expected some of {', '.join(known)}, found {', '.join(unknown)}")
         checked_camera(self.camera)
         rigid(self.world_from_sensor)
@@ -139,7 +149,7 @@ class KeypointSensor:
             depth: (H, W) uint16 or float32.
             metres_per_unit: of `depth`.
             before: site name -> how much of the person's body lies between it and the camera [m], see
-                `voodoo.sensors.occlusion`; None: not known. Networks are as sure of what they guess as of what they see.
+                `Tracker.body_before`; None: not known. Networks are as sure of what they guess as of what they see.
 
         Returns:
             The report, the rays, and site name -> (position (3,) in the world, standard deviation) [m].
@@ -151,48 +161,55 @@ class KeypointSensor:
         if depth is not None and depth.shape != (self.camera.height, self.camera.width):
             expected = (self.camera.height, self.camera.width)
             raise MeasurementError(f"depth: expected the camera's shape {expected}, found {depth.shape}")
-        seen, unseen = site_pixels(keypoints, layout=self.layout, min_confidence=self.min_confidence)
-        seen = [item for item in seen if item.site in predicted and (self.sites is None or item.site in self.sites)]
+        camera, parts = self.camera, layout_of(self.layout).parts
+        found = compiled(self.layout).sights(
+            checked_rows(keypoints, self.layout),
+            expected_places(self.layout, predicted),
+            world_from_sensor=pose,
+            intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
+            lens=(lambda pixels: normalized(camera, pixels)) if camera.distorted else None,
+            noise=self.noise.pixels,
+            least=self.min_confidence,
+        )
+        origin, before = pose[:3, 3], before or {}
         rays: list[SiteRay] = []
         points: dict[str, tuple[FloatArray, float]] = {}
         dropped: list[str] = []
-        if not seen:
-            return KeypointReport(unseen=tuple(unseen)), rays, points
-        origin, directions = world_rays(self.camera, pose, [item.pixel for item in seen])
-        sites = np.array([predicted[item.site] for item in seen], dtype=np.float64)
-        depths = in_sensor(pose, sites)[:, 2]
-        usable = np.isfinite(directions).all(axis=1) & (depths > 0.0)
-        off = ray_distance(origin, directions, sites)
-        for item, direction, site, z, away, able in zip(
-            seen, directions, sites, depths.tolist(), off.tolist(), usable.tolist(), strict=True
-        ):
-            if not able:
-                dropped.append(item.site)
+        for part, sight in zip(parts, found, strict=True):
+            site = part.site
+            if sight is None or site not in predicted or (self.sites is not None and site not in self.sites):
                 continue
-            sigma = self._sigma(item, z)
+            pixel, direction, z, away, sigma = sight
+            # NaN: the lens shows nothing there.
+            if not (z > 0.0 and away >= 0.0):
+                dropped.append(site)
+                continue
             if depth is not None:
-                point = self._point(item, direction, pose, depth, metres_per_unit)
-                if point is not None and (gate is None or gate.accepts_point(item.site, site, point, stamp)):
-                    points[item.site] = (point, max(sigma, POINT_SIGMA_M))
+                point = self._point(site, pixel, direction, pose, depth, metres_per_unit)
+                if point is not None and (gate is None or gate.accepts_point(site, predicted[site], point, stamp)):
+                    points[site] = (point, max(sigma, POINT_SIGMA_M))
                     continue
-            if gate is None or gate.accepts(item.site, away, stamp, self.source):
-                hidden = (before or {}).get(item.site, 0.0) - behind_surface(item.site)
-                sigma = math.hypot(sigma, GUESSED * max(hidden, 0.0))
-                rays.append(SiteRay(item.site, origin, direction, sigma, self.source))
+            if gate is None or gate.accepts(site, away, stamp, self.source):
+                hidden = before.get(site, 0.0) - behind_surface(site)
+                if hidden > 0.0:
+                    sigma = math.hypot(sigma, GUESSED * hidden)
+                rays.append(SiteRay(site, origin, direction, sigma, self.source))
             else:
-                dropped.append(item.site)
-        report = KeypointReport(tuple(ray.site for ray in rays), tuple(points), tuple(unseen), tuple(dropped))
-        return report, rays, points
-
-    def _sigma(self, item: SitePixel, z: float) -> float:
-        focal = math.sqrt(self.camera.fx * self.camera.fy)
-        return self.noise.sigma(z, focal, confidence=item.confidence, spread=item.spread)
+                dropped.append(site)
+        unseen = tuple(part.site for part, sight in zip(parts, found, strict=True) if sight is None)
+        return KeypointReport(tuple(ray.site for ray in rays), tuple(points), unseen, tuple(dropped)), rays, points
 
     def _point(
-        self, item: SitePixel, direction: FloatArray, pose: FloatArray, depth: DepthArray, metres_per_unit: float
+        self,
+        site: str,
+        pixel: tuple[float, float],
+        direction: FloatArray,
+        pose: FloatArray,
+        depth: DepthArray,
+        metres_per_unit: float,
     ) -> FloatArray | None:
-        z = window_depth(depth, item.pixel, metres_per_unit=metres_per_unit)
+        z = window_depth(depth, pixel, metres_per_unit=metres_per_unit)
         if z is None:
             return None
         cosine = float(direction @ pose[:3, 2])
-        return np.asarray(pose[:3, 3] + direction * (z / cosine + behind_surface(item.site)))
+        return np.asarray(pose[:3, 3] + direction * (z / cosine + behind_surface(site)))

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.errors import MeasurementError
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
-from voodoo.sensors.pixels import in_sensor
 
+_NOWHERE = np.full(3, np.nan)
 MIN_CONFIDENCE = 0.1
 """Keypoints that a network itself believes less than this are not measurements."""
 
@@ -47,29 +48,38 @@ def site_pixels(
     Raises:
         MeasurementError: unknown layout, wrong shape or no finite least confidence.
     """
-    table = layout_of(layout)
     check_confidence(min_confidence)
+    parts = layout_of(layout).parts
+    found = compiled(layout).pixels(checked_rows(keypoints, layout), min_confidence)
+    seen = [SitePixel(part.site, *of, part.spread) for part, of in zip(parts, found, strict=True) if of is not None]
+    return seen, [part.site for part, of in zip(parts, found, strict=True) if of is None]
+
+
+def checked_rows(keypoints: npt.ArrayLike, layout: str) -> npt.NDArray[np.float64]:
+    """Keypoints (K, 3) of a layout, contiguous.
+
+    Raises:
+        MeasurementError: unknown layout, or another shape.
+    """
+    count = layout_of(layout).count
     try:
-        rows = np.asarray(keypoints, dtype=np.float64)
+        rows = np.ascontiguousarray(keypoints, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise MeasurementError(f"keypoints: expected numbers (u, v, confidence), found {keypoints!r}") from error
-    if rows.shape != (table.count, 3):
-        raise MeasurementError(f"keypoints: expected shape ({table.count}, 3) for {layout}, found {rows.shape}")
-    values: list[list[float]] = rows.tolist()
-    seen, unseen = [], []
-    for part in table.parts:
-        u = v = total = 0.0
-        confidence = 1.0
-        for index, share in part.shares.items():
-            column, row, believed = values[index]
-            u, v, total = u + share * column, v + share * row, total + believed
-            confidence = min(confidence, believed)
-        # What is not finite anywhere is not in the sums.
-        if not math.isfinite(u + v + total) or confidence < min_confidence or confidence <= 0.0:
-            unseen.append(part.site)
-        else:
-            seen.append(SitePixel(part.site, (u, v), confidence, part.spread))
-    return seen, unseen
+    if rows.shape != (count, 3):
+        raise MeasurementError(f"keypoints: expected shape ({count}, 3) for {layout}, found {rows.shape}")
+    return rows
+
+
+@lru_cache(maxsize=32)
+def compiled(layout: str) -> _core.KeypointLayout:
+    """A layout as the core holds it."""
+    return _core.KeypointLayout([(list(part.shares.items()), part.spread) for part in layout_of(layout).parts])
+
+
+def expected_places(layout: str, predicted: Mapping[str, npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+    """Where the sites of a layout's parts are predicted (P, 3) [m]; NaN: nowhere."""
+    return np.array([predicted.get(part.site, _NOWHERE) for part in layout_of(layout).parts], dtype=np.float64)
 
 
 def check_confidence(least: object) -> None:
@@ -98,15 +108,12 @@ def nearest_person(
         MeasurementError: wrong shapes, or an unknown layout.
     """
     pose = rigid(world_from_sensor)
-    best, least = None, math.inf
-    for person in people:
-        seen, _ = site_pixels(person, layout=layout)
-        seen = [item for item in seen if item.site in predicted]
-        if not seen:
-            continue
-        pixels = camera.project(in_sensor(pose, [predicted[item.site] for item in seen]))
-        distance = np.hypot(*(pixels - [item.pixel for item in seen]).T)
-        distances = distance[np.isfinite(distance)].tolist()
-        if distances and (middle := median(distances)) < least:
-            best, least = person, middle
-    return best
+    nearest = compiled(layout).nearest(
+        [checked_rows(person, layout) for person in people],
+        expected_places(layout, predicted),
+        world_from_sensor=pose,
+        intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
+        project=camera.project if camera.distorted else None,
+        least=MIN_CONFIDENCE,
+    )
+    return None if nearest is None else people[nearest]

@@ -1,0 +1,204 @@
+//! What a depth camera sees of the body in the picture of a colour camera beside it.
+
+use std::sync::Arc;
+
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use voodoo_core::observation::body_view::{Beside, BodyView, Matrix, StillDepth};
+use voodoo_core::observation::frame::DepthPixels;
+use voodoo_core::observation::registration::Labels;
+
+use crate::arrays::contiguous;
+use crate::errors::{IntoPy, exception, wrong_argument};
+
+type Marks<'py> = Bound<'py, PyArray2<bool>>;
+
+/// The rows of a 4x4 array.
+pub fn rows_of(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Matrix> {
+    let entries: Option<[f64; 16]> = (value.dims() == numpy::Ix2(4, 4)).then(|| {
+        let mut entries = value.as_array().iter().copied().collect::<Vec<_>>();
+        entries.resize(16, 0.0);
+        <[f64; 16]>::try_from(entries).unwrap_or_default()
+    });
+    match entries {
+        Some(entries) => Ok([0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| entries[4 * row + column]))),
+        None => Err(wrong_argument(value.py(), name, "an array of shape (4, 4)", value.as_any())),
+    }
+}
+
+#[pyclass(name = "BodyView", module = "voodoo._core", frozen)]
+pub struct PyBodyView(pub Arc<BodyView>);
+
+#[pymethods]
+impl PyBodyView {
+    #[new]
+    #[pyo3(signature = (mask, pixels, depths, still=None, before=None))]
+    fn new(
+        mask: PyReadonlyArray2<'_, bool>,
+        pixels: PyReadonlyArray2<'_, f64>,
+        depths: PyReadonlyArray1<'_, f64>,
+        still: Option<PyReadonlyArray1<'_, bool>>,
+        before: Option<PyReadonlyArray2<'_, bool>>,
+    ) -> PyResult<Self> {
+        let (size, shape) = ([mask.dims()[0], mask.dims()[1]], pixels.dims());
+        if shape[1] != 2 || shape[0] != depths.len() || before.as_ref().is_some_and(|other| other.dims() != mask.dims())
+        {
+            let text = format!("pixels: expected shape (N, 2), and a depth each, found {:?}", pixels.shape());
+            return Err(exception(mask.py(), "MeasurementError", text));
+        }
+        Ok(Self(Arc::new(BodyView {
+            size,
+            mask: mask.as_array().iter().copied().collect(),
+            pixels: pixels.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect(),
+            depths: depths.as_array().to_vec(),
+            still: still.map(|marks| marks.as_array().to_vec()),
+            before: before.map(|marks| marks.as_array().iter().copied().collect()),
+        })))
+    }
+
+    #[getter]
+    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Marks<'py>> {
+        PyArray1::from_slice(py, &self.0.mask).reshape(self.0.size)
+    }
+
+    #[getter]
+    fn pixels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        PyArray1::from_slice(py, self.0.pixels.as_flattened()).reshape([self.0.pixels.len(), 2])
+    }
+
+    #[getter]
+    fn depths<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.0.depths)
+    }
+
+    #[getter]
+    fn still<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<bool>>> {
+        self.0.still.as_ref().map(|marks| PyArray1::from_slice(py, marks))
+    }
+
+    #[getter]
+    fn before<'py>(&self, py: Python<'py>) -> PyResult<Option<Marks<'py>>> {
+        let before = self.0.before.as_ref();
+        before.map(|marks| PyArray1::from_slice(py, marks).reshape(self.0.size)).transpose()
+    }
+
+    /// Depth of the nearest surface around each of some places and whether most of it is still; none with too few points.
+    fn look_at(
+        &self,
+        labels: PyReadonlyArray2<'_, i32>,
+        places: Vec<([f64; 2], i32)>,
+        radius: f64,
+    ) -> PyResult<Vec<Option<(f64, bool)>>> {
+        let size = [labels.dims()[0], labels.dims()[1]];
+        let image = Labels { first: [0, 0], size, values: labels.as_slice()?.to_vec() };
+        let found = self.0.measured().nearest_surfaces(&image, &places, radius);
+        found.map_err(|error| error.into_py(labels.py()))
+    }
+}
+
+#[pyclass(name = "StillDepth", module = "voodoo._core")]
+#[derive(Default)]
+pub struct PyStillDepth(StillDepth);
+
+#[pymethods]
+impl PyStillDepth {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn __copy__(&self) -> Self {
+        Self(self.0.twin())
+    }
+
+    #[getter]
+    fn farthest<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        PyArray1::from_slice(py, self.0.farthest())
+    }
+
+    /// Where an image (metres) shows what may be the scene, and where something before what was seen there once.
+    fn see<'py>(
+        &mut self,
+        z: PyReadonlyArray2<'py, f32>,
+        world_from_sensor: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Option<(Marks<'py>, Marks<'py>)>> {
+        let (py, size) = (z.py(), [z.dims()[0], z.dims()[1]]);
+        let image = z.as_array().iter().copied().collect();
+        let pose = rows_of("world_from_sensor", &world_from_sensor)?;
+        let found = self.0.see(image, size, &pose).map_err(|error| error.into_py(py))?;
+        let mask = |marks: Vec<bool>| PyArray1::from_vec(py, marks).reshape(size);
+        found.map(|(still, before)| Ok((mask(still)?, mask(before)?))).transpose()
+    }
+}
+
+/// Where a depth camera saw something near the body, in a picture of the camera beside it.
+#[pyfunction]
+#[pyo3(signature = (depth, rays, joints, *, metres_per_unit, intrinsics, world_from_depth, color_from_depth, color_intrinsics, project, beyond, reach, step, margin, scene))]
+#[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+pub fn body_view<'py>(
+    py: Python<'py>,
+    depth: &Bound<'py, PyAny>,
+    rays: PyReadonlyArray3<'py, f32>,
+    joints: PyReadonlyArray2<'py, f64>,
+    metres_per_unit: f64,
+    intrinsics: Option<[f64; 4]>,
+    world_from_depth: PyReadonlyArray2<'py, f64>,
+    color_from_depth: PyReadonlyArray2<'py, f64>,
+    color_intrinsics: [f64; 4],
+    project: Option<&Bound<'py, PyAny>>,
+    beyond: &Bound<'py, PyAny>,
+    reach: usize,
+    step: usize,
+    margin: f64,
+    mut scene: Option<PyRefMut<'py, PyStillDepth>>,
+) -> PyResult<PyBodyView> {
+    let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype uint16 or float32", depth);
+    let array = contiguous(depth).map_err(|_| wrong())?;
+    let (units, metres) = (array.cast::<PyArray2<u16>>(), array.cast::<PyArray2<f32>>());
+    let (units, metres) = (units.ok().map(|array| array.readonly()), metres.ok().map(|array| array.readonly()));
+    let image = match (&units, &metres) {
+        (Some(units), _) => DepthPixels::U16(units.as_slice()?),
+        (_, Some(metres)) => DepthPixels::F32(metres.as_slice()?),
+        _ => return Err(wrong()),
+    };
+    columns(py, "joints", &joints, 3)?;
+    let beside = Beside {
+        image,
+        metres_per_unit,
+        size: [rays.dims()[0], rays.dims()[1]],
+        intrinsics,
+        rays: rays.as_slice()?.as_chunks().0,
+        world_from_depth: rows_of("world_from_depth", &world_from_depth)?,
+        color_from_depth: rows_of("color_from_depth", &color_from_depth)?,
+        step,
+        margin,
+        joints: joints.as_slice()?.as_chunks().0,
+    };
+    let scene = scene.as_mut().map(|scene| &mut scene.0);
+    let found = py.detach(|| beside.nearby(scene));
+    let nearby = found.map_err(|error| error.into_py(py))?;
+    let pixels = match project {
+        Some(project) => {
+            let points = PyArray1::from_slice(py, nearby.points.as_flattened()).reshape([nearby.points.len(), 3])?;
+            let pixels: PyReadonlyArray2<'py, f64> = project.call1((points,))?.extract()?;
+            columns(py, "pixels", &pixels, 2)?;
+            pixels.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect()
+        }
+        None => nearby.projected(color_intrinsics),
+    };
+    let beyond: PyReadonlyArray2<'py, bool> = beyond.call1((beside.away(),))?.extract()?;
+    let (size, mask) = ([beyond.dims()[0], beyond.dims()[1]], beyond.as_slice()?);
+    let view = py.detach(|| nearby.view(pixels, mask, reach, size)).map_err(|error| error.into_py(py))?;
+    Ok(PyBodyView(Arc::new(view)))
+}
+
+fn columns(py: Python<'_>, name: &str, array: &PyReadonlyArray2<'_, f64>, count: usize) -> PyResult<()> {
+    let shape = array.dims();
+    if shape[1] == count {
+        return Ok(());
+    }
+    let text = format!("{name}: expected shape (N, {count}), found ({}, {})", shape[0], shape[1]);
+    Err(exception(py, "MeasurementError", text))
+}
