@@ -24,6 +24,9 @@ from voodoo.pipeline.run import start_tracker, track
 from voodoo.recordings import Recording, open_recording
 from voodoo.sensors.settings import FrontEndSettings
 
+PICTURES = {"color", "skin"}
+"""Kinds of inputs that look at colour pictures."""
+
 
 @dataclass
 class InMemory:
@@ -42,18 +45,20 @@ class InMemory:
         return iter(self.frames)
 
 
-def in_memory(path: Path, use: tuple[str, ...]) -> InMemory:
-    """A recording with its pictures decoded."""
-    source = open_recording(path, use=use)
+def in_memory(path: Path, use: set[str]) -> InMemory:
+    """A recording with its colour pictures decoded, if they are in use."""
+    source = open_recording(path)
     frames = list(source)
     for frame in frames:
         for item in frame.measurements:
-            if isinstance(item, ColorImage):
+            if isinstance(item, ColorImage) and not use.isdisjoint(PICTURES):
                 _ = item.image
     return InMemory(source, frames)
 
 
-def run(recording: InMemory, use: tuple[str, ...], init: Literal["auto"] | None) -> tuple[float, list[npt.NDArray[np.float64]]]:
+def run(
+    recording: InMemory, use: tuple[str, ...], init: Literal["auto"] | None
+) -> tuple[float, list[npt.NDArray[np.float64]]]:
     """CPU seconds of one run, and the joints (J, 3) [m] of every frame."""
     tracker = start_tracker(recording, init=init)  # type: ignore[arg-type]
     settings = FrontEndSettings.of(recording, use=use)  # type: ignore[arg-type]
@@ -75,7 +80,7 @@ def main() -> None:
     cv2.setNumThreads(1)
     use, least, poses = tuple(asked.use), [], {}
     for path in asked.recordings:
-        recording = in_memory(path, use)
+        recording = in_memory(path, set(use))
         runs = [run(recording, use, asked.init) for _ in range(asked.runs)]
         least.append(min(seconds for seconds, _ in runs) / len(recording) * 1e3)
         if asked.save:
