@@ -248,7 +248,7 @@ impl Hypotheses {
 mod tests {
     use super::history::Basis;
     use super::proposals::Proposal;
-    use super::refined::{REFINE, SAME_AFTER};
+    use super::refined::{BACK_AFTER, REFINE};
     use super::*;
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
@@ -316,7 +316,7 @@ mod tests {
             for (tried, basis, ended) in [
                 (&wrong, Basis::Rest, |steps, outcome| steps < REFINE && outcome == Outcome::Hopeless),
                 (&poses, Basis::Lean, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
-                (&poses, Basis::Rest, |steps, outcome| (steps, outcome) == (SAME_AFTER, Outcome::Refused)),
+                (&poses, Basis::Rest, |steps, outcome| (steps, outcome) == (BACK_AFTER, Outcome::Refused)),
             ] as [(_, _, fn(usize, Outcome) -> bool); 3]
             {
                 let tried = Proposal { found: true, basis, poses: tried.clone() };

@@ -19,8 +19,8 @@ const FALLEN_BEHIND: f64 = 15.0;
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
 /// After so many steps an arm or leg whose joint and end are this near to those of the current pose, metres, will be the same: a
 /// quarter of all, and none of them was ever a jump.
-pub(super) const SAME_AFTER: usize = 3;
-const SAME: f64 = 0.03;
+pub(super) const BACK_AFTER: usize = 3;
+const BACK: f64 = 0.03;
 
 /// How the look at a hypothesis ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +67,7 @@ impl Refined {
         // What colours alone tell on the way says little.
         let most = if pictures { f64::INFINITY } else { present.cost.total + FALLEN_BEHIND };
         let alone = matches!(basis, Basis::Points | Basis::Rest) && !pictures;
-        let comes_back = |poses: &[Pose]| alone && chain.distance(poses, present.poses) < SAME;
+        let comes_back = |poses: &[Pose]| alone && chain.distance(poses, present.poses) < BACK;
         let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most, comes_back);
         let hopeless = cost.is_some_and(|cost| cost.total > most);
         if steps == REFINE && !hopeless && cost.is_some_and(|cost| cost.is_better_than(&present.cost)) {
@@ -105,7 +105,7 @@ impl Refined {
         let last = context.config.max_steps;
         for step in 0..REFINE {
             let at = last.saturating_sub(REFINE - step);
-            if step == SAME_AFTER && comes_back(&self.poses) {
+            if step == BACK_AFTER && comes_back(&self.poses) {
                 return (step, None);
             }
             let here = if step < ROUGH_STEPS { context.roughly() } else { context };
