@@ -27,8 +27,8 @@ pub struct Nearest {
     limbs: Vec<LimbBox>,
     groups: Vec<Group>,
     least: Vec<Lanes>,
-    /// The limb that was nearest to a point of each cluster the last time: probably it is again.
-    expected: Vec<u32>,
+    /// The limbs that were nearest to two points of each cluster the last time: probably they are again.
+    expected: Vec<[u32; 2]>,
 }
 
 impl Nearest {
@@ -49,7 +49,7 @@ impl Nearest {
         self.groups.clear();
         self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
         self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
-        self.expected.resize(clusters.iter().len(), 0);
+        self.expected.resize(clusters.iter().len(), [0; 2]);
         widest(
             #[inline(always)]
             || {
@@ -70,17 +70,26 @@ impl Nearest {
             *least = group.least_squares(cluster.bounds);
         }
         let mut best = Best { limb: [NONE; CLUSTER], square: [OUTSIDE; CLUSTER] };
-        // What the expected limb leaves decides which others are worth a look. After a reset there may be fewer limbs.
-        let first = (expected[index] as usize).min(limbs.len() - 1);
+        // What the expected limbs leave decides which others are worth a look. After a reset there may be fewer limbs.
+        let [first, second] = expected[index].map(|limb| (limb as usize).min(limbs.len() - 1));
         best.offer(first as u32, &limbs[first].squares(cluster));
         if inside.is_empty() {
+            if second != first {
+                best.offer(second as u32, &limbs[second].squares(cluster));
+            }
             for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
                 let mut wanted = within(least, best.worst());
-                wanted &= !(1_u32.checked_shl((first as u32).wrapping_sub(start)).unwrap_or(0));
+                for limb in [first, second] {
+                    wanted &= !(1_u32.checked_shl((limb as u32).wrapping_sub(start)).unwrap_or(0));
+                }
                 while wanted != 0 {
                     let limb = start + wanted.trailing_zeros();
                     best.offer(limb, &limbs[limb as usize].squares(cluster));
                     wanted &= wanted - 1;
+                    if wanted != 0 {
+                        // It may have left less to those that follow.
+                        wanted &= within(least, best.worst());
+                    }
                 }
             }
         } else {
@@ -92,8 +101,11 @@ impl Nearest {
                 }
             }
         }
-        if best.limb[CLUSTER / 2] != NONE {
-            expected[index] = best.limb[CLUSTER / 2];
+        let middle = best.limb[CLUSTER / 2];
+        if middle != NONE {
+            // Of the limbs at its ends one that is another, if any is.
+            let other = if best.limb[0] == middle { best.limb[CLUSTER - 1] } else { best.limb[0] };
+            expected[index] = [middle, if other == NONE { middle } else { other }];
         }
         best.limb
     }

@@ -26,6 +26,11 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
+    /// The same with fewer points, where there are many.
+    pub fn roughly(self) -> Self {
+        Self { seen: self.seen.with(self.seen.candidates.rough()), ..self }
+    }
+
     /// Whether edges of colours tell more of a limb than what else there is: depth blurs arms, and knows legs better.
     pub fn wants_edges(&self, limb: usize) -> bool {
         self.pictures_alone() || {

@@ -26,7 +26,7 @@ use proposals::{
     CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
     UnexplainedCluster,
 };
-use refined::{Outcome, Refined};
+use refined::{Outcome, Present, Refined};
 use rough::{Extremity, RoughSearch};
 use suspicion::Suspicion;
 use unexplained::Unexplained;
@@ -217,7 +217,8 @@ impl Hypotheses {
         let present = refined.cost(context, fit, poses);
         let (mut steps, mut hopeless) = (0, true);
         for proposal in pool.found() {
-            let (taken, outcome) = refined.improves(context, index, fit, present, proposal, suspicion);
+            let (taken, outcome) =
+                refined.improves(context, Present { poses, cost: present }, index, fit, proposal, suspicion);
             steps += taken;
             hopeless &= outcome == Outcome::Hopeless;
             if outcome != Outcome::Better {
@@ -247,7 +248,7 @@ impl Hypotheses {
 mod tests {
     use super::history::Basis;
     use super::proposals::Proposal;
-    use super::refined::REFINE;
+    use super::refined::{BACK_AFTER, REFINE};
     use super::*;
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
@@ -310,16 +311,17 @@ mod tests {
             fit.match_last(context, &poses);
             let before = format!("{:?}", fit.correspondences());
             let (wrong, _) = raised(&model, &poses, 0.2);
-            // The second is as good as the current one, and no better.
-            let present = refined.cost(context, &fit, &poses);
+            // The others are as good as the current one, and no better.
+            let present = Present { poses: &poses, cost: refined.cost(context, &fit, &poses) };
             for (tried, basis, ended) in [
                 (&wrong, Basis::Rest, |steps, outcome| steps < REFINE && outcome == Outcome::Hopeless),
                 (&poses, Basis::Lean, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
-            ] as [(_, _, fn(usize, Outcome) -> bool); 2]
+                (&poses, Basis::Rest, |steps, outcome| (steps, outcome) == (BACK_AFTER, Outcome::Refused)),
+            ] as [(_, _, fn(usize, Outcome) -> bool); 3]
             {
                 let tried = Proposal { found: true, basis, poses: tried.clone() };
                 let arm = first_arm(&model);
-                let (steps, outcome) = refined.improves(context, arm, &mut fit, present, &tried, &mut suspicion);
+                let (steps, outcome) = refined.improves(context, present, arm, &mut fit, &tried, &mut suspicion);
                 assert!(ended(steps, outcome), "{basis:?}: {outcome:?} after {steps}");
             }
             assert_eq!(format!("{:?}", fit.correspondences()), before);

@@ -28,7 +28,13 @@ pub struct Candidates {
     pub cameras: Vec<(u32, Vec3)>,
     /// The points once more, neighbours together.
     pub(crate) clusters: Clusters,
+    /// What [`Self::rough`] returns, if there are any.
+    fewer: Option<Box<Candidates>>,
 }
+
+/// Pixels that rough looks are content with: twice as many of them are thinned, costs time in proportion. With 500 and 800 the
+/// rendered recordings' hypotheses end alike.
+const ROUGH_POINTS: usize = 700;
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
 pub fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
@@ -55,11 +61,7 @@ impl Candidates {
     /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
     /// whole-body box in the working frame; pixels of the learnt backgrounds are left out.
     pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, backgrounds: &Backgrounds, config: &Config) {
-        self.points.clear();
-        self.weight.clear();
-        self.limb.clear();
-        self.source.clear();
-        self.cameras.clear();
+        self.clear();
         let (up, floor) = match frame.ground {
             Some(ground) => (ground.normal, ground.about(origin).offset + config.ground_clearance),
             None => (Vec3::ZERO, -1.0),
@@ -77,6 +79,46 @@ impl Candidates {
         }
         self.leave_out(frame.excluded, origin);
         self.clusters.arrange(&self.points);
+        self.thin();
+    }
+
+    /// Where depth images show many, about [`ROUGH_POINTS`] of them that weigh as much together; else all.
+    pub fn rough(&self) -> &Self {
+        self.fewer.as_deref().filter(|fewer| !fewer.is_empty()).unwrap_or(self)
+    }
+
+    fn clear(&mut self) {
+        self.points.clear();
+        self.weight.clear();
+        self.limb.clear();
+        self.source.clear();
+        self.cameras.clear();
+    }
+
+    /// Takes every so manyth pixel, and all other points.
+    fn thin(&mut self) {
+        let mut fewer = self.fewer.take().unwrap_or_default();
+        fewer.clear();
+        let pixels = self.cameras.last().map_or(0, |(end, _)| *end as usize);
+        let every = pixels / ROUGH_POINTS;
+        if every > 1 {
+            let mut start = 0;
+            for (end, camera) in &self.cameras {
+                (start..*end as usize).step_by(every).for_each(|index| fewer.take(self, index, every as f32));
+                fewer.cameras.push((fewer.len() as u32, *camera));
+                start = *end as usize;
+            }
+            (pixels..self.len()).for_each(|index| fewer.take(self, index, 1.0));
+            fewer.clusters.arrange(&fewer.points);
+        }
+        self.fewer = Some(fewer);
+    }
+
+    /// Takes one of others, so many times as heavy.
+    fn take(&mut self, others: &Self, index: usize, times: f32) {
+        let Points { x, y, z } = &others.points;
+        let point = [x[index], y[index], z[index]];
+        self.push(point, times * others.weight[index], others.limb[index], others.source[index]);
     }
 
     fn push(&mut self, point: [f32; 3], weight: f32, limb: u16, source: u16) {
@@ -258,6 +300,28 @@ mod tests {
         }
         assert!(found.limb.iter().all(|limb| *limb == ANY_LIMB) && found.source.iter().all(|source| *source == 3));
         assert_eq!(found.cameras, [(expected.len() as u32, world_from_sensor.translation - origin)]);
+    }
+
+    #[test]
+    fn a_rough_look_sees_fewer_pixels_that_weigh_as_much_and_all_other_points() {
+        let mut all = Candidates::default();
+        let pixels = 4 * ROUGH_POINTS;
+        for index in 0..pixels {
+            all.push([index as f32, 0.0, 2.0], 0.5, ANY_LIMB, 1);
+        }
+        all.cameras = vec![(1000, Vec3::X), (pixels as u32, Vec3::Y)];
+        (0..3).for_each(|index| all.push([index as f32, 1.0, 0.0], 2.0, 7, 2));
+        all.thin();
+        let rough = all.rough();
+        assert_eq!(rough.len(), ROUGH_POINTS + 3);
+        assert_eq!(rough.weight.iter().sum::<f32>(), all.weight.iter().sum::<f32>());
+        assert_eq!(rough.cameras, [(250, Vec3::X), (ROUGH_POINTS as u32, Vec3::Y)]);
+        assert!((0..ROUGH_POINTS).all(|index| rough.points.x[index] == 4.0 * index as f32));
+        assert_eq!((&rough.limb[ROUGH_POINTS..], &rough.source[ROUGH_POINTS..]), (&[7; 3][..], &[2; 3][..]));
+        // Those of a coarse image are all needed.
+        all.cameras = vec![(2 * ROUGH_POINTS as u32 - 1, Vec3::X)];
+        all.thin();
+        assert_eq!(all.rough().len(), all.len());
     }
 
     #[test]

@@ -8,9 +8,9 @@ use super::{
 };
 use crate::body::Pair;
 use crate::config::Config;
-use crate::math::Pose;
+use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Floor, Limits, Penetration, Prior, Regions, Sites, Surface, Term};
+use crate::terms::{Contour, Floor, Limits, Penetration, Prior, Regions, Sites, Surface, Term, sphere};
 
 /// Standard deviation of an axis that lies in another limb or below the floor, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
@@ -45,6 +45,8 @@ pub struct WholeBody {
     sites: Vec<f64>,
     /// Weight of the edges of colours on each limb.
     edges: Vec<f64>,
+    /// A sphere around each limb.
+    spheres: Vec<(Vec3, f64)>,
 }
 
 impl Solver for WholeBody {
@@ -107,7 +109,9 @@ impl WholeBody {
         let still_gain = still_prior_gain(problem, information);
         let prior = Prior { predicted, root, joints: &self.joint_sigmas, still_gain };
         let limits = Limits { sigma: LIMIT_SIGMA };
-        let penetration = Penetration { sigma: OVERLAP_SIGMA };
+        self.spheres.clear();
+        self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| sphere(&limb.shape, pose)));
+        let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The objective: one more term is a file and a line here.
         let terms: [Option<&dyn Term>; 8] = [

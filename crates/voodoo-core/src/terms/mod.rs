@@ -13,7 +13,7 @@ mod surface;
 pub use contour::Contour;
 pub use floor::Floor;
 pub use limits::Limits;
-pub use penetration::Penetration;
+pub use penetration::{Penetration, sphere};
 pub use prior::Prior;
 pub use regions::Regions;
 pub use sites::Sites;

@@ -15,19 +15,26 @@ const APPROXIMATE: f64 = 0.01;
 /// One-sided: `r = max(0, -distance)` for every felt point against every limb that is neither joined to its
 /// own nor hangs on the same parent. Those overlap at their joints in any pose.
 #[derive(Debug)]
-pub struct Penetration {
+pub struct Penetration<'a> {
     /// Standard deviation of the overlap, metres.
     pub sigma: f64,
+    /// [`sphere`] of every limb: most are far from each other.
+    pub spheres: &'a [(Vec3, f64)],
 }
 
-impl Term for Penetration {
+/// Middle and radius of a sphere around a posed limb.
+pub fn sphere(shape: &TaperedEllipticCylinder, pose: &Pose) -> (Vec3, f64) {
+    let half = 0.5 * shape.length();
+    let radius = shape.a0().max(shape.a1()).max(shape.b0()).max(shape.b1());
+    (*pose * (Vec3::Z * half), half.hypot(radius))
+}
+
+impl Term for Penetration<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         let limbs = body.limbs();
         for first in 1..limbs.len() {
             for second in 0..first {
-                if apart(body, first, second)
-                    && near(&limbs[first].shape, &poses[first], &limbs[second].shape, &poses[second])
-                {
+                if meet(self.spheres[first], self.spheres[second]) && apart(body, first, second) {
                     self.add_points(body, poses, [first, second], normal);
                     self.add_points(body, poses, [second, first], normal);
                 }
@@ -36,7 +43,7 @@ impl Term for Penetration {
     }
 }
 
-impl Penetration {
+impl Penetration<'_> {
     /// Points of `limb` against the surface of `other`.
     fn add_points(&self, body: &Body, poses: &[Pose], [limb, other]: [usize; 2], normal: &mut NormalEquations) {
         let (shape, surface) = (&body.limbs()[limb].shape, &body.limbs()[other].shape);
@@ -78,18 +85,7 @@ fn far(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
         || q.z > shape.length()
 }
 
-/// Whether the spheres around two limbs meet.
-fn near(
-    first: &TaperedEllipticCylinder,
-    world_from_first: &Pose,
-    second: &TaperedEllipticCylinder,
-    world_from_second: &Pose,
-) -> bool {
-    let sphere = |shape: &TaperedEllipticCylinder, pose: &Pose| {
-        let half = 0.5 * shape.length();
-        let radius = shape.a0().max(shape.a1()).max(shape.b0()).max(shape.b1());
-        (*pose * (Vec3::Z * half), half.hypot(radius))
-    };
-    let ((from, reach), (to, other_reach)) = (sphere(first, world_from_first), sphere(second, world_from_second));
+/// Whether two spheres meet.
+fn meet((from, reach): (Vec3, f64), (to, other_reach): (Vec3, f64)) -> bool {
     (to - from).length_squared() < (reach + other_reach).powi(2)
 }
