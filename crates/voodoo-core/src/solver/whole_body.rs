@@ -45,6 +45,15 @@ pub struct WholeBody {
     sites: Vec<f64>,
     /// Weight of the edges of colours on each limb.
     edges: Vec<f64>,
+    calm: Calm,
+}
+
+/// How calm the root and the joints are, as the step has said in which a frame began to hold them, and the last step.
+#[derive(Debug, Default)]
+struct Calm {
+    joints: Vec<f64>,
+    step: usize,
+    holds: Vec<f64>,
 }
 
 impl Solver for WholeBody {
@@ -104,8 +113,10 @@ impl WholeBody {
         let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
         let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
         let regions = Regions { pairs: &correspondences.regions };
-        let still_gain = still_prior_gain(problem, information);
-        let prior = Prior { predicted, root, joints: &self.joint_sigmas, still_gain };
+        let gain = still_prior_gain(problem, information);
+        let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[] };
+        let holds = self.calm.holds(problem, &free, poses, gain);
+        let prior = Prior { holds, ..free };
         let limits = Limits { sigma: LIMIT_SIGMA };
         let penetration = Penetration { sigma: OVERLAP_SIGMA };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
@@ -159,6 +170,22 @@ impl WholeBody {
             let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
+    }
+}
+
+impl Calm {
+    /// How much tighter the root and each joint are held in this step, at most by `gain`.
+    fn holds(&mut self, problem: &Problem, prior: &Prior, poses: &[Pose], gain: f64) -> &[f64] {
+        let Self { joints, step, holds } = self;
+        // A frame, and every hypothesis in it, begins with an earlier step than the last one before.
+        let anew = problem.step <= *step || joints.len() != poses.len();
+        *step = problem.step;
+        if anew || problem.step == STILL_FROM {
+            prior.calm(problem.body, poses, joints);
+        }
+        holds.clear();
+        holds.extend(joints.iter().map(|calm| gain * calm));
+        holds
     }
 }
 
