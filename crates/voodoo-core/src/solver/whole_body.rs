@@ -6,7 +6,7 @@ use super::{
     ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Reassociation, Schedule, Solver, TreeSolver, WarmStart,
     WarmStartInput,
 };
-use crate::body::Pair;
+use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
@@ -21,6 +21,9 @@ const STILL_FROM: usize = 3;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
+/// Share by which a hand, foot or head that does not show at all is drawn to its posture at rest in 1/30 s: else it would keep for
+/// ever how it was seen last. In a quarter of a second it comes half of the way.
+const TO_REST: f64 = 0.1;
 /// By contours alone every joint moves by so much at least, radians: no points hold a shoulder where it is not.
 const LEAST_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
@@ -41,6 +44,8 @@ pub struct WholeBody {
     lengths: Lengths,
     warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
+    /// Shares by which joints are drawn to their turns at rest.
+    rests: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
     /// Weight of the edges of colours on each limb.
@@ -114,7 +119,7 @@ impl WholeBody {
         let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
         let regions = Regions { pairs: &correspondences.regions };
         let gain = still_prior_gain(problem, information);
-        let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[] };
+        let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[], rests: &self.rests };
         let holds = self.calm.holds(problem, &free, poses, gain);
         let prior = Prior { holds, ..free };
         let limits = Limits { sigma: LIMIT_SIGMA };
@@ -162,12 +167,17 @@ impl WholeBody {
         let points = problem.correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
         let contours_alone = !problem.correspondences.regions.is_empty() && !points;
         self.joint_sigmas.clear();
+        self.rests.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             let motion = if contours_alone { motion.max(LEAST_MOTION) } else { motion };
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
-            let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
+            let shown = (measured / FREE_WEIGHT).min(1.0);
+            let end = part.match_caps[1];
+            let rests = end && part.parent.as_ref().is_some_and(|(_, joint)| joint.kind() == JointKind::Elliptic);
+            self.rests.push(if rests { ((1.0 - shown) * TO_REST * problem.time_scale).min(1.0) } else { 0.0 });
+            let shown = shown.max(HIDDEN_MOTION);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
     }

@@ -7,7 +7,7 @@
 
 use super::Term;
 use super::surface::geman_mcclure;
-use crate::body::Body;
+use crate::body::{Body, Joint};
 use crate::math::{Pose, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 
@@ -27,6 +27,8 @@ pub struct Prior<'a> {
     pub joints: &'a [f64],
     /// How much tighter the root (first) and each joint are held, as multiples of their information; empty: not at all.
     pub holds: &'a [f64],
+    /// The share by which the turn expected of each joint is drawn to that at rest; empty: not at all.
+    pub rests: &'a [f64],
 }
 
 impl Prior<'_> {
@@ -39,7 +41,9 @@ impl Prior<'_> {
                 let (r, d) = self.root_deviation(poses);
                 share((r.length() / self.root[0]).hypot(d.length() / self.root[1]))
             }
-            Some((parent, _)) => share(self.turn(poses, *parent, index).length() / self.joints[index]),
+            Some((parent, joint)) => {
+                share(self.turn(poses, *parent, index, joint).length() / self.joints[index])
+            }
         }));
     }
 
@@ -49,10 +53,16 @@ impl Prior<'_> {
         (turn, poses[0].translation - self.predicted[0].translation)
     }
 
-    /// Turn of a limb against its parent, in the parent's frame.
-    fn turn(&self, poses: &[Pose], parent: usize, limb: usize) -> Vec3 {
+    /// Turn of a limb against its parent from the one that is expected, in the parent's frame.
+    fn turn(&self, poses: &[Pose], parent: usize, limb: usize, joint: &Joint) -> Vec3 {
         let relative = |poses: &[Pose]| poses[parent].rotation.inverse() * poses[limb].rotation;
-        (relative(poses) * relative(self.predicted).inverse()).to_scaled_axis_shortest()
+        let expected = match self.rests.get(limb) {
+            Some(share) if *share > 0.0 => {
+                relative(self.predicted).slerp(joint.parent_from_limb_at_rest().rotation, *share)
+            }
+            _ => relative(self.predicted),
+        };
+        (relative(poses) * expected.inverse()).to_scaled_axis_shortest()
     }
 }
 
@@ -71,9 +81,9 @@ impl Term for Prior<'_> {
             block.add_row(shift, &crate::terms::normal_equations::line(poses[0].translation, axis), d[i]);
         }
         for (index, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, _)) = &limb.parent else { continue };
+            let Some((parent, joint)) = &limb.parent else { continue };
             // In world axes its derivative by the relative turn is one.
-            let r = poses[*parent].rotation * self.turn(poses, *parent, index);
+            let r = poses[*parent].rotation * self.turn(poses, *parent, index, joint);
             let weight = information(self.joints[index], hold(index));
             normal.joints[index].add_turn(weight, r);
             normal.cost += weight * r.length_squared();
