@@ -41,9 +41,7 @@ impl Prior<'_> {
                 let (r, d) = self.root_deviation(poses);
                 share((r.length() / self.root[0]).hypot(d.length() / self.root[1]))
             }
-            Some((parent, joint)) => {
-                share(self.turn(poses, *parent, index, joint).length() / self.joints[index])
-            }
+            Some((parent, joint)) => share(self.turn(poses, *parent, index, joint).length() / self.joints[index]),
         }));
     }
 
