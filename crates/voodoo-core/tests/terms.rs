@@ -72,16 +72,15 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
-    fn prior(angles in angles(), other in angles(), still_gain in prop::sample::select(vec![0.0, 30.0])) {
+    fn prior(angles in angles(), other in angles(), hold in prop::sample::select(vec![0.0, 30.0])) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let predicted = random_pose(&body, &other);
-        // The deviations below reach from the middle of the inner well to beyond its rim.
-        let sigmas = vec![0.02; predicted.len()];
+        let [sigmas, holds, rests] = [0.02, hold, 0.01].map(|value| vec![value; predicted.len()]);
         // Rotation errors beyond a small one make the linearised geodesic (R07 eq. 25) an approximation: stay near.
         let near: Vec<Pose> = predicted.iter().zip(random_pose(&body, &angles)).map(|(pose, push)| {
             *pose * Pose::new(0.02 * push.translation, 0.01 * push.translation)
         }).collect();
-        check(&body, &near, &|poses, normal| Prior { predicted: &predicted, root: [0.02, 0.04], joints: &sigmas, still_gain }.add(&body, poses, normal))?;
+        check(&body, &near, &|poses, normal| Prior { predicted: &predicted, root: [0.02, 0.04], joints: &sigmas, holds: &holds, rests: &rests }.add(&body, poses, normal))?;
     }
 
     #[test]

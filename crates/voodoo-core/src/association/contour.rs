@@ -6,7 +6,7 @@ use crate::math::{Points, Pose, Vec3};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbours as well.
-const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+const STATIONS: [f64; 9] = [0.2, 0.275, 0.35, 0.425, 0.5, 0.575, 0.65, 0.725, 0.8];
 /// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
 const DEPTH_REACH: f64 = 0.12;
 /// A limb whose axis makes an angle with the line of sight of less than this sine (30 degrees) shows no sides: what ends there
@@ -24,8 +24,9 @@ const STRIDE: f64 = 0.008;
 const MOST_STEPS: f64 = 4.0;
 /// The first look after the axis is at this share of the rim's distance: what lies well inside the limb is no edge.
 const FIRST_LOOK: f64 = 0.4;
-/// The edge lies between the two last looks: this share of a step before the last one, which saw past the body.
-const EDGE_BEFORE: f64 = 0.25;
+/// The edge lies between the last look at the body and the first past it; so often is what lies between them halved: to a
+/// sixteenth of a pixel. Else the model would follow where the looks fell, not the edge.
+const HALVINGS: usize = 5;
 /// Steps are no shorter than those of half a pixel at this depth, metres.
 const NEAREST_STEP: f64 = 0.1;
 
@@ -97,11 +98,10 @@ impl ContourSearch {
         let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
         let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
         let deep = self.thickness + DEPTH_REACH;
-        let mut last: Option<(Vec3, f64)> = None;
+        // Long strides as far as the first look past the body, then what lies between is halved.
+        let stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
+        let mut on: Option<(f64, f64)> = None;
         let mut r = 0.0;
-        // Long strides as far as the first look past the body, then back, and on in small steps.
-        let mut stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
-        let mut from = 0.0;
         while r <= self.rim + self.reach {
             let place = self.start + self.along * r;
             match view.at(place) {
@@ -109,22 +109,28 @@ impl ContourSearch {
                 Pixel::Foreground(z) if z < place.z - deep => return None,
                 // Where another body begins this one need not end.
                 Pixel::Other(z) if z < place.z + deep => return None,
-                Pixel::Foreground(z) if z <= place.z + deep => {
-                    last = Some((place, z));
-                    from = r;
-                }
+                Pixel::Foreground(z) if z <= place.z + deep => on = Some((r, z)),
                 Pixel::Foreground(_) | Pixel::Background(_) | Pixel::Other(_) => {
-                    let (last, z) = last?;
-                    if stride <= step || r - from <= step {
-                        // The edge lies between the two last looks.
-                        return Some((r - EDGE_BEFORE * step, last * (z / last.z)));
-                    }
-                    (r, stride) = (from, step);
+                    return Some(self.halved(view, on?, r));
                 }
             }
             r = if r == 0.0 { (FIRST_LOOK * self.rim).max(step) } else { r + stride };
         }
         None
+    }
+
+    /// Where the body ends between a look at it, of which the depth is known, and one past it; and the last place seen on it.
+    fn halved(&self, view: &DepthView, (mut on, mut depth): (f64, f64), mut past: f64) -> (f64, Vec3) {
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (on + past);
+            let place = self.start + self.along * middle;
+            match view.at(place) {
+                Pixel::Foreground(z) if z <= place.z + self.thickness + DEPTH_REACH => (on, depth) = (middle, z),
+                _ => past = middle,
+            }
+        }
+        let last = self.start + self.along * on;
+        (0.5 * (on + past), last * (depth / last.z))
     }
 }
 
@@ -280,6 +286,28 @@ mod tests {
                 let off = edge.seen - edge.rim - wider;
                 assert!(off.abs() < pixel, "{wider} wider: off by {off} m at {edge:?}");
             }
+        }
+    }
+
+    #[test]
+    fn an_edge_stays_where_it_is_seen_when_the_model_moves_a_little() {
+        let (limb, pose) = forearm();
+        let pixels = shoot(&limb.shape, &pose);
+        let step = 0.5 * 2.0 / FOCAL;
+        let seen = |off: f64| {
+            let moved = Pose::from_parts(pose.translation + Vec3::new(0.0, off * step, 0.0), pose.rotation);
+            let mut found = Vec::new();
+            with_view(&pixels, |view| {
+                edges(&view, &limb, &moved, |edge| found.push((moved * (edge.side * edge.seen)).y));
+            });
+            found.truncate(2 * STATIONS.len());
+            found
+        };
+        let all: Vec<Vec<f64>> = (0..8).map(|eighth| seen(f64::from(eighth) / 8.0)).collect();
+        for edge in 0..2 * STATIONS.len() {
+            let places = all.iter().map(|found| found[edge]);
+            let spread = places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min);
+            assert!(spread < 0.1 * step, "edge {edge} is seen {spread} m apart, steps are {step} m");
         }
     }
 

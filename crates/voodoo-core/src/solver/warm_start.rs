@@ -93,7 +93,7 @@ impl WarmStart {
         }
         let terms: [&dyn Term; 3] = [
             &Sites { correspondences, information, scale: SCALE, biased: true },
-            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, still_gain: 0.0 },
+            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, holds: &[], rests: &[] },
             &Limits { sigma: LIMIT_SIGMA },
         ];
         for term in terms {

@@ -6,7 +6,7 @@ use super::{
     ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Reassociation, Schedule, Solver, TreeSolver, WarmStart,
     WarmStartInput,
 };
-use crate::body::Pair;
+use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
@@ -21,6 +21,9 @@ const STILL_FROM: usize = 3;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
+/// Share by which a hand, foot or head that does not show at all is drawn to its posture at rest in 1/30 s: else it would keep for
+/// ever how it was seen last. In a quarter of a second it comes half of the way.
+const TO_REST: f64 = 0.1;
 /// By contours alone every joint moves by so much at least, radians: no points hold a shoulder where it is not.
 const LEAST_MOTION: f64 = 0.1;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
@@ -41,12 +44,23 @@ pub struct WholeBody {
     lengths: Lengths,
     warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
+    /// Shares by which joints are drawn to their turns at rest.
+    rests: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
     /// Weight of the edges of colours on each limb.
     edges: Vec<f64>,
     /// A sphere around each limb.
     spheres: Vec<(Vec3, f64)>,
+    calm: Calm,
+}
+
+/// How calm the root and the joints are, as the step has said in which a frame began to hold them, and the last step.
+#[derive(Debug, Default)]
+struct Calm {
+    joints: Vec<f64>,
+    step: usize,
+    holds: Vec<f64>,
 }
 
 impl Solver for WholeBody {
@@ -106,8 +120,10 @@ impl WholeBody {
         let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
         let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
         let regions = Regions { pairs: &correspondences.regions };
-        let still_gain = still_prior_gain(problem, information);
-        let prior = Prior { predicted, root, joints: &self.joint_sigmas, still_gain };
+        let gain = still_prior_gain(problem, information);
+        let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[], rests: &self.rests };
+        let holds = self.calm.holds(problem, &free, poses, gain);
+        let prior = Prior { holds, ..free };
         let limits = Limits { sigma: LIMIT_SIGMA };
         self.spheres.clear();
         self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| sphere(&limb.shape, pose)));
@@ -155,14 +171,35 @@ impl WholeBody {
         let points = problem.correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
         let contours_alone = !problem.correspondences.regions.is_empty() && !points;
         self.joint_sigmas.clear();
+        self.rests.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             let motion = if contours_alone { motion.max(LEAST_MOTION) } else { motion };
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
-            let shown = (measured / FREE_WEIGHT).clamp(HIDDEN_MOTION, 1.0);
+            let shown = (measured / FREE_WEIGHT).min(1.0);
+            let end = part.match_caps[1];
+            let rests = end && part.parent.as_ref().is_some_and(|(_, joint)| joint.kind() == JointKind::Elliptic);
+            self.rests.push(if rests { ((1.0 - shown) * TO_REST * problem.time_scale).min(1.0) } else { 0.0 });
+            let shown = shown.max(HIDDEN_MOTION);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
+    }
+}
+
+impl Calm {
+    /// How much tighter the root and each joint are held in this step, at most by `gain`.
+    fn holds(&mut self, problem: &Problem, prior: &Prior, poses: &[Pose], gain: f64) -> &[f64] {
+        let Self { joints, step, holds } = self;
+        // A frame, and every hypothesis in it, begins with an earlier step than the last one before.
+        let anew = problem.step <= *step || joints.len() != poses.len();
+        *step = problem.step;
+        if anew || problem.step == STILL_FROM {
+            prior.calm(problem.body, poses, joints);
+        }
+        holds.clear();
+        holds.extend(joints.iter().map(|calm| gain * calm));
+        holds
     }
 }
 

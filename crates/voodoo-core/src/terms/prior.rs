@@ -1,16 +1,17 @@
 //! Prediction and smoothness (R07 eq. 16-18, 26): the root's twist and every joint's turn are drawn to the predicted ones.
 //!
-//! R07's penalty is quadratic: what is strong enough for a body at rest makes a fast one late. Here a second well lies in the
-//! middle of the first: a deviation that is small against what is expected is taken for noise and held tightly, a greater one
-//! leaves the well and feels the wide one only.
+//! R07's penalty is quadratic: what is strong enough for a body at rest makes a fast one late. Here every joint is held tighter the
+//! less it wants to deviate from what is expected ([`Prior::calm`]): a small deviation is taken for noise. That is decided once
+//! a frame, by where the measurements alone have moved the joint; judged anew in every step, what is held deviates less and is
+//! held tighter still, until it sticks where it happened to be in the frame before.
 
 use super::Term;
 use super::surface::geman_mcclure;
-use crate::body::Body;
+use crate::body::{Body, Joint};
 use crate::math::{Pose, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 
-/// Width of the inner well in standard deviations of the outer one: what is smaller than expected motion counts as noise.
+/// Deviation, in standard deviations of expected motion, at which a joint is held by a quarter: what is smaller counts as noise.
 const WELL: f64 = 0.6;
 /// Share of it that holds the root: what all limbs agree on is less likely noise.
 const ROOT_SHARE: f64 = 0.2;
@@ -24,25 +25,53 @@ pub struct Prior<'a> {
     pub root: [f64; 2],
     /// Standard deviation of each joint's turn, radians.
     pub joints: &'a [f64],
-    /// Information of the inner well as a multiple of the outer one's; 0: no inner well.
-    pub still_gain: f64,
+    /// How much tighter the root (first) and each joint are held, as multiples of their information; empty: not at all.
+    pub holds: &'a [f64],
+    /// The share by which the turn expected of each joint is drawn to that at rest; empty: not at all.
+    pub rests: &'a [f64],
 }
 
-/// Cost and weight of a deviation `r` in the two wells of `sigma`.
-fn hold(still_gain: f64, r: f64, sigma: f64) -> (f64, f64) {
-    let information = 1.0 / (sigma * sigma);
-    let (rho, kernel) = geman_mcclure(r, WELL * sigma);
-    (information * (r * r + still_gain * rho), information * (1.0 + still_gain * kernel))
+impl Prior<'_> {
+    /// How calm the root (first) and each joint are, into `calm`: 1 where they are as expected, 0 where they move.
+    pub fn calm(&self, body: &Body, poses: &[Pose], calm: &mut Vec<f64>) {
+        let share = |deviation: f64| geman_mcclure(deviation, WELL).1;
+        calm.clear();
+        calm.extend(body.limbs().iter().enumerate().map(|(index, limb)| match &limb.parent {
+            None => {
+                let (r, d) = self.root_deviation(poses);
+                share((r.length() / self.root[0]).hypot(d.length() / self.root[1]))
+            }
+            Some((parent, joint)) => share(self.turn(poses, *parent, index, joint).length() / self.joints[index]),
+        }));
+    }
+
+    /// Turn and shift of the root, apart, so that the lever to the working origin does not matter.
+    fn root_deviation(&self, poses: &[Pose]) -> (Vec3, Vec3) {
+        let turn = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
+        (turn, poses[0].translation - self.predicted[0].translation)
+    }
+
+    /// Turn of a limb against its parent from the one that is expected, in the parent's frame.
+    fn turn(&self, poses: &[Pose], parent: usize, limb: usize, joint: &Joint) -> Vec3 {
+        let relative = |poses: &[Pose]| poses[parent].rotation.inverse() * poses[limb].rotation;
+        let expected = match self.rests.get(limb) {
+            Some(share) if *share > 0.0 => {
+                relative(self.predicted).slerp(joint.parent_from_limb_at_rest().rotation, *share)
+            }
+            _ => relative(self.predicted),
+        };
+        (relative(poses) * expected.inverse()).to_scaled_axis_shortest()
+    }
 }
 
 impl Term for Prior<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
-        // Root: rotation and position apart, so that the lever to the working origin does not matter.
-        let r = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
-        let d = poses[0].translation - self.predicted[0].translation;
-        let (turn_cost, turn) = hold(ROOT_SHARE * self.still_gain, r.length(), self.root[0]);
-        let (shift_cost, shift) = hold(ROOT_SHARE * self.still_gain, d.length(), self.root[1]);
-        normal.cost += turn_cost + shift_cost;
+        let information = |sigma: f64, hold: f64| (1.0 + hold) / (sigma * sigma);
+        let (r, d) = self.root_deviation(poses);
+        let hold = |index: usize| self.holds.get(index).copied().unwrap_or(0.0);
+        let (turn, shift) =
+            (information(self.root[0], ROOT_SHARE * hold(0)), information(self.root[1], ROOT_SHARE * hold(0)));
+        normal.cost += turn * r.length_squared() + shift * d.length_squared();
         let block = &mut normal.limbs[0];
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
             block.h[(i, i)] += turn;
@@ -50,14 +79,12 @@ impl Term for Prior<'_> {
             block.add_row(shift, &crate::terms::normal_equations::line(poses[0].translation, axis), d[i]);
         }
         for (index, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, _)) = &limb.parent else { continue };
-            let relative = |poses: &[Pose]| poses[*parent].rotation.inverse() * poses[index].rotation;
-            // Deviation in the parent's frame, then in world axes: its derivative by the relative turn is one.
-            let turn = (relative(poses) * relative(self.predicted).inverse()).to_scaled_axis_shortest();
-            let r = poses[*parent].rotation * turn;
-            let (cost, weight) = hold(self.still_gain, r.length(), self.joints[index]);
+            let Some((parent, joint)) = &limb.parent else { continue };
+            // In world axes its derivative by the relative turn is one.
+            let r = poses[*parent].rotation * self.turn(poses, *parent, index, joint);
+            let weight = information(self.joints[index], hold(index));
             normal.joints[index].add_turn(weight, r);
-            normal.cost += cost;
+            normal.cost += weight * r.length_squared();
         }
     }
 }
