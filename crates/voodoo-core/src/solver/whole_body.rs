@@ -178,7 +178,7 @@ impl WholeBody {
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let shown = (measured / FREE_WEIGHT).min(1.0);
-            let end = part.match_caps[1];
+            let end = part.match_caps[1] && !contours_alone;
             let rests = end && part.parent.as_ref().is_some_and(|(_, joint)| joint.kind() == JointKind::Elliptic);
             self.rests.push(if rests { ((1.0 - shown) * TO_REST * problem.time_scale).min(1.0) } else { 0.0 });
             let shown = shown.max(HIDDEN_MOTION);
