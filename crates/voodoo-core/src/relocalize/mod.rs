@@ -293,7 +293,7 @@ mod tests {
     use super::*;
     use crate::testing::{depth, farthest, moved, put_board, standing, turned, with_context, without_background};
 
-    /// Where a lost body is found, which was last tracked half a metre to one side of the camera's axis, and whether that place
+    /// Where a lost body is in the frame after it was found, which was last tracked half a metre beside the camera's axis, and whether its place
     /// explains what may be the body.
     fn found(pixels: &[u16]) -> (Option<Vec<Pose>>, Option<bool>) {
         let (model, poses) = standing();
@@ -310,8 +310,13 @@ mod tests {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &present);
             let before = format!("{:?}", fit.correspondences());
-            let found = relocalizer.search(context, &mut fit, &present).map(<[Pose]>::to_vec);
+            let mut found = relocalizer.search(context, &mut fit, &present).map(<[Pose]>::to_vec);
             assert_eq!(format!("{:?}", fit.correspondences()), before);
+            // The next frame, which shows the same.
+            found.iter_mut().for_each(|poses| {
+                let predicted = poses.clone();
+                with_context(pixels, &config, &model, &predicted, |context| fit.run(context, &predicted, poses));
+            });
             (found, relocalizer.watch.explained)
         })
     }
@@ -324,7 +329,7 @@ mod tests {
             let (found, explained) = found(&depth(&model.body, &place));
             let found = found.unwrap();
             assert_eq!(explained, Some(false));
-            assert!(farthest(&found, &place) < 0.03, "{} m off", farthest(&found, &place));
+            assert!(farthest(&found, &place) < 0.028, "{} m off", farthest(&found, &place));
         }
     }
 
