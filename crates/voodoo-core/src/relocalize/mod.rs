@@ -293,8 +293,8 @@ mod tests {
     use super::*;
     use crate::testing::{depth, farthest, moved, put_board, standing, turned, with_context, without_background};
 
-    /// Where a lost body is in the frame after it was found, which was last tracked half a metre beside the camera's axis, and whether its place
-    /// explains what may be the body.
+    /// Where a lost body is in the frame after it was found, which was last tracked half a metre beside the camera's axis, and
+    /// whether the place where it was found explains what may be the body.
     fn found(pixels: &[u16]) -> (Option<Vec<Pose>>, Option<bool>) {
         let (model, poses) = standing();
         let present = moved(&poses, -0.5 * Vec3::X);
