@@ -19,7 +19,7 @@ const AGREED: f64 = 0.01;
 /// What is not known at all counts as so much, metres.
 const ALL_UNSURE: f64 = 1.0;
 /// Share of the frames before in what is known: lines that speak for a limb flicker.
-const STEADY: f64 = 0.3;
+const OF_BEFORE: f64 = 0.3;
 
 /// How much less sure a limb is whose second opinion ends so many metres away, as a factor of its standard deviation.
 fn doubted_by(apart: f64) -> f64 {
@@ -49,7 +49,7 @@ impl Assessor {
             let RegionSupport { own, shown, .. } = support.unwrap_or_default();
             let sigma = edges.end_sigma(limb).min(ALL_UNSURE) * differs(limb).map_or(1.0, doubted_by);
             let now = (sigma / UNSURE).ln() - SPOKEN_FOR * own[0] * shown;
-            *known = if known.is_nan() { now } else { STEADY * *known + (1.0 - STEADY) * now };
+            *known = if known.is_nan() { now } else { OF_BEFORE * *known + (1.0 - OF_BEFORE) * now };
         }
     }
 
