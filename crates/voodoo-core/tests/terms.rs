@@ -10,7 +10,7 @@ use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Vec3};
 use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
-use voodoo_core::terms::{Contour, Floor, Limits, Penetration, Prior, Regions, Sites, Surface, Term, sphere};
+use voodoo_core::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term, sphere};
 
 /// Compares the analytic gradient with differences of the cost; `evaluate` fills the system at given poses. Where the cost has a
 /// kink, as where two limbs begin to touch, the gradient lies between the differences to both sides; elsewhere these agree.
@@ -88,6 +88,7 @@ proptest! {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = random_pose(&body, &angles);
         check(&body, &poses, &|poses, normal| Limits { sigma: 0.1 }.add(&body, poses, normal))?;
+        check(&body, &poses, &|poses, normal| Posture { share: 0.25 }.add(&body, poses, normal))?;
     }
 
     #[test]

@@ -184,8 +184,10 @@ fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, 
 }
 
 impl Correspondences {
-    /// Makes as much room for surface matches as `other` has.
+    /// Makes as much room for surface matches and edges as `other` has.
     pub fn reserve_as(&mut self, other: &Self) {
+        self.regions.reserve(other.regions.capacity().saturating_sub(self.regions.len()));
+        self.region_support.reserve(other.region_support.capacity().saturating_sub(self.region_support.len()));
         self.limbs.resize_with(other.limbs.len(), LimbMatches::default);
         for (own, other) in self.limbs.iter_mut().zip(&other.limbs) {
             own.reserve(other.candidate.capacity());

@@ -9,6 +9,7 @@ mod proposals;
 mod refined;
 mod rough;
 mod score;
+mod second;
 mod suspicion;
 mod unexplained;
 
@@ -16,7 +17,7 @@ pub use landmark_cost::{APART, body_landmark_cost};
 pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
 
 use crate::association::correspondence::RegionSupport;
-use crate::body::Model;
+use crate::body::{Body, Model};
 use crate::detect::Detection;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
@@ -28,6 +29,7 @@ use proposals::{
 };
 use refined::{Outcome, Present, Refined};
 use rough::{Extremity, RoughSearch};
+use second::Second;
 use suspicion::Suspicion;
 use unexplained::Unexplained;
 
@@ -55,6 +57,7 @@ pub struct Hypotheses {
     pool: Pool,
     exchange: Exchange,
     refined: Refined,
+    second: Second,
 }
 
 impl Hypotheses {
@@ -71,8 +74,19 @@ impl Hypotheses {
         self.pool.prepare(limbs);
         self.exchange.prepare(limbs);
         self.lean.prepare(model);
+        self.second.prepare(limbs);
         self.refined.poses.clear();
         self.refined.poses.reserve(limbs);
+    }
+
+    /// Follows a second body in what few cameras see, before the first one is. Returns the number of ICP steps.
+    pub fn follow_second(&mut self, context: Context, fit: &mut Fit) -> usize {
+        self.second.follow(context, fit)
+    }
+
+    /// How far from the far end of the body's limb, world frame, that of a second body lies, metres; none without a second body.
+    pub fn differs(&self, body: &Body, limb: usize, world_from_limb: &Pose) -> Option<f64> {
+        self.second.differs(limb, body.limbs()[limb].shape.length(), world_from_limb)
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others, and takes what explains the frame better.
@@ -110,6 +124,9 @@ impl Hypotheses {
         if pictures {
             let doubtful = |index: usize| !self.history[index].persistence.is_clear();
             steps += self.exchange.attempt(context, doubtful, &mut self.refined, fit, poses, predicted);
+        }
+        if pictures {
+            steps += self.second.compare(context, &mut self.refined, fit, poses, predicted);
         }
         if pictures && steps > 0 {
             // What was looked at last was tried.

@@ -210,6 +210,8 @@ impl Regions {
             let view = scan::View { picture, model, labels, scene: scene.as_ref(), groups, unit };
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
+            edges.reserve(lines.capacity());
+            pairs.reserve(lines.capacity());
             for line in &*lines {
                 let looked = wanted.is_none_or(|wanted| wanted(usize::from(line.limb)));
                 let found = if looked { scanner.edge(&view, line, search, together) } else { None };
@@ -279,6 +281,8 @@ impl Regions {
         let (body, Camera { lens, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, lens, CELL_BITS, |_| true);
         lines.clear();
+        // Room at once: how many there are differs from pose to pose.
+        lines.reserve(2 * MOST_LINES * camera_from_limb.len());
         let viewer = Viewer { body, lens, labels, unit: unit_of(lens), beside: Beside::of(frame, picture) };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;

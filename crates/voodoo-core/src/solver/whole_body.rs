@@ -10,7 +10,7 @@ use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Floor, Limits, Penetration, Prior, Regions, Sites, Surface, Term, sphere};
+use crate::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term, sphere};
 
 /// Standard deviation of an axis that lies in another limb or below the floor, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
@@ -26,6 +26,9 @@ const HIDDEN_MOTION: f64 = 0.1;
 const TO_REST: f64 = 0.1;
 /// By contours alone every joint moves by so much at least, radians: no points hold a shoulder where it is not.
 const LEAST_MOTION: f64 = 0.1;
+/// By contours alone a joint that turns little is held to where it is at rest by a standard deviation of this share of half of its
+/// range, times `motion_scale`.
+const POSTURE: f64 = 1.0;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 pub const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
@@ -128,15 +131,17 @@ impl WholeBody {
         self.spheres.clear();
         self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| sphere(&limb.shape, pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
+        let posture = Posture { share: POSTURE * config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The objective: one more term is a file and a line here.
-        let terms: [Option<&dyn Term>; 8] = [
+        let terms: [Option<&dyn Term>; 9] = [
             Some(&surface),
             Some(&sites),
             Some(&contour),
             Some(&regions),
             Some(&prior),
             config.limits.then_some(&limits),
+            contours_alone(problem).then_some(&posture),
             config.penetration.then_some(&penetration),
             floor.as_ref().filter(|_| config.penetration).map(|floor| floor as &dyn Term),
         ];
@@ -168,8 +173,7 @@ impl WholeBody {
         for pair in &problem.correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
-        let points = problem.correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
-        let contours_alone = !problem.correspondences.regions.is_empty() && !points;
+        let contours_alone = contours_alone(problem);
         self.joint_sigmas.clear();
         self.rests.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
@@ -201,6 +205,12 @@ impl Calm {
         holds.extend(joints.iter().map(|calm| gain * calm));
         holds
     }
+}
+
+/// Whether edges of colours are matched and no points.
+fn contours_alone(problem: &Problem) -> bool {
+    let Problem { correspondences, .. } = problem;
+    !correspondences.regions.is_empty() && correspondences.limbs.iter().all(|matches| matches.candidate.is_empty())
 }
 
 /// How much tighter small deviations from the prediction are held, in this step.

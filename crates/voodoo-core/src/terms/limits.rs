@@ -1,8 +1,8 @@
 //! Joint limits, one-sided and soft: each component of the joint's rotation vector stays in its range.
 
 use super::Term;
-use crate::body::Body;
-use crate::math::{Pose, ShortestAxis, Vec3};
+use crate::body::{Body, Joint};
+use crate::math::{Pose, Quat, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 
 /// All joints that have limits.
@@ -18,9 +18,7 @@ impl Term for Limits {
         for (index, limb) in body.limbs().iter().enumerate() {
             let Some((parent, joint)) = &limb.parent else { continue };
             let Some(limits) = &joint.limits else { continue };
-            let world_from_joint = poses[*parent].rotation * joint.parent_from_joint.rotation;
-            let turned = world_from_joint.inverse() * poses[index].rotation * joint.limb_from_joint.rotation;
-            let v = turned.to_scaled_axis_shortest();
+            let (world_from_joint, v) = turn_in_joint(joint, &poses[*parent], &poses[index]);
             for (axis, [low, high]) in limits.iter().enumerate() {
                 let excess = if v[axis] < *low {
                     v[axis] - low
@@ -38,9 +36,16 @@ impl Term for Limits {
     }
 }
 
+/// The joint's axes in the world, and the rotation vector of its turn, joint frame, radians.
+pub(super) fn turn_in_joint(joint: &Joint, parent: &Pose, limb: &Pose) -> (Quat, Vec3) {
+    let world_from_joint = parent.rotation * joint.parent_from_joint.rotation;
+    let turned = world_from_joint.inverse() * limb.rotation * joint.limb_from_joint.rotation;
+    (world_from_joint, turned.to_scaled_axis_shortest())
+}
+
 /// Row `axis` of the inverse left Jacobian of the rotation vector `v`: `J^-1 = I - [v]/2 + k [v]^2` with
 /// `k = (1 - (t/2) cot(t/2)) / t^2`, `t = |v|`.
-fn inverse_left_jacobian_row(v: Vec3, axis: usize) -> Vec3 {
+pub(super) fn inverse_left_jacobian_row(v: Vec3, axis: usize) -> Vec3 {
     let square = v.length_squared();
     let k = if square < 1e-6 {
         1.0 / 12.0

@@ -12,7 +12,7 @@ use crate::detect::Detection;
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
-use crate::math::{Pose, Vec3, is_rigid};
+use crate::math::{Pose, Vec3, is_rigid, shifted};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
@@ -198,6 +198,9 @@ impl Tracker {
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
         fit.begin_regions(setting.of(model), poses);
+        if config.hypotheses && schedule.whole_body && known {
+            steps += hypotheses.follow_second(setting.of(model), fit);
+        }
         if sizes.wait_for_pose() {
             steps += fit.run(setting.of(model), predicted, poses);
         }
@@ -363,7 +366,9 @@ impl Tracker {
         let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
         let (pairs, sizes_found) = (sizes.followed(), sizes.found());
         let found = Found { body, poses, correspondences, pairs, sizes_found, time_scale, config };
-        assessor.follow_edges(model, found);
+        let origin = motion.origin;
+        let differs = |limb: usize| hypotheses.differs(body, limb, &shifted(&poses[limb], -origin));
+        assessor.follow_edges(model, found, differs);
         assessor.report_status(model, estimate);
         assessor.report_spread(found, hypotheses.rivals(), |limb| sizes.girth_sigma(body, limb), estimate);
     }

@@ -9,39 +9,59 @@ use crate::tracker::estimate::LimbStatus;
 use crate::uncertainty::Found;
 
 /// A limb is in doubt whose end is known less well, metres. Edges err alike: errors are about twice as large.
-const UNSURE: f64 = 0.048;
+const UNSURE: f64 = 0.05;
 /// What speaks for all of a limb makes it surer by so many e-folds.
 const SPOKEN_FOR: f64 = 0.9;
+/// Where a second opinion on a limb ends so far away, metres, it is as sure as by edges alone, and less so with the root of what is
+/// more; a difference of less than the second one says nothing.
+const USUAL: f64 = 0.03;
+const AGREED: f64 = 0.01;
+/// What is not known at all counts as so much, metres.
+const ALL_UNSURE: f64 = 1.0;
+/// Share of the frames before in what is known: lines that speak for a limb flicker.
+const OF_BEFORE: f64 = 0.3;
+
+/// How much less sure a limb is whose second opinion ends so many metres away, as a factor of its standard deviation.
+fn doubted_by(apart: f64) -> f64 {
+    ((apart + AGREED) / (USUAL + AGREED)).sqrt()
+}
 
 impl Assessor {
-    /// Takes what a frame's edges told.
-    pub(in crate::tracker) fn follow_edges(&mut self, model: &Model, found: Found) {
+    /// Takes what a frame's edges told, and how far away the far end of a limb is by a second opinion, if there is one.
+    pub(in crate::tracker) fn follow_edges(
+        &mut self,
+        model: &Model,
+        found: Found,
+        differs: impl Fn(usize) -> Option<f64>,
+    ) {
         let Found { poses, correspondences, time_scale, config, .. } = found;
         let points = correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
         let pictures = !correspondences.region_support.is_empty();
-        if points || !pictures && self.sure.is_empty() {
+        if points || !pictures && self.unsure.is_empty() {
             self.forget_edges();
             return;
         }
         self.edges.observe(model, poses, correspondences, time_scale, config);
-        let Self { edges, sure, .. } = self;
-        sure.clear();
-        sure.extend((0..poses.len()).map(|limb| {
+        let Self { edges, unsure, .. } = self;
+        unsure.resize(poses.len(), f64::NAN);
+        for (limb, known) in unsure.iter_mut().enumerate() {
             let support = correspondences.region_support.get(limb).copied();
             let RegionSupport { own, shown, .. } = support.unwrap_or_default();
-            edges.end_sigma(limb) * (-SPOKEN_FOR * own[0] * shown).exp() < UNSURE
-        }));
+            let sigma = edges.end_sigma(limb).min(ALL_UNSURE) * differs(limb).map_or(1.0, doubted_by);
+            let now = (sigma / UNSURE).ln() - SPOKEN_FOR * own[0] * shown;
+            *known = if known.is_nan() { now } else { OF_BEFORE * *known + (1.0 - OF_BEFORE) * now };
+        }
     }
 
     /// Nothing that edges told before counts.
     pub(super) fn forget_edges(&mut self) {
         self.edges.forget();
-        self.sure.clear();
+        self.unsure.clear();
     }
 
     /// Edges of pictures are all there is.
     pub(super) fn told_by_edges(&self) -> bool {
-        !self.sure.is_empty()
+        !self.unsure.is_empty()
     }
 
     /// Statuses of arms and legs by what edges told, if that is all there is.
@@ -49,7 +69,7 @@ impl Assessor {
         for chain in extremities.iter().filter(|_| self.told_by_edges()) {
             for limb in [chain.upper, chain.lower] {
                 statuses[limb] = match statuses[limb] {
-                    _ if self.sure[limb] => LimbStatus::Measured,
+                    _ if self.unsure[limb] < 0.0 => LimbStatus::Measured,
                     LimbStatus::Measured => LimbStatus::Inferred,
                     doubtful => doubtful,
                 };
@@ -62,14 +82,18 @@ impl Assessor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::standing;
+    use crate::association::correspondence::{Correspondences, RegionPair};
+    use crate::config::Config;
+    use crate::math::Vec3;
+    use crate::testing::{first_arm, standing};
 
     #[test]
     fn arms_and_legs_are_measured_where_edges_told_where_they_are() {
         let (model, poses) = standing();
         let chain = &model.extremities[0];
         let statuses = |internal: LimbStatus, sure: bool| {
-            let mut assessor = Assessor { sure: vec![sure; poses.len()], ..Assessor::default() };
+            let mut assessor =
+                Assessor { unsure: vec![if sure { -1.0 } else { 1.0 }; poses.len()], ..Assessor::default() };
             let mut statuses = vec![internal; poses.len()];
             assessor.doubt_by_edges(&model.extremities, &mut statuses);
             assessor.forget_edges();
@@ -82,5 +106,48 @@ mod tests {
         assert_eq!(statuses(measured, false), (measured, [inferred; 3]));
         assert_eq!(statuses(lost, false), (lost, [lost; 3]));
         assert_eq!(statuses(lost, true), (lost, [measured; 3]));
+    }
+
+    #[test]
+    fn a_limb_is_in_doubt_where_a_second_opinion_ends_elsewhere_for_more_than_a_frame() {
+        let (model, poses) = standing();
+        let mut correspondences = Correspondences::default();
+        for (limb, part) in model.body.limbs().iter().enumerate() {
+            for (step, normal) in (0..8).flat_map(|step| Vec3::AXES.map(|normal| (step, normal))) {
+                let x = poses[limb] * (f64::from(step) / 7.0 * part.shape.length() * Vec3::Z);
+                correspondences.regions.push(RegionPair {
+                    limb,
+                    x,
+                    normal,
+                    distance: 0.0,
+                    information: 5e3,
+                    source: 0,
+                });
+            }
+            let support = RegionSupport { own: [0.6; 2], shown: 0.6, ..RegionSupport::default() };
+            correspondences.region_support.push(support);
+        }
+        let (body, config) = (&model.body, Config::default());
+        let found = Found {
+            body,
+            poses: &poses,
+            correspondences: &correspondences,
+            pairs: &[],
+            sizes_found: false,
+            time_scale: 1.0,
+            config: &config,
+        };
+        let arm = &model.extremities[first_arm(&model)];
+        let mut assessor = Assessor::default();
+        let mut status = |apart: Option<f64>| {
+            assessor.follow_edges(&model, found, |_| apart);
+            let mut statuses = vec![LimbStatus::Measured; poses.len()];
+            assessor.doubt_by_edges(&model.extremities, &mut statuses);
+            (statuses[arm.lower] == LimbStatus::Measured, assessor.unsure[arm.lower])
+        };
+        let (alone, agreed) = (status(None), status(Some(0.0)));
+        assert!(alone.0 && agreed.0 && agreed.1 < alone.1, "{alone:?} {agreed:?}");
+        let differ: Vec<(bool, f64)> = (0..6).map(|_| status(Some(5.0))).collect();
+        assert!(!differ[5].0 && differ[0].1 < differ[1].1, "{differ:?}");
     }
 }

@@ -62,8 +62,8 @@ pub(super) struct Assessor {
     supports: Vec<LimbSupport>,
     uncertainty: Uncertainty,
     edges: ByEdges,
-    /// Of every limb whether edges told where it is; empty where they are not all there is.
-    sure: Vec<bool>,
+    /// Of every limb by what edges told, a logarithm: above 0 it is in doubt. Empty where they are not all there is.
+    unsure: Vec<f64>,
 }
 
 impl Assessor {

@@ -1,0 +1,157 @@
+//! A second opinion: the body followed by the same pictures, and held less to what is expected.
+//!
+//! What two cameras do not see is as the prior has it, or where a small chance led it. Somebody who believes less of the prior goes
+//! elsewhere there, and to the same place wherever the pictures tell. Where an arm or leg of the two is not in one place, the one
+//! that explains clearly more of the pictures is taken; how far they lie apart tells how little the pictures do.
+
+use super::refined::{REFINE, Refined};
+use super::score::GAIN;
+use crate::config::Config;
+use crate::fit::{Context, Fit, Motion};
+use crate::math::{Pose, Vec3, shifted};
+
+/// With more cameras than this there is hardly anything that none of them sees.
+const FEW_CAMERAS: usize = 2;
+/// The second body may move so many times as far as is expected of the first, and be held so much less to a usual posture.
+const LOOSER: f64 = 3.0;
+/// Ends of arms and legs that lie farther apart than this are not in one place, metres: nearer ones are hardly told by what they
+/// explain.
+const TWO_PLACES: f64 = 0.1;
+
+/// The other body.
+#[derive(Debug, Default)]
+pub(super) struct Second {
+    /// World frame; without poses there is none.
+    motion: Motion,
+    /// In this frame, working frame: its poses, those expected and those before, and the first body with one of its arms or legs.
+    poses: Vec<Pose>,
+    predicted: Vec<Pose>,
+    previous: Vec<Pose>,
+    tried: Vec<Pose>,
+}
+
+impl Second {
+    /// There is none until the next frame has been followed; room for so many limbs.
+    pub(super) fn prepare(&mut self, limbs: usize) {
+        let Self { motion, poses, predicted, previous, tried } = self;
+        for poses in [&mut motion.poses, &mut motion.previous, poses, predicted, previous, tried] {
+            poses.clear();
+            poses.reserve(limbs);
+        }
+    }
+
+    /// Follows the second body in a frame, before the first one is: `fit` holds its matches afterwards. Returns the ICP steps.
+    pub(super) fn follow(&mut self, context: Context, fit: &mut Fit) -> usize {
+        let Self { motion, poses, predicted, previous, .. } = self;
+        if !is_wanted(context) || motion.poses.len() != context.model.body.limbs().len() {
+            motion.poses.clear();
+            return 0;
+        }
+        let (frame, origin) = (context.seen.frame(), context.seen.origin());
+        let config = Config { motion_scale: LOOSER * context.config.motion_scale, ..context.config.clone() };
+        motion.expect(&context.model.body, frame.stamp, config.prediction, predicted);
+        predicted.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
+        set_shifted(previous, &motion.poses, origin);
+        poses.clone_from(predicted);
+        let steps = fit.run(Context { config: &config, previous, ..context }, predicted, poses);
+        motion.previous.clone_from(&motion.poses);
+        set_shifted(&mut motion.poses, poses, -origin);
+        motion.commit(frame.stamp);
+        steps
+    }
+
+    /// Where an arm or leg of the two bodies is not in one place, the one that explains clearly more is that of both; `predicted`
+    /// is what is expected of the first one. `fit` holds its matches, before and afterwards. Returns the ICP steps.
+    pub(super) fn compare(
+        &mut self,
+        context: Context,
+        refined: &mut Refined,
+        fit: &mut Fit,
+        poses: &mut Vec<Pose>,
+        predicted: &mut Vec<Pose>,
+    ) -> usize {
+        let (body, origin) = (&context.model.body, context.seen.origin());
+        let mut steps = 0;
+        if self.motion.poses.len() != poses.len() {
+            if is_wanted(context) {
+                // From here on they go their own ways.
+                self.motion.restart(poses.iter().map(|pose| shifted(pose, -origin)).collect());
+                self.motion.commit(context.seen.frame().stamp);
+            }
+            return steps;
+        }
+        set_shifted(&mut self.poses, &self.motion.poses, origin);
+        for chain in &context.model.extremities {
+            if chain.end(poses).distance(chain.end(&self.poses)) < TWO_PLACES {
+                continue;
+            }
+            let now = refined.cost(context, fit, poses);
+            self.tried.clone_from(poses);
+            chain.put(body, &mut self.tried, self.poses[chain.lower].translation, chain.end(&self.poses));
+            let cost = refined.refine(context, fit, &self.tried);
+            steps += REFINE;
+            if cost.total < now.total - GAIN {
+                poses.clone_from(&refined.poses);
+                predicted.clone_from(&self.tried);
+                continue;
+            }
+            fit.exchange(&mut refined.matched);
+            if cost.total > now.total + GAIN {
+                chain.put(body, &mut self.poses, poses[chain.lower].translation, chain.end(poses));
+            }
+        }
+        set_shifted(&mut self.motion.poses, &self.poses, -origin);
+        steps
+    }
+
+    /// How far from the first body's limb, world frame, the second one's ends, metres; none where there is no second body.
+    pub(super) fn differs(&self, limb: usize, length: f64, world_from_limb: &Pose) -> Option<f64> {
+        let end = length * Vec3::Z;
+        self.motion.poses.get(limb).map(|own| (*own * end).distance(*world_from_limb * end))
+    }
+}
+
+/// Few pictures are all that is seen.
+fn is_wanted(context: Context) -> bool {
+    context.pictures_alone() && context.seen.frame().colors.len() <= FEW_CAMERAS
+}
+
+fn set_shifted(to: &mut Vec<Pose>, from: &[Pose], origin: Vec3) {
+    to.clear();
+    to.extend(from.iter().map(|pose| shifted(pose, origin)));
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
+
+    #[test]
+    fn where_depth_is_seen_there_is_no_second_opinion() {
+        let (model, mut poses) = standing();
+        let (pixels, config) = (before_wall(&model.body, &poses), without_background());
+        with_context(&pixels, &config, &model, &poses.clone(), |context| {
+            let (mut second, mut fit) = (Second::default(), Fit::new(&config).unwrap());
+            let mut predicted = poses.clone();
+            // One that was is given up.
+            second.motion.restart(poses.clone());
+            assert_eq!(second.follow(context, &mut fit), 0);
+            let steps = second.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
+            assert_eq!((steps, second.differs(0, 0.1, &poses[0])), (0, None));
+        });
+    }
+
+    #[test]
+    fn a_limb_differs_by_how_far_apart_its_ends_are() {
+        let (model, poses) = standing();
+        let (other, _) = raised(&model, &poses, 0.2);
+        let arm = &model.extremities[first_arm(&model)];
+        let mut second = Second::default();
+        second.motion.restart(moved(&other, 0.02 * Vec3::X));
+        let differs =
+            |limb: usize| second.differs(limb, model.body.limbs()[limb].shape.length(), &poses[limb]).unwrap();
+        assert!((differs(0) - 0.02).abs() < 1e-9, "the trunk is only shifted: {}", differs(0));
+        assert!(differs(arm.lower) > 0.15, "{}", differs(arm.lower));
+    }
+}

@@ -1,0 +1,68 @@
+//! A usual posture: joints that turn little are drawn to where they are at rest.
+//!
+//! Edges of colours err alike, and what two cameras see from opposite sides says hardly anything of a turn along their line of
+//! sight: a pelvis turns, a spine twists a little farther with every frame, and nothing turns it back.
+
+use super::Term;
+use super::limits::{inverse_left_jacobian_row, turn_in_joint};
+use crate::body::Body;
+use crate::math::Pose;
+use crate::terms::normal_equations::NormalEquations;
+
+/// A component that may turn farther than this in all, radians, swings where it likes: those of shoulders, elbows and knees, and
+/// the bends of hips and back.
+const SWINGS: f64 = 1.7;
+
+/// All joints that have limits.
+#[derive(Debug)]
+pub struct Posture {
+    /// Standard deviation of each component of a joint's turn, as a share of half of what it may turn in all.
+    pub share: f64,
+}
+
+impl Term for Posture {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
+        for (index, limb) in body.limbs().iter().enumerate() {
+            let Some((parent, joint)) = &limb.parent else { continue };
+            let Some(limits) = &joint.limits else { continue };
+            let (world_from_joint, v) = turn_in_joint(joint, &poses[*parent], &poses[index]);
+            for (axis, [low, high]) in limits.iter().enumerate() {
+                let range = high - low;
+                if !(range > 0.0 && range < SWINGS) {
+                    continue;
+                }
+                let sigma = 0.5 * range * self.share;
+                let weight = 1.0 / (sigma * sigma);
+                // At rest the turn is none, or as little as the limits let it be.
+                let off = v[axis] - 0.0_f64.clamp(*low, *high);
+                normal.joints[index].add_row(weight, world_from_joint * inverse_left_jacobian_row(v, axis), off);
+                normal.cost += weight * off * off;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{raised, standing, turned};
+
+    fn cost(body: &Body, poses: &[Pose]) -> f64 {
+        let mut normal = NormalEquations::default();
+        normal.clear(poses.len());
+        Posture { share: 0.25 }.add(body, poses, &mut normal);
+        normal.cost
+    }
+
+    #[test]
+    fn who_stands_or_raises_an_arm_costs_nothing_and_a_turned_pelvis_does() {
+        let (model, poses) = standing();
+        let body = &model.body;
+        let (arm_up, _) = raised(&model, &poses, 1.0);
+        assert!(cost(body, &poses) < 1e-12 && cost(body, &arm_up) < 1e-12);
+        let mut twisted = poses.clone();
+        twisted[0] = turned(&poses[..1], poses[0].translation, poses[0].rotation * crate::math::Vec3::Z, 0.3)[0];
+        // A waist and two hips, each a bit more than a standard deviation off.
+        assert!((2.0..12.0).contains(&cost(body, &twisted)), "{}", cost(body, &twisted));
+    }
+}
