@@ -74,7 +74,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Scale at which the robust kernel stops narrowing, for the whole-body solvers. (unit: m; range: 0.001 to
     10)
     """
-    outline_sigma: float = 0.013
+    outline_sigma: float = 0.01
     """Standard deviation of an edge of the outline, for the whole-body solvers. (unit: m; range: 0.0001 to 1)"""
     prediction: float = 0.6
     """Share of the last motion that is expected to go on (0: the body is expected to stand still; whole-body

@@ -253,7 +253,7 @@ config! {
     /// Scale at which the robust kernel stops narrowing, for the whole-body solvers.
     kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
     /// Standard deviation of an edge of the outline, for the whole-body solvers.
-    outline_sigma: f64 = 0.013, "m", 0.0001 ..= 1.0;
+    outline_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
     /// Share of the last motion that is expected to go on (0: the body is expected to stand still; whole-body solvers).
     prediction: f64 = 0.6, "", 0.0 ..= 1.0;
     /// Standard deviation of the root's unexpected turn in 1/30 s.

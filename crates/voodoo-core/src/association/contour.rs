@@ -6,7 +6,7 @@ use crate::math::{Points, Pose, Vec3};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbours as well.
-const STATIONS: [f64; 9] = [0.2, 0.275, 0.35, 0.425, 0.5, 0.575, 0.65, 0.725, 0.8];
+const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
 /// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
 const DEPTH_REACH: f64 = 0.12;
 /// A limb whose axis makes an angle with the line of sight of less than this sine (30 degrees) shows no sides: what ends there

@@ -1,5 +1,6 @@
 //! Lengths that a detector tells of a body it found, look by look: of a sitter it knows less than of who stands.
 
+use super::girth::ALIKE;
 use crate::body::Body;
 use crate::detect::LENGTHS;
 
@@ -15,9 +16,6 @@ const HANGS_BY: [(&str, &str); 6] = [
 const TRUNK: &str = "trunk";
 /// The sizes are known when the stature is, to this share of it: of sitters and who bend it is known to 4 to 6 %, of others to 2.
 const KNOWN: f64 = 0.03;
-/// Points of a limb err alike, so that a frame tells less of its length than it has points: what is told counts for so many of them.
-const COUNTS: f64 = 4.0;
-
 /// Logarithms of lengths, as in [`LENGTHS`].
 #[derive(Debug, Default)]
 pub(super) struct Told {
@@ -53,14 +51,14 @@ impl Told {
         stature > 0.0 && stature < 1.0 / (KNOWN * KNOWN)
     }
 
-    /// By how much longer a limb is than the sizes were set, as all looks tell, and the information of that; none of what was not
-    /// told.
+    /// By how much longer a limb is than the sizes were set, as all looks tell, and the information of that against a frame's, whose
+    /// points err alike; none of what was not told.
     pub(super) fn of(&self, body: &Body, limb: usize) -> Option<(f64, f64)> {
         let joint = body.limbs()[limb].parent.as_ref().map_or("", |(_, joint)| joint.name.as_str());
         let stem = joint.trim_start_matches("l_").trim_start_matches("r_");
         let name = HANGS_BY.iter().find(|(by, _)| *by == stem).map_or(TRUNK, |(_, name)| name);
         let index = LENGTHS.iter().position(|length| *length == name).filter(|index| self.information[*index] > 0.0)?;
-        Some(((self.mean[index] - self.set[index]).exp(), COUNTS * self.information[index]))
+        Some(((self.mean[index] - self.set[index]).exp(), ALIKE * self.information[index]))
     }
 }
 
@@ -85,11 +83,11 @@ mod tests {
     fn who_stands_up_is_as_tall_as_the_surer_looks_say_and_looks_that_follow_are_worth_no_more() {
         let (sitting, standing) = ([1.0, 0.05], [0.9, 0.02]);
         let (factor, information, unsure) = heard(&[sitting; 9]);
-        assert!((factor - 1.0).abs() < 1e-12 && (information - COUNTS / 0.0025).abs() < 1e-6 && unsure);
+        assert!((factor - 1.0).abs() < 1e-12 && (information - ALIKE / 0.0025).abs() < 1e-6 && unsure);
         let mut looks = vec![sitting; 9];
         looks.extend([standing; 2]);
         let (factor, information, unsure) = heard(&looks);
-        assert!((0.9..0.91).contains(&factor) && (information - COUNTS / 0.0004).abs() < 1e-6 && !unsure, "{factor}");
+        assert!((0.9..0.91).contains(&factor) && (information - ALIKE / 0.0004).abs() < 1e-6 && !unsure, "{factor}");
         looks.push(sitting);
         let (again, after, unsure) = heard(&looks);
         assert!(again - factor < 0.02 && after == information && !unsure, "{again} after {factor}");

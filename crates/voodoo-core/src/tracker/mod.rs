@@ -166,7 +166,6 @@ impl Tracker {
         self.assessor.doubt_pose();
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.sizes.hear(detection);
         }
         self.follow(frame, Some(share));
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
@@ -274,7 +273,7 @@ impl Tracker {
                 // What was learnt of sizes and scene was learnt in the wrong place.
                 return !among && young && self.restart_at_detection();
             }
-            if !lost && self.relocalizer.agrees() {
+            if !among && !lost && self.relocalizer.agrees() {
                 self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
             }
         }
