@@ -1,11 +1,10 @@
 //! Closest points of many queries at once.
 
-use super::kernel::{BLOCK, Block, BlockResult, Constants, SHORT, closest};
-use super::lanes::LANES;
+use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
 use super::{SurfacePoint, TaperedEllipticCylinder};
 #[cfg(target_arch = "x86_64")]
 use crate::math::has_avx512;
-use crate::math::{Points, Pose, Vec3};
+use crate::math::{LANES, Points, Pose, Vec3};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which one guess is enough in double precision.
@@ -98,32 +97,53 @@ impl TaperedEllipticCylinder {
         let constants = Constants::new(self, world_from_limb);
         let whole = xs.len() - xs.len() % BLOCK;
         let queries = [xs, ys, zs];
-        let mut doubtful = Doubtful::default();
-        self.closest_blocks(world_from_limb, &constants, kernel::<BLOCK>(), queries, 0..whole, &mut doubtful, out);
-        self.closest_blocks(
-            world_from_limb,
-            &constants,
-            kernel::<SHORT>(),
-            queries,
-            whole..xs.len(),
-            &mut doubtful,
-            out,
-        );
-        self.settle(world_from_limb, &mut doubtful, out);
+        let mut batch = Batch { shape: self, world_from_limb, constants, out, doubtful: Few::new(), open: Few::new() };
+        batch.closest_blocks(kernel::<BLOCK, FEW>(), queries, 0..whole);
+        batch.closest_blocks(kernel::<SHORT, FEW>(), queries, whole..xs.len());
+        batch.go_on();
+        batch.settle();
+    }
+}
+
+// So many are decided side by side in double precision.
+const _: () = assert!(SHORT <= LANES);
+
+/// Queries that wait until there are as many as are worked on side by side, and which they are.
+struct Few {
+    queries: Block<SHORT>,
+    indices: [usize; SHORT],
+    count: usize,
+}
+
+impl Few {
+    const fn new() -> Self {
+        Self { queries: Block::ZERO, indices: [0; SHORT], count: 0 }
     }
 
-    /// Closest points of the queries in `range`, block by block; some of those left to the exact path stay in `doubtful`.
-    #[allow(clippy::too_many_arguments, reason = "one loop of its caller, for two sizes of blocks")]
-    fn closest_blocks<const N: usize>(
-        &self,
-        world_from_limb: &Pose,
-        constants: &Constants,
-        run: Kernel<N>,
-        queries: [&[f32]; 3],
-        range: Range<usize>,
-        doubtful: &mut Doubtful,
-        out: &mut SurfaceBatch,
-    ) {
+    /// Adds one; whether that makes them enough.
+    fn push(&mut self, index: usize, [x, y, z]: [f32; 3]) -> bool {
+        let at = self.count;
+        (self.queries.x[at], self.queries.y[at], self.queries.z[at], self.indices[at]) = (x, y, z, index);
+        self.count += 1;
+        self.count == SHORT
+    }
+
+}
+
+/// Queries to one shape in its pose, and where the results go.
+struct Batch<'a> {
+    shape: &'a TaperedEllipticCylinder,
+    world_from_limb: &'a Pose,
+    constants: Constants,
+    out: &'a mut SurfaceBatch,
+    /// Left by few steps of single precision; left by more of them.
+    doubtful: Few,
+    open: Few,
+}
+
+impl Batch<'_> {
+    /// Closest points of the queries in `range`, block by block; those in doubt go on in between, the last ones wait.
+    fn closest_blocks<const N: usize>(&mut self, run: Kernel<N>, queries: [&[f32]; 3], range: Range<usize>) {
         let mut block = Block::ZERO;
         let mut found = BlockResult::ZERO;
         for start in range.clone().step_by(N) {
@@ -133,7 +153,8 @@ impl TaperedEllipticCylinder {
             load(&mut block.x, &queries[0][span.clone()]);
             load(&mut block.y, &queries[1][span.clone()]);
             load(&mut block.z, &queries[2][span.clone()]);
-            run(constants, &block, &mut found);
+            run(&self.constants, &block, &mut found);
+            let out = &mut *self.out;
             store(&mut out.points.x[span.clone()], &found.points.x);
             store(&mut out.points.y[span.clone()], &found.points.y);
             store(&mut out.points.z[span.clone()], &found.points.z);
@@ -145,41 +166,49 @@ impl TaperedEllipticCylinder {
             if found.doubtful.iter().fold(0, |any, doubt| any | doubt) == 0 {
                 continue;
             }
-            for i in 0..count {
-                if found.doubtful[i] != 0 {
-                    let query = [block.x[i], block.y[i], block.z[i]];
-                    doubtful.queries[doubtful.count] = in_limb(world_from_limb, query);
-                    doubtful.indices[doubtful.count] = start + i;
-                    doubtful.count += 1;
-                    if doubtful.count == LANES {
-                        self.settle(world_from_limb, doubtful, out);
-                    }
+            for i in (0..count).filter(|i| found.doubtful[*i] != 0) {
+                if self.doubtful.push(start + i, [block.x[i], block.y[i], block.z[i]]) {
+                    self.go_on();
                 }
             }
         }
     }
 
-    /// Decides the doubtful queries in double precision.
-    fn settle(&self, world_from_limb: &Pose, doubtful: &mut Doubtful, out: &mut SurfaceBatch) {
-        let Doubtful { queries, indices, count } = doubtful;
-        if *count > 0 {
-            let mut decide = |lane: usize, found: SurfacePoint| out.set(indices[lane], &found, world_from_limb);
-            if self.aspect_change() > ONE_BASIN {
-                (0..*count).for_each(|lane| decide(lane, self.closest_point(queries[lane])));
-            } else {
-                self.closest_points_in_one_basin(&queries[..*count], decide);
+    /// Takes more steps in single precision with those that few did not settle.
+    fn go_on(&mut self) {
+        let mut found = BlockResult::ZERO;
+        if self.doubtful.count > 0 {
+            kernel::<SHORT, MORE>()(&self.constants, &self.doubtful.queries, &mut found);
+        }
+        for i in 0..self.doubtful.count {
+            let (index, query) = (self.doubtful.indices[i], self.doubtful.queries.get(i));
+            if found.doubtful[i] == 0 {
+                self.out.points.set(index, found.points.get(i));
+                self.out.normals.set(index, found.normals.get(i));
+                (self.out.signed_distance[index], self.out.region[index]) = (found.signed_distance[i], found.region[i]);
+            } else if self.open.push(index, query) {
+                self.settle();
             }
         }
-        *count = 0;
+        self.doubtful.count = 0;
     }
-}
 
-/// Queries (limb frame) that single precision did not settle, and which they are.
-#[derive(Default)]
-struct Doubtful {
-    queries: [Vec3; LANES],
-    indices: [usize; LANES],
-    count: usize,
+    /// Decides what is still open in double precision.
+    fn settle(&mut self) {
+        let Self { shape, world_from_limb, out, open, .. } = self;
+        let mut queries = [Vec3::ZERO; SHORT];
+        for (at, query) in queries.iter_mut().enumerate().take(open.count) {
+            *query = in_limb(world_from_limb, open.queries.get(at));
+        }
+        let queries = &queries[..open.count];
+        let mut decide = |at: usize, found: SurfacePoint| out.set(open.indices[at], &found, world_from_limb);
+        if shape.aspect_change() > ONE_BASIN {
+            queries.iter().enumerate().for_each(|(at, query)| decide(at, shape.closest_point(*query)));
+        } else {
+            shape.closest_points_in_one_basin(queries, decide);
+        }
+        open.count = 0;
+    }
 }
 
 fn in_limb(world_from_limb: &Pose, query: [f32; 3]) -> Vec3 {
@@ -206,7 +235,7 @@ fn store<T: Copy, const N: usize>(to: &mut [T], from: &[T; N]) {
 type Kernel<const N: usize> = fn(&Constants, &Block<N>, &mut BlockResult<N>);
 
 /// The fastest kernel this processor can run; the detection is cached by the standard library.
-fn kernel<const N: usize>() -> Kernel<N> {
+fn kernel<const N: usize, const STEPS: usize>() -> Kernel<N> {
     #[cfg(target_arch = "x86_64")]
     if has_avx512() && std::arch::is_x86_feature_detected!("fma") {
         return |constants, queries, out| {
@@ -216,7 +245,7 @@ fn kernel<const N: usize>() -> Kernel<N> {
                 reason = "a function compiled for an instruction set is called where the processor has it"
             )]
             unsafe {
-                closest_avx512(constants, queries, out);
+                closest_avx512::<N, STEPS>(constants, queries, out);
             }
         };
     }
@@ -229,28 +258,28 @@ fn kernel<const N: usize>() -> Kernel<N> {
                 reason = "a function compiled for an instruction set is called where the processor has it"
             )]
             unsafe {
-                closest_avx2(constants, queries, out);
+                closest_avx2::<N, STEPS>(constants, queries, out);
             }
         };
     }
-    closest_baseline
+    closest_baseline::<N, STEPS>
 }
 
 /// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
-fn closest_baseline<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
-    closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N>(constants, queries, out);
+fn closest_baseline<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+    closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N, STEPS>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
-fn closest_avx512<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
-    closest::<true, N>(constants, queries, out);
+fn closest_avx512<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+    closest::<true, N, STEPS>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn closest_avx2<const N: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
-    closest::<true, N>(constants, queries, out);
+fn closest_avx2<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+    closest::<true, N, STEPS>(constants, queries, out);
 }
 
 #[cfg(test)]
@@ -286,7 +315,7 @@ mod tests {
             let mut found = BlockResult::ZERO;
             let mut doubtful = 0;
             for queries in shell(&shape) {
-                kernel()(&constants, &queries, &mut found);
+                kernel::<BLOCK, FEW>()(&constants, &queries, &mut found);
                 doubtful += found.doubtful.iter().filter(|&&doubt| doubt != 0).count();
             }
             let share = doubtful as f64 / (200 * BLOCK) as f64;
@@ -301,8 +330,8 @@ mod tests {
         let constants = Constants::new(&shape, &Pose::IDENTITY);
         let (mut fast, mut plain) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
-            kernel()(&constants, &queries, &mut fast);
-            closest_baseline(&constants, &queries, &mut plain);
+            kernel::<BLOCK, FEW>()(&constants, &queries, &mut fast);
+            closest_baseline::<BLOCK, FEW>(&constants, &queries, &mut plain);
             for i in (0..BLOCK).filter(|&i| fast.doubtful[i] | plain.doubtful[i] == 0) {
                 assert!((fast.points.x[i] - plain.points.x[i]).abs() < 1e-6);
                 assert!((fast.points.y[i] - plain.points.y[i]).abs() < 1e-6);
@@ -326,8 +355,8 @@ mod tests {
         for queries in shell(&shape) {
             // SAFETY: the processor was just found to have AVX-512 (hence AVX2) and FMA.
             unsafe {
-                closest_avx512(&constants, &queries, &mut wider);
-                closest_avx2(&constants, &queries, &mut wide);
+                closest_avx512::<BLOCK, FEW>(&constants, &queries, &mut wider);
+                closest_avx2::<BLOCK, FEW>(&constants, &queries, &mut wide);
             }
             let bits = |found: &BlockResult<BLOCK>| {
                 [

@@ -8,6 +8,9 @@ use crate::math::{Mat3, Pose, Vec3};
 /// becomes SIMD of the target's width.
 pub(super) const BLOCK: usize = 32;
 pub(super) const SHORT: usize = 8;
+/// Steps of Newton's iteration before the last one: of all points, and of the hundredth of them for which that is too few.
+pub(super) const FEW: usize = 1;
+pub(super) const MORE: usize = 3;
 /// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, metres, that passes.
 const FOOT_ERROR: f32 = 3e-8;
 /// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned: the error of the foot is that of the query divided by it.
@@ -23,6 +26,10 @@ pub(super) struct Block<const N: usize> {
 
 impl<const N: usize> Block<N> {
     pub const ZERO: Self = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
+
+    pub fn get(&self, at: usize) -> [f32; 3] {
+        [self.x[at], self.y[at], self.z[at]]
+    }
 }
 
 /// The results of one block, in the frame of the queries.
@@ -280,8 +287,13 @@ fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f3
 /// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
 ///
 /// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
+/// Newton's iteration takes `STEPS` steps before the last one.
 #[inline(always)]
-pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
+    k: &Constants,
+    queries: &Block<N>,
+    out: &mut BlockResult<N>,
+) {
     let mut limb = Block::<N>::ZERO;
     let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
     for i in 0..N {
@@ -289,10 +301,12 @@ pub(super) fn closest<const FMA: bool, const N: usize>(k: &Constants, queries: &
         (limb.x[i], limb.y[i], limb.z[i]) = (qx, qy, z);
         (cosine[i], sine[i]) = first_angle::<FMA>(k, qx.abs(), qy.abs(), z);
     }
-    for i in 0..N {
-        let (c, s) = (cosine[i], sine[i]);
-        let f = foot::<FMA>(k, c, s, limb.x[i].abs(), limb.y[i].abs(), limb.z[i]);
-        (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
+    for _ in 0..STEPS {
+        for i in 0..N {
+            let (c, s) = (cosine[i], sine[i]);
+            let f = foot::<FMA>(k, c, s, limb.x[i].abs(), limb.y[i].abs(), limb.z[i]);
+            (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
+        }
     }
     for i in 0..N {
         let (qx, qy, z) = (limb.x[i], limb.y[i], limb.z[i]);

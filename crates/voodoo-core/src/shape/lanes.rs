@@ -4,9 +4,8 @@
 
 use super::ruling::{Angle, Foot};
 use super::{SurfacePoint, TaperedEllipticCylinder};
-use crate::math::{Vec3, widest};
+use crate::math::{LANES, Vec3, widest};
 
-pub(super) use crate::math::LANES;
 type Lanes = [f64; LANES];
 
 /// One [`Foot`] a lane.
