@@ -207,7 +207,7 @@ impl Fit {
     }
 
     /// Steps 3 to 5: points stay with their limbs, contours with their edges.
-    fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
+    pub fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
         let gate = self.schedule(context.config).gate(step);
         self.match_assigned(context, poses, &gate, false);
         self.find_regions(context, poses, step);

@@ -109,7 +109,12 @@ impl Refined {
                 return (step, None);
             }
             let here = if step < ROUGH_STEPS { context.roughly() } else { context };
-            fit.match_all(here, &self.poses, at);
+            // As in a frame's own steps, points mostly stay with the limbs they have.
+            if step > BACK_AFTER && step % 2 == 1 || step == BACK_AFTER {
+                fit.match_again(here, &self.poses, at);
+            } else {
+                fit.match_all(here, &self.poses, at);
+            }
             if step == GIVE_UP_AFTER && most.is_finite() {
                 let cost = self.own_cost(context, fit);
                 if cost.total > most {
