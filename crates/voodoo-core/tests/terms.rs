@@ -10,7 +10,7 @@ use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Vec3};
 use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
-use voodoo_core::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term, sphere};
+use voodoo_core::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term};
 
 /// Compares the analytic gradient with differences of the cost; `evaluate` fills the system at given poses. Where the cost has a
 /// kink, as where two limbs begin to touch, the gradient lies between the differences to both sides; elsewhere these agree.
@@ -154,7 +154,7 @@ proptest! {
         let thorax = body.limb_index("thorax").unwrap();
         poses[forearm] = poses[thorax] * Pose::new(Vec3::new(0.05, 0.12, 0.1), Vec3::new(folded, 0.4, 0.0));
         let add = |poses: &[Pose], normal: &mut NormalEquations| {
-            let spheres: Vec<_> = body.limbs().iter().zip(poses).map(|(limb, pose)| sphere(&limb.shape, pose)).collect();
+            let spheres: Vec<_> = body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)).collect();
             Penetration { sigma: 1.0, spheres: &spheres }.add(&body, poses, normal);
         };
         check(&body, &poses, &add)?;

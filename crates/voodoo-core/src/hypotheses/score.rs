@@ -8,6 +8,7 @@ use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Ground;
+use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
 
@@ -116,6 +117,25 @@ pub fn explain(body: &Body, limb: usize, poses: &[Pose], points: &Points, least:
     for (least, distance) in least.iter_mut().zip(distances.iter()) {
         *least = least.min(distance.abs());
     }
+}
+
+/// Lowest and highest coordinates of points.
+pub fn bounds(points: &Points) -> [Vec3; 2] {
+    let least =
+        |values: &[f32]| values.iter().fold(f32::INFINITY, |least, value| if *value < least { *value } else { least });
+    let most =
+        |values: &[f32]| values.iter().fold(f32::NEG_INFINITY, |most, value| if *value > most { *value } else { most });
+    let Points { x, y, z } = points;
+    [[least(x), least(y), least(z)], [most(x), most(y), most(z)]].map(|corner| Vec3::from_array(corner.map(f64::from)))
+}
+
+/// Whether a limb can explain any point within such bounds, however roughly.
+pub fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, [low, high]: [Vec3; 2]) -> bool {
+    let (middle, radius) = shape.sphere(pose);
+    let gap = (middle - middle.max(low).min(high)).length() - radius;
+    // The approximate distance falls below the true one where a slice is flat.
+    let flatness = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
+    gap * flatness(shape.a0(), shape.b0()).min(flatness(shape.a1(), shape.b1())) <= ROUGHLY
 }
 
 /// Cost of points at these distances from the nearest limb of a rough pose.

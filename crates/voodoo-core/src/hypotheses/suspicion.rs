@@ -1,6 +1,6 @@
 //! Whether the frame speaks against an arm or leg where it is.
 
-use super::score::{GAIN, explain};
+use super::score::{GAIN, bounds, explain, may_explain};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
@@ -86,7 +86,8 @@ impl Suspicion {
     }
 }
 
-/// Distances of points to the nearest limb that does not belong to an arm or leg.
+/// Distances of points to the nearest limb that does not belong to an arm or leg; those that are too far to explain a point are
+/// not told apart.
 pub(super) fn distances_to_others(
     context: Context,
     poses: &[Pose],
@@ -97,8 +98,12 @@ pub(super) fn distances_to_others(
 ) {
     others.clear();
     others.resize(points.len(), f32::INFINITY);
+    let bounds = bounds(points);
+    let limbs = context.model.body.limbs();
     for limb in (0..poses.len()).filter(|limb| !chain.limbs().any(|own| own == *limb)) {
-        explain(&context.model.body, limb, poses, points, others, distances);
+        if may_explain(&limbs[limb].shape, &poses[limb], bounds) {
+            explain(&context.model.body, limb, poses, points, others, distances);
+        }
     }
 }
 

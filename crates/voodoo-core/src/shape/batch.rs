@@ -1,5 +1,6 @@
 //! Closest points of many queries at once.
 
+use super::closest::ONE_BASIN;
 use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
 use super::{SurfacePoint, TaperedEllipticCylinder};
 #[cfg(target_arch = "x86_64")]
@@ -7,9 +8,7 @@ use crate::math::has_avx512;
 use crate::math::{LANES, Points, Pose, Vec3};
 use std::ops::Range;
 
-/// Largest [`TaperedEllipticCylinder::aspect_change`] at which one guess is enough in double precision.
-const ONE_BASIN: f64 = 0.05;
-/// The same at which the f32 kernel is trusted in what it settles: no error beyond a micrometre in a million queries at 0.4.
+/// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted in what it settles: no error beyond a micrometre in a million queries at 0.4.
 const SETTLED: f64 = 0.2;
 
 /// Closest points of a batch of queries, in the frame of the queries; index i belongs to query i.
@@ -127,7 +126,6 @@ impl Few {
         self.count += 1;
         self.count == SHORT
     }
-
 }
 
 /// Queries to one shape in its pose, and where the results go.
@@ -266,19 +264,31 @@ fn kernel<const N: usize, const STEPS: usize>() -> Kernel<N> {
 }
 
 /// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
-fn closest_baseline<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+fn closest_baseline<const N: usize, const STEPS: usize>(
+    constants: &Constants,
+    queries: &Block<N>,
+    out: &mut BlockResult<N>,
+) {
     closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N, STEPS>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
-fn closest_avx512<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+fn closest_avx512<const N: usize, const STEPS: usize>(
+    constants: &Constants,
+    queries: &Block<N>,
+    out: &mut BlockResult<N>,
+) {
     closest::<true, N, STEPS>(constants, queries, out);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn closest_avx2<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+fn closest_avx2<const N: usize, const STEPS: usize>(
+    constants: &Constants,
+    queries: &Block<N>,
+    out: &mut BlockResult<N>,
+) {
     closest::<true, N, STEPS>(constants, queries, out);
 }
 

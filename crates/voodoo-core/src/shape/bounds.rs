@@ -1,4 +1,4 @@
-//! Axis-aligned boxes.
+//! Axis-aligned boxes, and spheres.
 
 use super::TaperedEllipticCylinder;
 use crate::math::{Aabb, Pose, Vec3};
@@ -25,5 +25,12 @@ impl TaperedEllipticCylinder {
             (world_from_limb.translation, world_from_limb.transform_point(Vec3::new(0.0, 0.0, self.length)));
         let (first, last) = (reach(self.a0, self.b0), reach(self.a1, self.b1));
         Aabb::new((start - first).min(end - last), (start + first).max(end + last))
+    }
+
+    /// Middle and radius, metres, of a sphere around the solid in the frame `world`.
+    pub fn sphere(&self, world_from_limb: &Pose) -> (Vec3, f64) {
+        let half = 0.5 * self.length;
+        let radius = self.a0.max(self.a1).max(self.b0).max(self.b1);
+        (*world_from_limb * (Vec3::Z * half), half.hypot(radius))
     }
 }

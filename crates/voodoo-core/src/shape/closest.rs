@@ -31,6 +31,8 @@ const SHARPEST: f64 = 1e-3;
 
 /// Least ratio of `g''/2` to `|P_θ|²` of a minimum that is taken for the only one; it falls to 0 at the medial axis.
 pub(super) const DISTINCT: f64 = 0.3;
+/// Largest [`TaperedEllipticCylinder::aspect_change`] at which a distinct minimum is the only one.
+pub(super) const ONE_BASIN: f64 = 0.05;
 
 pub(super) fn folded(q: Vec3) -> Vec3 {
     Vec3::new(q.x.abs(), q.y.abs(), q.z)
@@ -59,10 +61,13 @@ impl TaperedEllipticCylinder {
         if !q.is_finite() {
             return self.closest_point(q);
         }
-        let (a, b) = self.semi_axes(guessed.t * self.length);
-        let tangent = (a * guessed.angle.s).powi(2) + (b * guessed.angle.c).powi(2);
-        let distinct = guessed.bend >= DISTINCT * tangent;
-        self.nearest_face(q, if distinct { guessed } else { self.closest_on_side(folded(q), guessed) })
+        self.nearest_face(q, self.closest_on_side(folded(q), guessed))
+    }
+
+    /// Whether a minimum is so distinct that the side of a shape whose end ellipses differ little has no other basin.
+    fn is_distinct(&self, minimum: &Foot) -> bool {
+        let (a, b) = self.semi_axes(minimum.t * self.length);
+        minimum.bend >= DISTINCT * ((a * minimum.angle.s).powi(2) + (b * minimum.angle.c).powi(2))
     }
 
     /// The closest point when that of the side is known: a cap may be nearer.
@@ -130,7 +135,8 @@ impl TaperedEllipticCylinder {
 
     /// The closest point of the side with its rims, for a query with `x, y >= 0` and what was guessed for it.
     fn closest_on_side(&self, q: Vec3, guessed: Foot) -> Foot {
-        if self.aspect_change() < 1e-12 && self.is_blunt() {
+        let one_basin = self.aspect_change() <= ONE_BASIN && self.is_blunt();
+        if one_basin && (self.aspect_change() < 1e-12 || self.is_distinct(&guessed)) {
             return guessed;
         }
         let mut best = self.scan(None, q);

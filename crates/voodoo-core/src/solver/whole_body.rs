@@ -10,7 +10,7 @@ use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term, sphere};
+use crate::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term};
 
 /// Standard deviation of an axis that lies in another limb or below the floor, metres.
 const OVERLAP_SIGMA: f64 = 0.03;
@@ -129,7 +129,7 @@ impl WholeBody {
         let prior = Prior { holds, ..free };
         let limits = Limits { sigma: LIMIT_SIGMA };
         self.spheres.clear();
-        self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| sphere(&limb.shape, pose)));
+        self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
         let posture = Posture { share: POSTURE * config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });

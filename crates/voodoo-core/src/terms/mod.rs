@@ -14,7 +14,7 @@ mod surface;
 pub use contour::Contour;
 pub use floor::Floor;
 pub use limits::Limits;
-pub use penetration::{Penetration, sphere};
+pub use penetration::Penetration;
 pub use posture::Posture;
 pub use prior::Prior;
 pub use regions::Regions;

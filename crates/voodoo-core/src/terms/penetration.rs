@@ -18,15 +18,8 @@ const APPROXIMATE: f64 = 0.01;
 pub struct Penetration<'a> {
     /// Standard deviation of the overlap, metres.
     pub sigma: f64,
-    /// [`sphere`] of every limb: most are far from each other.
+    /// [`TaperedEllipticCylinder::sphere`] of every limb: most are far from each other.
     pub spheres: &'a [(Vec3, f64)],
-}
-
-/// Middle and radius of a sphere around a posed limb.
-pub fn sphere(shape: &TaperedEllipticCylinder, pose: &Pose) -> (Vec3, f64) {
-    let half = 0.5 * shape.length();
-    let radius = shape.a0().max(shape.a1()).max(shape.b0()).max(shape.b1());
-    (*pose * (Vec3::Z * half), half.hypot(radius))
 }
 
 impl Term for Penetration<'_> {
