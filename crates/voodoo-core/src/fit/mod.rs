@@ -19,7 +19,7 @@ use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::Pose;
 use crate::regions;
-use crate::solver::{Gate, Problem, Schedule, Solver, WarmStartInput, solver};
+use crate::solver::{Gate, Problem, Reassociation, Schedule, Solver, WarmStartInput, solver};
 
 /// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
 pub const CONTOUR_FROM: usize = 2;
@@ -112,7 +112,8 @@ impl Fit {
             }
             before = distance;
         }
-        self.match_last(context, poses);
+        // The last steps hardly moved anything: points keep their limbs, if they have any.
+        self.match_end(context, poses, steps == 0 || schedule.reassociation == Reassociation::EveryStep);
         steps
     }
 
@@ -146,10 +147,17 @@ impl Fit {
 
     /// The same after the last step, but for the contour: it moves nothing any more.
     pub fn match_last(&mut self, context: Context, poses: &[Pose]) {
+        self.match_end(context, poses, true);
+    }
+
+    /// The same; `anew` says whether points are assigned to limbs anew.
+    fn match_end(&mut self, context: Context, poses: &[Pose], anew: bool) {
         let gate = self.schedule(context.config).gate(context.config.max_steps);
-        self.assign(context, poses, &gate);
+        if anew {
+            self.assign(context, poses, &gate);
+        }
         self.contours.clear();
-        self.match_assigned(context, poses, &gate, true);
+        self.match_assigned(context, poses, &gate, anew);
         self.find_regions(context, poses, context.config.max_steps);
         self.claim_regions(context, poses);
     }

@@ -118,7 +118,8 @@ mod tests {
     #[test]
     fn a_chain_is_tried_less_the_longer_it_is_refused_until_it_asks() {
         let mut persistence = Persistence::default();
-        let tried: Vec<bool> = (0..(REST - 1) * WEARY + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
+        let tried: Vec<bool> =
+            (0..(REST - 1) * WEARY + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
         let due = |tried: &[bool]| tried.iter().filter(|due| **due).count();
         let eights = [0, 1, 2, 3].map(|eight| due(&tried[eight * WEARY..][..WEARY]));
         assert_eq!((eights, due(&tried[(REST - 1) * WEARY..])), ([8, 4, 3, 2], 10));
