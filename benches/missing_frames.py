@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from in_memory import InMemory
 
 from voodoo.measurements import DepthImage, RecordedFrame
 from voodoo.pipeline.run import start_tracker, track
@@ -30,23 +30,6 @@ SETTLED_S = 0.2
 WITHIN_M = 0.005
 KINDS = ("missing", "noise", "pixel")
 Joints = npt.NDArray[np.float64]
-
-
-@dataclass
-class Taken:
-    """Frames of a recording."""
-
-    source: Recording
-    frames: Sequence[RecordedFrame]
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.source, name)
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    def __iter__(self) -> Iterator[RecordedFrame]:
-        return iter(self.frames)
 
 
 @dataclass
@@ -69,7 +52,7 @@ class Found:
 
 def followed(source: Recording, frames: Sequence[RecordedFrame]) -> tuple[dict[float, Joints], tuple[str, ...]]:
     """Joints (J, 3) by stamp, and their names; frames without a body have none."""
-    taken, poses, names = Taken(source, frames), {}, ()
+    taken, poses, names = InMemory(source, frames), {}, ()
     for step in track(taken, start_tracker(taken), settings=FrontEndSettings.of(taken, use=USED)):  # type: ignore[arg-type]
         if step.estimate.joints:
             names = tuple(step.estimate.joint_names)

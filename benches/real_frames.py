@@ -10,39 +10,21 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from in_memory import InMemory
 
-from voodoo.measurements import ColorImage, RecordedFrame
+from voodoo.measurements import ColorImage
 from voodoo.pipeline.run import start_tracker, track
-from voodoo.recordings import Recording, open_recording
+from voodoo.recordings import open_recording
 from voodoo.sensors.settings import FrontEndSettings
 
 PICTURES = {"color", "skin"}
 """Kinds of inputs that look at colour pictures."""
-
-
-@dataclass
-class InMemory:
-    """A recording whose frames are read."""
-
-    source: Recording
-    frames: list[RecordedFrame]
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.source, name)
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    def __iter__(self) -> Iterator[RecordedFrame]:
-        return iter(self.frames)
 
 
 def in_memory(path: Path, use: set[str]) -> InMemory:

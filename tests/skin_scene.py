@@ -19,6 +19,7 @@ class Pose:
 
     def __init__(self, head, left, right):
         self.joints = {"head_center": at(head), "l_hand": at(left), "r_hand": at(right)}
+        self.joint_names, self.joint_positions = tuple(self.joints), np.array(list(self.joints.values()))
 
 
 def at(pixel, z=Z):

@@ -104,8 +104,8 @@ def test_rays_meet_where_most_of_them_agree():
     assert np.linalg.norm(met.position - place) < 0.005 and met.seen_by.tolist() == [True, True, False]
     assert 0.01 < met.sigma < 0.05
     assert place_of(rays[:1]) is None
-    assert place_of([rays[0], replace(rays[0], origin=rays[0].origin + (0.0, 0.01, 0.0))]) is None  # parallel
-    away = [replace(ray, direction=-ray.direction) for ray in rays[:2]]
+    assert place_of([rays[0], rays[0].moved((0.0, 0.01, 0.0))]) is None  # parallel
+    away = [SiteRay("l_wrist", ray.origin, -ray.direction, 0.02, "") for ray in rays[:2]]
     assert place_of(away) is None  # behind both cameras
 
 

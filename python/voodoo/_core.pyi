@@ -19,6 +19,9 @@ __all__ = [
     "KeypointLayout",
     "People",
     "PersonCandidate",
+    "SiteGate",
+    "SiteMotion",
+    "SiteRay",
     "SkinCue",
     "SkinTeacher",
     "StillDepth",
@@ -352,7 +355,7 @@ class SkinCue:
         self,
         teacher: SkinTeacher,
         image: npt.NDArray[np.uint8],
-        joints: npt.NDArray[np.float64],
+        predicted: Mapping[str, npt.NDArray[np.float64]],
         *,
         stamp: float,
         world_from_sensor: npt.NDArray[np.float64],
@@ -374,31 +377,120 @@ class SkinCue:
 class KeypointLayout:
     """A network's keypoints: of each site the keypoints with their shares, and its spread [m]."""
 
-    def __new__(cls, parts: Sequence[tuple[Sequence[tuple[int, float]], float]]) -> KeypointLayout: ...
+    def __new__(cls, parts: Sequence[tuple[str, Sequence[tuple[int, float]], float, float]]) -> KeypointLayout: ...
     def pixels(
         self, keypoints: npt.NDArray[np.float64], least: float
     ) -> list[tuple[tuple[float, float], float] | None]: ...
     def nearest(
         self,
         people: Sequence[npt.NDArray[np.float64]],
-        places: npt.NDArray[np.float64],
+        predicted: Mapping[str, npt.NDArray[np.float64]],
         *,
         world_from_sensor: npt.NDArray[np.float64],
         intrinsics: tuple[float, float, float, float],
         project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
         least: float,
     ) -> int | None: ...
-    def sights(
+    def observe(
         self,
         keypoints: npt.NDArray[np.float64],
-        places: npt.NDArray[np.float64],
+        predicted: Mapping[str, npt.NDArray[np.float64]],
         *,
+        stamp: float,
+        source: str,
         world_from_sensor: npt.NDArray[np.float64],
         intrinsics: tuple[float, float, float, float],
         lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
         noise: float,
+        place_sigma: float,
         least: float,
-    ) -> list[tuple[tuple[float, float], npt.NDArray[np.float64], float, float, float] | None]: ...
+        only: Sequence[str] | None,
+        gate: SiteGate | None,
+        surface: Callable[[tuple[float, float]], float | None] | None,
+        before: Mapping[str, float] | None,
+    ) -> tuple[list[SiteRay], list[tuple[str, npt.NDArray[np.float64], float]], list[str], list[str]]: ...
+
+@final
+class SiteMotion:
+    """Where sites will be; see voodoo.sensors.gating.SitePredictor."""
+
+    def __new__(cls, *, share: float, max_speed: float) -> SiteMotion: ...
+    def __copy__(self) -> SiteMotion: ...
+    def __len__(self) -> int: ...
+    def update(self, stamp: float, names: tuple[str, ...], positions: npt.NDArray[np.float64]) -> None: ...
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]: ...
+    def positions(self, stamp: float) -> npt.NDArray[np.float64]: ...
+
+@final
+class SiteGate:
+    """Which measurements of sites are near enough to be believed; see voodoo.sensors.gating.SiteGate."""
+
+    def __new__(cls, radius: float, growth: float, widest: float) -> SiteGate: ...
+    def __copy__(self) -> SiteGate: ...
+    def limit(self, site: str, source: str, stamp: float) -> float: ...
+    def accepts(self, site: str, distance: float, stamp: float, source: str) -> bool: ...
+    @property
+    def accepted(self) -> list[tuple[str, str, float]]: ...
+
+@final
+class SiteRay:
+    """A site was seen on a ray.
+
+    Args:
+        site: its name.
+        origin: focal point (3,) in the world [m].
+        direction: (3,) unit vector in the world.
+        sigma: standard deviation across the ray at the site [m].
+        source: name for `Estimate.sources`.
+        trust: factor of its weight, in [0, 1].
+        bias: it may always be this far off [m]; see `Frame.add_position`.
+        place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
+        place_sigma: standard deviation of `place` along the ray [m].
+    """
+
+    def __new__(
+        cls,
+        site: str,
+        origin: npt.ArrayLike,
+        direction: npt.ArrayLike,
+        sigma: float,
+        source: str,
+        trust: float = 1.0,
+        bias: float = 0.0,
+        place: npt.ArrayLike | None = None,
+        place_sigma: float = 0.04,
+    ) -> SiteRay: ...
+    @property
+    def site(self) -> str:
+        """Its name."""
+    @property
+    def origin(self) -> npt.NDArray[np.float64]:
+        """Focal point (3,) in the world [m]."""
+    @property
+    def direction(self) -> npt.NDArray[np.float64]:
+        """(3,) unit vector in the world."""
+    @property
+    def sigma(self) -> float:
+        """Standard deviation across the ray at the site [m]."""
+    @property
+    def source(self) -> str:
+        """Name for `Estimate.sources`."""
+    @property
+    def trust(self) -> float:
+        """Factor of its weight, in [0, 1]."""
+    @property
+    def bias(self) -> float:
+        """It may always be this far off [m]."""
+    @property
+    def place(self) -> npt.NDArray[np.float64] | None:
+        """(3,) where on the ray the site is [m], if a depth camera saw it; None: not known."""
+    @property
+    def place_sigma(self) -> float:
+        """Standard deviation of `place` along the ray [m]."""
+    def moved(self, shift: npt.ArrayLike) -> SiteRay:
+        """The ray of a site that has gone on by (3,) [m] since it was seen."""
+    def trusted(self, trust: float) -> SiteRay:
+        """The ray with another trust."""
 
 def carried(
     points: npt.NDArray[np.float64],
@@ -411,8 +503,9 @@ def carried(
     share: float,
     max_speed: float,
     distances: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float32]],
+    world_from_sensor: npt.NDArray[np.float64] | None = None,
 ) -> npt.NDArray[np.float64]:
-    """Points (N, 3) of the world that go on with the limb they lie on; see voodoo.sensors.motion.
+    """Points (N, 3) that go on with the limb they lie on; see voodoo.sensors.motion.
 
     Args:
         points: (N, 3) [m].
@@ -423,6 +516,7 @@ def carried(
         share: of the limbs' velocity that is believed.
         max_speed: points of a limb that is faster stay [m/s].
         distances: of places (N, 3) from each limb, (L, N) [m].
+        world_from_sensor: pose of the sensor in whose frame the points are; None: they are in the world.
     """
 
 def _estimate(
@@ -630,6 +724,9 @@ class Frame:
         Raises:
             MeasurementError: not three numbers.
         """
+    def _add_site_rays(
+        self, rays: Sequence[SiteRay], *, reference_sigma: float, max_weight: float, min_trust: float
+    ) -> int: ...
     def set_ground(self, *, normal: Sequence[float] | npt.NDArray[np.float64], offset: float = 0.0) -> None:
         """Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background.
 

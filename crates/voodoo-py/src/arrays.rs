@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::type_object::PyTypeInfo;
 use voodoo_core::Body;
 use voodoo_core::body::Limb;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
@@ -87,8 +88,30 @@ pub fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>>
     py.import("numpy")?.call_method1("require", (value, py.None(), wanted))
 }
 
+/// Rows of three numbers.
+pub fn rows<'a>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; 3]]> {
+    if array.dims()[1] == 3 {
+        return Ok(array.as_slice()?.as_chunks().0);
+    }
+    let text = format!("{name}: expected shape (N, 3), found {:?}", array.shape());
+    Err(exception(array.py(), "MeasurementError", text))
+}
+
+/// The entries of an array of double precision, C-contiguous and of some shape; none of anything else, masked ones too.
+///
+/// What follows the protocol of sequences gives numbers one by one, which takes many times as long.
+fn entries<const N: usize>(value: &Bound<'_, PyAny>, shape: &[usize]) -> Option<[f64; N]> {
+    let array = value.cast::<PyArrayDyn<f64>>().ok()?;
+    let plain = value.get_type().is(PyUntypedArray::type_object(value.py())) && array.shape() == shape;
+    let view = if plain { array.try_readonly().ok()? } else { return None };
+    view.as_slice().ok()?.try_into().ok()
+}
+
 /// A vector from anything with three numbers.
 pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
+    if let Some(numbers) = entries(value, &[3]) {
+        return Ok(Vec3::from_array(numbers));
+    }
     value
         .extract::<[f64; 3]>()
         .map(Vec3::from_array)
@@ -99,7 +122,10 @@ pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
 pub fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
     let Some(value) = value else { return Ok(Pose::identity()) };
     let wrong = || wrong_argument(value.py(), name, "a rigid 4x4 transform", value);
-    let rows: [[f64; 4]; 4] = value.extract().map_err(|_| wrong())?;
+    let rows: [[f64; 4]; 4] = match entries::<16>(value, &[4, 4]) {
+        Some(numbers) => [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| numbers[4 * row + column])),
+        None => value.extract().map_err(|_| wrong())?,
+    };
     let rotation = Mat3::from_cols_array_2d(&[
         [rows[0][0], rows[0][1], rows[0][2]],
         [rows[1][0], rows[1][1], rows[1][2]],

@@ -127,7 +127,7 @@ impl PyStillDepth {
         let (py, size) = (z.py(), [z.dims()[0], z.dims()[1]]);
         let image = z.as_array().iter().copied().collect();
         let pose = rows_of("world_from_sensor", &world_from_sensor)?;
-        let found = self.0.see(image, size, &pose).map_err(|error| error.into_py(py))?;
+        let found = self.0.see(image, size, &pose, size.map(|size| 0..size)).map_err(|error| error.into_py(py))?;
         let mask = |marks: Vec<bool>| PyArray1::from_vec(py, marks).reshape(size);
         found.map(|(still, before)| Ok((mask(still)?, mask(before)?))).transpose()
     }

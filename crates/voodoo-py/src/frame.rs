@@ -10,6 +10,7 @@ use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
 use crate::borrowed::{Borrowed, CloudData, ColorArray, ColorData, ColorView, DepthArray, Held, ImageData, SiteData};
 use crate::errors::{exception, wrong_argument};
+use crate::sites::PySiteRay;
 
 /// All measurements of one instant, from any number of sensors.
 ///
@@ -276,6 +277,39 @@ impl PyFrame {
         };
         self.sites.push(data);
         Ok(())
+    }
+
+    /// Rays with the weights of their standard deviations, those that are trusted; how many.
+    #[pyo3(signature = (rays, *, reference_sigma, max_weight, min_trust))]
+    fn _add_site_rays(
+        &mut self,
+        py: Python<'_>,
+        rays: Vec<PyRef<'_, PySiteRay>>,
+        reference_sigma: f64,
+        max_weight: f64,
+        min_trust: f64,
+    ) -> PyResult<usize> {
+        let weight = |sigma: f64| {
+            if sigma > 0.0 && sigma.is_finite() {
+                return Ok((reference_sigma / sigma).powi(2).min(max_weight));
+            }
+            Err(exception(py, "MeasurementError", format!("sigma: expected finite metres > 0, found {sigma}")))
+        };
+        let trusted = rays.iter().map(|ray| &ray.0).filter(|ray| ray.trust >= min_trust);
+        let mut count = 0;
+        for ray in trusted {
+            let source = self.source(&ray.source);
+            let data = |position, direction, weight| {
+                let (site, weight, bias) = (ray.site.clone(), weight * ray.trust, ray.bias);
+                SiteData { site, position, direction, weight, bias, source }
+            };
+            self.sites.push(data(ray.origin, Some(ray.direction), weight(ray.sigma)?));
+            if let Some(place) = ray.place {
+                self.sites.push(data(place, None, weight(ray.place_sigma)?));
+            }
+            count += 1;
+        }
+        Ok(count)
     }
 
     /// Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background.

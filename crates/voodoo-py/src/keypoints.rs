@@ -4,34 +4,30 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArra
 use pyo3::prelude::*;
 use voodoo_core::math::Vec3;
 use voodoo_core::observation::body_view::Matrix;
-use voodoo_core::observation::carried::Carrying;
+use voodoo_core::observation::carried::{Carrying, in_sensor, in_world};
 use voodoo_core::observation::eye::Eye;
-use voodoo_core::observation::keypoints::{Part, nearest_person};
+use voodoo_core::observation::keypoints::{Part, Sensor, Sighting, Told, nearest_person};
 
+use crate::arrays::rows;
 use crate::body_view::rows_of;
 use crate::errors::exception;
-use crate::skin::pairs;
+use crate::sites::{PySiteGate, PySiteRay, places_of};
+use crate::skin::{before, pairs};
 
 type Seen = ((f64, f64), f64);
-type Sight<'py> = ((f64, f64), Bound<'py, PyArray1<f64>>, f64, f64, f64);
+/// Site, number and share of each keypoint, spread, and how far it lies behind the surface.
+type Shares = (String, Vec<(usize, f64)>, f64, f64);
+type Observed<'py> = (Vec<PySiteRay>, Vec<(String, Bound<'py, PyArray1<f64>>, f64)>, Vec<String>, Vec<String>);
 
 #[pyclass(name = "KeypointLayout", module = "voodoo._core", frozen)]
 pub struct PyKeypointLayout(Vec<Part>);
 
-/// Rows of three numbers.
-fn rows<'a>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; 3]]> {
-    if array.dims()[1] == 3 {
-        return Ok(array.as_slice()?.as_chunks().0);
-    }
-    let text = format!("{name}: expected shape (N, 3), found {:?}", array.shape());
-    Err(exception(array.py(), "MeasurementError", text))
-}
-
 #[pymethods]
 impl PyKeypointLayout {
     #[new]
-    fn new(parts: Vec<(Vec<(usize, f64)>, f64)>) -> Self {
-        Self(parts.into_iter().map(|(shares, spread)| Part { shares, spread }).collect())
+    fn new(parts: Vec<Shares>) -> Self {
+        let part = |(site, shares, spread, behind)| Part { site, shares, spread, behind };
+        Self(parts.into_iter().map(part).collect())
     }
 
     /// Pixel and confidence of each part; none where it is not seen.
@@ -42,65 +38,94 @@ impl PyKeypointLayout {
     }
 
     /// Number of the person nearest to where the parts are expected.
-    #[pyo3(signature = (people, places, *, world_from_sensor, intrinsics, project, least))]
+    #[pyo3(signature = (people, predicted, *, world_from_sensor, intrinsics, project, least))]
     fn nearest<'py>(
         &self,
         people: Vec<PyReadonlyArray2<'py, f64>>,
-        places: PyReadonlyArray2<'py, f64>,
+        predicted: &Bound<'py, PyAny>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
         intrinsics: [f64; 4],
         project: Option<&Bound<'py, PyAny>>,
         least: f64,
     ) -> PyResult<Option<usize>> {
         let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, intrinsics };
-        let inside: Vec<[f64; 3]> =
-            rows("places", &places)?.iter().map(|place| eye.in_sensor(Vec3::from_array(*place)).to_array()).collect();
-        let expected = match project {
-            Some(project) => pairs(project, &inside)?,
-            None => inside
-                .iter()
-                .map(|place| if place[2] > 0.0 { eye.pixel(Vec3::from_array(*place)) } else { [f64::NAN; 2] })
-                .collect(),
-        };
+        let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
+        let (_, expected) = before(&eye, places, project)?;
         let people = people.iter().map(|keypoints| rows("keypoints", keypoints)).collect::<PyResult<Vec<_>>>()?;
         Ok(nearest_person(people.into_iter(), &self.0, &expected, least))
     }
 
-    /// Of each part that is seen pixel, direction, expected depth, distance from there and standard deviation of its ray.
-    #[pyo3(signature = (keypoints, places, *, world_from_sensor, intrinsics, lens, noise, least))]
+    /// Rays; sites with places and their standard deviations; names of those not seen, and of those that were dropped.
+    #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, intrinsics, lens, noise, place_sigma, least, only, gate, surface, before))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
-    fn sights<'py>(
+    fn observe<'py>(
         &self,
         py: Python<'py>,
         keypoints: PyReadonlyArray2<'py, f64>,
-        places: PyReadonlyArray2<'py, f64>,
+        predicted: &Bound<'py, PyAny>,
+        stamp: f64,
+        source: &str,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
         intrinsics: [f64; 4],
         lens: Option<&Bound<'py, PyAny>>,
         noise: f64,
+        place_sigma: f64,
         least: f64,
-    ) -> PyResult<Vec<Option<Sight<'py>>>> {
+        only: Option<Vec<String>>,
+        gate: Option<PyRefMut<'py, PySiteGate>>,
+        surface: Option<&Bound<'py, PyAny>>,
+        before: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Observed<'py>> {
         let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, intrinsics };
-        let (keypoints, places) = (rows("keypoints", &keypoints)?, rows("places", &places)?);
+        let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
         let seen: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
         let pixels: Vec<[f64; 2]> = seen.iter().map(|seen| seen.map_or([f64::NAN; 2], |seen| seen.pixel)).collect();
         let flat = match lens {
             Some(lens) => pairs(lens, &pixels)?,
             None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),
         };
-        let told = seen.iter().zip(&self.0).zip(flat.iter().zip(places)).map(|((seen, part), (flat, place))| {
-            let seen = (*seen)?;
-            let sight = seen.sight(&eye, *flat, Vec3::from_array(*place), part.spread, noise);
-            let direction = PyArray1::from_slice(py, &sight.direction.to_array());
-            Some(((seen.pixel[0], seen.pixel[1]), direction, sight.depth, sight.away, sight.sigma))
-        });
-        Ok(told.collect())
+        let (places, mut gate) = (self.places(predicted)?, gate);
+        let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for ((part, seen), (flat, place)) in self.0.iter().zip(seen).zip(flat.into_iter().zip(places)) {
+            let Some(seen) = seen else {
+                unseen.push(part.site.clone());
+                continue;
+            };
+            let Some(expected) = place.filter(|_| only.as_ref().is_none_or(|only| only.contains(&part.site))) else {
+                continue;
+            };
+            let pixel = (seen.pixel[0], seen.pixel[1]);
+            let surface: Option<f64> = match surface {
+                Some(surface) => surface.call1((pixel,))?.extract()?,
+                None => None,
+            };
+            let hidden: Option<f64> = match before {
+                Some(before) => before.call_method1("get", (&part.site,))?.extract()?,
+                None => None,
+            };
+            let sighting = Sighting { seen, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
+            match part.told(&sighting, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
+                Told::Ray(ray) => rays.push(PySiteRay(ray)),
+                Told::Place(place, sigma) => {
+                    points.push((part.site.clone(), PyArray1::from_slice(py, &place.to_array()), sigma));
+                }
+                Told::Dropped => dropped.push(part.site.clone()),
+            }
+        }
+        Ok((rays, points, unseen, dropped))
     }
 }
 
-/// Points in the world that go on with the limb that they lie on, as `distances` tells.
+impl PyKeypointLayout {
+    /// Where the sites are, in a mapping of names to places.
+    fn places(&self, places: &Bound<'_, PyAny>) -> PyResult<Vec<Option<Vec3>>> {
+        places_of(places, self.0.iter().map(|part| &*part.site))
+    }
+}
+
+/// Points of a sensor, or in the world, that go on with the limb that they lie on, as `distances` tells.
 #[pyfunction]
-#[pyo3(signature = (points, poses, before, *, interval, elapsed, near, share, max_speed, distances))]
+#[pyo3(signature = (points, poses, before, *, interval, elapsed, near, share, max_speed, distances, world_from_sensor=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn carried<'py>(
     py: Python<'py>,
@@ -113,8 +138,11 @@ pub fn carried<'py>(
     share: f64,
     max_speed: f64,
     distances: &Bound<'py, PyAny>,
+    world_from_sensor: Option<PyReadonlyArray2<'py, f64>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let mut moved = rows("points", &points)?.to_vec();
+    let pose = world_from_sensor.as_ref().map(|pose| rows_of("world_from_sensor", pose)).transpose()?;
+    pose.iter().for_each(|pose| in_world(&mut moved, pose));
     let (poses, before) = (matrices(&poses)?, matrices(&before)?);
     let carrying = Carrying { poses: &poses, before: &before, interval, elapsed, near, share, max_speed };
     let around = carrying.around(&moved);
@@ -124,6 +152,7 @@ pub fn carried<'py>(
         let away: PyReadonlyArray2<'py, f32> = distances.call1((chosen,))?.extract()?;
         carrying.carry(&mut moved, &around, away.as_slice()?);
     }
+    pose.iter().for_each(|pose| in_sensor(&mut moved, pose));
     PyArray1::from_slice(py, moved.as_flattened()).reshape([moved.len(), 3])
 }
 

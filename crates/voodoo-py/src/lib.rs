@@ -22,6 +22,7 @@ mod people;
 mod registration;
 mod render;
 mod shape;
+mod sites;
 mod skin;
 mod tracker;
 
@@ -57,6 +58,8 @@ mod _core {
     use super::render::render_depth;
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
+    #[pymodule_export]
+    use super::sites::{PySiteGate, PySiteMotion, PySiteRay};
     #[pymodule_export]
     use super::skin::{PySkinCue, PySkinTeacher, skin_candidates};
     #[pymodule_export]

@@ -5,7 +5,8 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use voodoo_core::error::TrackError;
-use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
+use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints};
+use voodoo_core::observation::window::Window;
 
 use crate::errors::{IntoPy, exception};
 

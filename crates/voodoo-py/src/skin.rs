@@ -1,5 +1,7 @@
 //! The skin cue of one camera: what is learnt, and what is followed.
 
+use std::sync::Arc;
+
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
@@ -12,8 +14,10 @@ use voodoo_core::skin::cue::{Look, SkinCue, SkinSettings};
 use voodoo_core::skin::rules::{Expected, LimbDistances};
 use voodoo_core::skin::teacher::{Pace, Shown, Teacher};
 
+use crate::arrays::rows;
 use crate::body_view::{PyBodyView, rows_of};
 use crate::errors::{IntoPy, exception};
+use crate::sites::places_of;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
 type Place = ((f64, f64), i32, usize, bool);
@@ -56,6 +60,20 @@ pub fn pairs<'py, const N: usize>(function: &Bound<'py, PyAny>, rows: &[[f64; N]
         return Err(exception(py, "MeasurementError", text));
     }
     Ok(found.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect())
+}
+
+/// Places before a camera, and their pixels.
+type Before = (Vec<[f64; 3]>, Vec<[f64; 2]>);
+
+/// Places of the world before a camera, metres, and their columns and rows; NaN behind it, and where its lens shows nothing.
+pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>, project: Option<&Bound<'_, PyAny>>) -> PyResult<Before> {
+    let inside: Vec<[f64; 3]> = places.map(|place| eye.in_sensor(place).to_array()).collect();
+    let pixel = |place: &[f64; 3]| if place[2] > 0.0 { eye.pixel(Vec3::from_array(*place)) } else { [f64::NAN; 2] };
+    let pixels = match project {
+        Some(project) => pairs(project, &inside)?,
+        None => inside.iter().map(pixel).collect(),
+    };
+    Ok((inside, pixels))
 }
 
 fn image_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<(&'a [[u8; 3]], [usize; 2])> {
@@ -106,31 +124,27 @@ impl PySkinTeacher {
         settled: u32,
     ) -> PyResult<()> {
         let eye = eye(&world_from_sensor, intrinsics)?;
-        let inside: Vec<[f64; 3]> = places
-            .as_array()
-            .rows()
-            .into_iter()
-            .map(|row| eye.in_sensor(Vec3::new(row[0], row[1], row[2])).into())
-            .collect();
-        let pixels = match project {
-            Some(project) => pairs(project, &inside)?,
-            None => inside.iter().map(|place| eye.pixel(Vec3::from_array(*place))).collect(),
-        };
+        let places = rows("places", &places)?.iter().map(|place| Vec3::from_array(*place));
+        let (inside, pixels) = before(&eye, places, project)?;
         let shown = |(site, (place, pixel)): (usize, (&[f64; 3], &[f64; 2]))| {
             let seen = place[2] > 0.1 && pixel.iter().all(|value| value.is_finite());
-            let found = cue.0.assigned.iter().any(|(other, _)| *other == site);
-            seen.then_some(Shown { pixel: *pixel, depth: place[2], head: cue.0.settings.is_head(site), found })
+            let found = cue.cue.assigned.iter().any(|(other, _)| *other == site);
+            seen.then_some(Shown { pixel: *pixel, depth: place[2], head: cue.cue.settings.is_head(site), found })
         };
         let sites: Vec<Shown> = inside.iter().zip(&pixels).enumerate().filter_map(shown).collect();
         let image = image.as_ref().map(image_of).transpose()?;
         let pace = Pace { focal: eye.focal(), half_life, every, settled };
-        py.detach(|| self.0.learn(&cue.0.picture, image, &sites, &pace));
+        py.detach(|| self.0.learn(&cue.cue.picture, image, &sites, &pace));
         Ok(())
     }
 }
 
 #[pyclass(name = "SkinCue", module = "voodoo._core")]
-pub struct PySkinCue(SkinCue);
+pub struct PySkinCue {
+    cue: SkinCue,
+    /// Of each site its name, and those of shoulder, elbow and hand of its side.
+    arms: Arc<Vec<[String; 4]>>,
+}
 
 #[pymethods]
 impl PySkinCue {
@@ -145,16 +159,23 @@ impl PySkinCue {
         unexplained: f64,
         ambiguity: f64,
     ) -> Self {
-        Self(SkinCue::new(SkinSettings { sites, gate, growth, lost_gate, widest_gate, unexplained, ambiguity }))
+        let arm = |site: &String| {
+            let side: String = site.chars().take(1).collect();
+            let [shoulder, elbow, hand] = ["shoulder", "elbow", "hand"].map(|joint| format!("{side}_{joint}"));
+            [site.clone(), shoulder, elbow, hand]
+        };
+        let arms = Arc::new(sites.iter().map(arm).collect());
+        let settings = SkinSettings { sites, gate, growth, lost_gate, widest_gate, unexplained, ambiguity };
+        Self { cue: SkinCue::new(settings), arms }
     }
 
     fn __copy__(&self) -> Self {
-        Self(self.0.twin())
+        Self { cue: self.cue.twin(), arms: Arc::clone(&self.arms) }
     }
 
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<bool>>>> {
-        let picture = &self.0.picture;
+        let picture = &self.cue.picture;
         if picture.skin.is_empty() {
             return Ok(None);
         }
@@ -164,18 +185,18 @@ impl PySkinCue {
 
     #[getter]
     fn candidates(&self) -> Vec<Place> {
-        self.0.candidates().iter().map(told).collect()
+        self.cue.candidates().iter().map(told).collect()
     }
 
     #[getter]
     fn assigned(&self) -> Vec<(usize, usize)> {
-        self.0.assigned.clone()
+        self.cue.assigned.clone()
     }
 
     /// Of all regions that are followed: site, pictures, stamp, velocity, how far from each site and how long in doubt.
     #[getter]
     fn followed(&self) -> Vec<Names> {
-        let blobs = self.0.blobs.items.iter();
+        let blobs = self.cue.blobs.items.iter();
         blobs
             .map(|blob| {
                 let velocity = blob.velocity.to_array().to_vec();
@@ -185,14 +206,14 @@ impl PySkinCue {
     }
 
     /// Looks for regions of skin and follows them; where their candidates are, none without any.
-    #[pyo3(signature = (teacher, image, joints, *, stamp, world_from_sensor, intrinsics, lens, body, settled, arm_lost, upper_arm_visible))]
+    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, intrinsics, lens, body, settled, arm_lost, upper_arm_visible))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn look<'py>(
         &mut self,
         py: Python<'py>,
         teacher: &PySkinTeacher,
         image: PyReadonlyArray3<'py, u8>,
-        joints: PyReadonlyArray3<'py, f64>,
+        predicted: &Bound<'py, PyAny>,
         stamp: f64,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
         intrinsics: [f64; 4],
@@ -203,27 +224,29 @@ impl PySkinCue {
         upper_arm_visible: Vec<bool>,
     ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let eye = eye(&world_from_sensor, intrinsics)?;
-        let joints = joints.as_array();
-        let count = self.0.settings.sites.len();
-        if joints.shape() != [count, 4, 3] || arm_lost.len() != count || upper_arm_visible.len() != count {
-            let text = format!("joints: expected shape ({count}, 4, 3), found {:?}", joints.shape());
-            return Err(exception(py, "MeasurementError", text));
+        let count = self.arms.len();
+        if arm_lost.len() != count || upper_arm_visible.len() != count {
+            let found = [arm_lost.len(), upper_arm_visible.len()];
+            return Err(exception(
+                py,
+                "MeasurementError",
+                format!("arms: expected {count} marks each, found {found:?}"),
+            ));
         }
+        let known = |place: &Vec3| !place.is_nan();
         let mut expected = Vec::new();
-        for site in 0..count {
-            let place = |row: usize| {
-                let place = Vec3::from_array([0, 1, 2].map(|axis| joints[[site, row, axis]]));
-                (!place.is_nan()).then_some(place)
-            };
-            let Some(here) = place(0) else { continue };
+        for (site, names) in self.arms.iter().enumerate() {
+            let places = places_of(predicted, names.iter().map(String::as_str))?;
+            let [here, shoulder, elbow, hand] = [0, 1, 2, 3].map(|index| places[index].filter(known));
+            let Some(here) = here else { continue };
             let inside = eye.in_sensor(here);
             if inside.is_finite() && inside.z > 0.1 {
                 expected.push(Expected {
                     site,
-                    head: self.0.settings.is_head(site),
+                    head: self.cue.settings.is_head(site),
                     place: here,
                     depth: inside.z,
-                    arm: [place(1), place(2), place(3)],
+                    arm: [shoulder, elbow, hand],
                     arm_lost: arm_lost[site],
                     upper_arm_visible: upper_arm_visible[site],
                 });
@@ -240,17 +263,17 @@ impl PySkinCue {
             expected: &expected,
             settled,
         };
-        py.detach(|| self.0.look(&look)).map_err(|error| error.into_py(py))?;
-        if self.0.candidates().is_empty() {
+        py.detach(|| self.cue.look(&look)).map_err(|error| error.into_py(py))?;
+        if self.cue.candidates().is_empty() {
             return Ok(None);
         }
-        let pixels: Vec<[f64; 2]> = self.0.candidates().iter().map(|item| item.pixel).collect();
+        let pixels: Vec<[f64; 2]> = self.cue.candidates().iter().map(|item| item.pixel).collect();
         let flat = match lens {
             Some(lens) => pairs(lens, &pixels)?,
             None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),
         };
         let directions: Vec<Vec3> = flat.into_iter().map(|xy| eye.direction(xy)).collect();
-        let sights = self.0.place(&directions, eye.origin(), eye.axis()).map_err(|error| error.into_py(py))?;
+        let sights = self.cue.place(&directions, eye.origin(), eye.axis()).map_err(|error| error.into_py(py))?;
         let places = sights.iter().flat_map(|sight| sight.place.to_array()).collect();
         PyArray1::from_vec(py, places).reshape([sights.len(), 3]).map(Some)
     }
@@ -266,7 +289,7 @@ impl PySkinCue {
     ) -> PyResult<Vec<Ray<'py>>> {
         let limbs = LimbDistances { names: limbs, away: away.as_slice()?.to_vec() };
         let strangers = strangers.as_ref().map(|away| away.as_slice()).transpose()?;
-        let found = self.0.name(&limbs, strangers).map_err(|error| error.into_py(py))?;
+        let found = self.cue.name(&limbs, strangers).map_err(|error| error.into_py(py))?;
         let row = |place: Vec3| PyArray1::from_slice(py, &place.to_array());
         let told = found.iter();
         Ok(told

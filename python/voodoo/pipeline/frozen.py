@@ -31,7 +31,7 @@ class FrozenSensors:
         measurements: Sequence[Measurement],
         *,
         use: Sequence[str],
-        idle: Callable[[Measurement], bool] = lambda item: False,
+        idle: Callable[[Measurement], bool] | None = None,
     ) -> list[Measurement]:
         """Those measurements whose sensor is not frozen.
 
@@ -41,11 +41,10 @@ class FrozenSensors:
         """
         repeats: list[Measurement] = []
         changes = False
-        for item in sorted(measurements, key=idle):
-            if idle(item) and not repeats:
+        for item in measurements if idle is None else sorted(measurements, key=idle):
+            if idle is not None and idle(item) and not repeats:
                 continue
-            adapter = next((known for known in adapters_of(item) if known.kind in use), None)
-            content = None if adapter is None else adapter.content(item)
+            content = _content(item, use)
             if content is None:
                 continue
             before = self._contents.get(item.sensor)
@@ -56,7 +55,16 @@ class FrozenSensors:
                 changes = changes or before is not None
         stuck = repeats if changes else []
         self.names = tuple(item.sensor for item in stuck)
+        if not stuck:
+            return list(measurements)
         return [item for item in measurements if not any(item is other for other in stuck)]
+
+
+def _content(item: Measurement, use: Sequence[str]) -> npt.NDArray[Any] | None:
+    for adapter in adapters_of(item):
+        if adapter.kind in use:
+            return adapter.content(item)
+    return None
 
 
 def _same(before: npt.NDArray[Any], content: npt.NDArray[Any]) -> bool:

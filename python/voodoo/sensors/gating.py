@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
 
+import voodoo._core as _core
 from voodoo.errors import MeasurementError
-from voodoo.sensors.pixels import FloatArray, lengths, ray_distance
-
-_NOWHERE = np.full(3, np.nan)
+from voodoo.sensors.pixels import FloatArray, ray_distance
 
 
 @dataclass
@@ -32,7 +31,7 @@ class SiteGate:
     radius: float = 0.15
     growth: float = 0.5
     widest: float = 0.40
-    _last: dict[tuple[str, str], float] = field(default_factory=dict, repr=False)
+    core: _core.SiteGate = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -41,17 +40,17 @@ class SiteGate:
                 f"gate: expected 0 < radius <= widest and growth >= 0, found radius {self.radius!r}, growth "
                 f"{self.growth!r}, widest {self.widest!r}"
             )
+        self.core = _core.SiteGate(self.radius, self.growth, self.widest)
 
     def __copy__(self) -> SiteGate:
         """The same, with a memory of its own."""
         twin = SiteGate.__new__(SiteGate)
-        vars(twin).update(vars(self), _last=dict(self._last))
+        vars(twin).update(vars(self), core=copy(self.core))
         return twin
 
     def limit(self, site: str, source: str, stamp: float) -> float:
         """Radius [m] of a site's gate at `stamp` [s]."""
-        waited = max(stamp - self._last.setdefault((site, source), stamp), 0.0)
-        return min(self.radius + self.growth * waited, self.widest)
+        return self.core.limit(site, source, stamp)
 
     def accepts_ray(
         self, site: str, predicted: FloatArray, origin: FloatArray, direction: FloatArray, stamp: float, source: str
@@ -67,10 +66,7 @@ class SiteGate:
 
     def accepts(self, site: str, distance: float, stamp: float, source: str) -> bool:
         """Whether a measurement this far [m] from the predicted site is near enough."""
-        if distance > self.limit(site, source, stamp):
-            return False
-        self._last[site, source] = stamp
-        return True
+        return self.core.accepts(site, distance, stamp, source)
 
 
 @dataclass
@@ -84,25 +80,21 @@ class SitePredictor:
 
     velocity_share: float = 0.6
     max_speed: float = 8.0
-    _names: tuple[str, ...] = field(default=(), repr=False)
-    _stamp: float = field(default=float("nan"), repr=False)
-    _positions: FloatArray = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
-    _velocity: FloatArray = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
+    core: _core.SiteMotion = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """No estimate yet."""
+        self.core = _core.SiteMotion(share=self.velocity_share, max_speed=self.max_speed)
+
+    def __copy__(self) -> SitePredictor:
+        """The same, with a memory of its own."""
+        twin = SitePredictor.__new__(SitePredictor)
+        vars(twin).update(vars(self), core=copy(self.core))
+        return twin
 
     def update(self, stamp: float, names: tuple[str, ...], positions: FloatArray) -> None:
         """Take up an estimate's named positions (J, 3) [m]; a NaN stamp (after a reset) forgets the velocity."""
-        velocity = np.zeros_like(positions)
-        if stamp > self._stamp:
-            before = self._positions
-            if names != self._names:
-                known = dict(zip(self._names, before, strict=True))
-                before = np.array([known.get(name, _NOWHERE) for name in names])
-            velocity = (positions - before) / (stamp - self._stamp)
-            speeds = lengths(velocity)
-            # NaN: the site is new.
-            if not speeds.max(initial=0.0) <= self.max_speed:
-                velocity[~(speeds <= self.max_speed)] = 0.0
-        self._names, self._stamp, self._positions, self._velocity = names, stamp, positions, velocity
+        self.core.update(stamp, names, positions)
 
     def predict(self, stamp: float) -> dict[str, FloatArray]:
         """Site name -> (3,) [m] at `stamp` [s].
@@ -110,7 +102,8 @@ class SitePredictor:
         Raises:
             MeasurementError: no estimate yet.
         """
-        return dict(zip(self._names, self.positions(stamp), strict=True))
+        self._check()
+        return self.core.predict(stamp)
 
     def positions(self, stamp: float) -> FloatArray:
         """The same of all sites (J, 3) [m].
@@ -118,7 +111,9 @@ class SitePredictor:
         Raises:
             MeasurementError: no estimate yet.
         """
-        if not self._names:
+        self._check()
+        return self.core.positions(stamp)
+
+    def _check(self) -> None:
+        if not len(self.core):
             raise MeasurementError("prediction: expected an estimate first, found none")
-        elapsed = self.velocity_share * (stamp - self._stamp) if math.isfinite(self._stamp) else 0.0
-        return np.asarray(self._positions + elapsed * self._velocity)

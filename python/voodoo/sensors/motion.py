@@ -49,14 +49,20 @@ class LimbMotion:
         return self._before is not None and abs(elapsed) >= _SAME_S
 
     def motion_compensated(
-        self, points: FloatArray, elapsed: float, distances: Callable[[FloatArray], npt.NDArray[np.floating[Any]]]
-    ) -> FloatArray:
-        """Places (N, 3) [m] at the frame's time of points (N, 3) in the world, seen `elapsed` seconds before it.
+        self,
+        points: npt.NDArray[Any],
+        elapsed: float,
+        distances: Callable[[FloatArray], npt.NDArray[np.floating[Any]]],
+        *,
+        world_from_sensor: FloatArray | None = None,
+    ) -> npt.NDArray[Any]:
+        """Places (N, 3) [m] at the frame's time of points (N, 3), seen `elapsed` seconds before it.
 
         Args:
-            points: in the world.
+            points: in the frame of a sensor.
             elapsed: negative for a sensor that measured after the frame's time.
             distances: of places (N, 3) from each limb, (L, N) [m]; see `Tracker.limb_distances`.
+            world_from_sensor: pose of the sensor; None: the points are in the world.
         """
         if self._before is None or self._poses is None or not self.moves(elapsed):
             return points
@@ -71,4 +77,5 @@ class LimbMotion:
             share=self.velocity_share,
             max_speed=self.max_speed,
             distances=lambda places: np.asarray(distances(places), dtype=np.float32),
+            world_from_sensor=world_from_sensor,
         )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo._core import Frame
 from voodoo.sensors.model import SensorModel
 from voodoo.sensors.pixels import FloatArray
@@ -16,36 +16,7 @@ _STEPS = 20
 _MOVED_M = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class SiteRay:
-    """A site was seen on a ray.
-
-    Args:
-        site: its name.
-        origin: focal point (3,) in the world [m].
-        direction: (3,) unit vector in the world.
-        sigma: standard deviation across the ray at the site [m].
-        source: name for `Estimate.sources`.
-        trust: factor of its weight, in [0, 1].
-        bias: it may always be this far off [m]; see `Frame.add_position`.
-        place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
-        place_sigma: standard deviation of `place` along the ray [m].
-    """
-
-    site: str
-    origin: FloatArray
-    direction: FloatArray
-    sigma: float
-    source: str
-    trust: float = 1.0
-    bias: float = 0.0
-    place: FloatArray | None = None
-    place_sigma: float = 0.04
-
-    def moved(self, shift: FloatArray) -> SiteRay:
-        """The ray of a site that has gone on by (3,) [m] since it was seen."""
-        place = None if self.place is None else self.place + shift
-        return replace(self, origin=self.origin + shift, place=place)
+SiteRay = _core.SiteRay
 
 
 def agreed(
@@ -70,7 +41,7 @@ def agreed(
         information = np.array([rays[index].trust / rays[index].sigma ** 2 for index in members])
         start = np.asarray(predicted[site], dtype=np.float64)
         for index, trust in zip(members, _trust(origins, directions, information, start, scale), strict=True):
-            result[index] = replace(result[index], trust=result[index].trust * float(trust))
+            result[index] = result[index].trusted(result[index].trust * float(trust))
     return result
 
 
@@ -101,16 +72,12 @@ def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_t
 
     Returns:
         How many were added.
+
+    Raises:
+        MeasurementError: a standard deviation that is not a number above zero.
     """
-    count = 0
-    for ray in rays:
-        if ray.trust >= min_trust:
-            weight = model.weight(ray.sigma) * ray.trust
-            frame.add_ray(
-                ray.site, origin=ray.origin, direction=ray.direction, weight=weight, bias=ray.bias, source=ray.source
-            )
-            if ray.place is not None:
-                along = model.weight(ray.place_sigma) * ray.trust
-                frame.add_position(ray.site, ray.place, weight=along, bias=ray.bias, source=ray.source)
-            count += 1
-    return count
+    if not rays:
+        return 0
+    return frame._add_site_rays(
+        rays, reference_sigma=model.reference_sigma, max_weight=model.max_weight, min_trust=min_trust
+    )

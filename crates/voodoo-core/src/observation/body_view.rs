@@ -7,8 +7,9 @@ use std::sync::Arc;
 use crate::error::TrackError;
 use crate::observation::depth_view::NEAREST_SEEN;
 use crate::observation::frame::DepthPixels;
-use crate::observation::registration::{MeasuredPixels, ProjectedPoints, Window};
+use crate::observation::registration::{MeasuredPixels, ProjectedPoints};
 use crate::observation::still::still;
+use crate::observation::window::Window;
 
 /// A pose whose entries change by less is that of a camera that stands.
 const CAMERA_STANDS: f64 = 1e-3;
@@ -41,7 +42,7 @@ impl BodyView {
     }
 }
 
-/// Of every pixel whether it shows what may be the scene, and whether something before what was seen there once.
+/// Of every pixel that is looked at whether it shows what may be the scene, and whether something before what was seen there once.
 pub type Standing = (Vec<bool>, Vec<bool>);
 
 /// What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind which
@@ -77,11 +78,17 @@ impl StillDepth {
     /// Takes up an image, metres, 0 = no return, of so many rows and columns; a camera that has moved starts anew.
     ///
     /// Of every pixel whether it shows what may be the scene, and whether something before what was seen there once; none as long
-    /// as too little was seen.
+    /// as too little was seen. Nothing is told of pixels outside some rows and columns.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when the image is not of that size.
-    pub fn see(&mut self, z: Vec<f32>, size: [usize; 2], pose: &Matrix) -> Result<Option<Standing>, TrackError> {
+    pub fn see(
+        &mut self,
+        z: Vec<f32>,
+        size: [usize; 2],
+        pose: &Matrix,
+        within: [Range<usize>; 2],
+    ) -> Result<Option<Standing>, TrackError> {
         let entries = self.pose.as_flattened().iter().zip(pose.as_flattened());
         let moved = entries.into_iter().any(|(before, now)| !((before - now).abs() <= CAMERA_STANDS));
         if self.farthest.is_empty() || moved || self.size != size || self.farthest.len() != z.len() {
@@ -96,7 +103,7 @@ impl StillDepth {
             self.spare.push_back(std::mem::replace(&mut self.farthest, Arc::new(farthest)));
         }
         let found = match self.last.front() {
-            Some(then) if self.last.len() == STAYS_PICTURES => Some(still(&z, &self.farthest, then, size[1])?),
+            Some(then) if self.last.len() == STAYS_PICTURES => Some(still(&z, &self.farthest, then, size[1], within)?),
             _ => None,
         };
         if self.last.len() == STAYS_PICTURES {
@@ -173,10 +180,11 @@ impl Beside<'_> {
         let [rows, columns] = self.window(low, high).map(|span| span.start.div_ceil(step)..span.end.div_ceil(step));
         let mut scene = scene;
         let depth = self.metres(scene.as_mut().map_or_else(Vec::new, |scene| scene.image()));
+        let within = [rows.clone(), columns.clone()];
         let window = Window { depth: &depth, size, rays: self.rays, camera: self.size, step, rows, columns };
         let (points, pixels) = window.within(low, high, &self.world_from_depth, &self.color_from_depth)?;
         let standing = match scene {
-            Some(scene) => scene.see(depth, size, &self.world_from_depth)?,
+            Some(scene) => scene.see(depth, size, &self.world_from_depth, within)?,
             None => None,
         };
         let at = |marks: Vec<bool>| pixels.iter().map(|index| marks[*index as usize]).collect();
@@ -280,7 +288,7 @@ mod tests {
         let mut scene = StillDepth::default();
         for count in 0..9 {
             let twin = scene.twin();
-            let found = scene.see(vec![3.0; 12], [3, 4], &LEVEL).unwrap();
+            let found = scene.see(vec![3.0; 12], [3, 4], &LEVEL, [0..3, 0..4]).unwrap();
             assert_eq!(found.is_some(), count >= STAYS_PICTURES, "{count}");
             assert_eq!(twin.last.len(), count.min(STAYS_PICTURES));
         }
@@ -288,11 +296,11 @@ mod tests {
         let mut hand = vec![3.0; 12];
         hand[5] = 2.0;
         hand[11] = f32::NAN;
-        let (still, before) = scene.see(hand, [3, 4], &LEVEL).unwrap().unwrap();
+        let (still, before) = scene.see(hand, [3, 4], &LEVEL, [0..3, 0..4]).unwrap().unwrap();
         assert_eq!((still[5], before[5], still[0]), (false, true, true));
         assert!(scene.farthest()[11].is_nan() && twin.farthest() == [3.0; 12]);
         let moved = [[1.0, 0.0, 0.0, 0.01], LEVEL[1], LEVEL[2], LEVEL[3]];
-        assert!(scene.see(vec![3.0; 12], [3, 4], &moved).unwrap().is_none());
+        assert!(scene.see(vec![3.0; 12], [3, 4], &moved, [0..3, 0..4]).unwrap().is_none());
     }
 
     #[test]

@@ -5,6 +5,23 @@ use crate::observation::body_view::Matrix;
 /// No limb is longer, metres: what is farther from all their origins is on none.
 const LONGEST_LIMB: f64 = 1.0;
 
+/// Places of the world of points in a sensor's frame, metres.
+pub fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
+    for point in points {
+        let [x, y, z] = *point;
+        *point = [0, 1, 2].map(|axis| pose[axis][0] * x + pose[axis][1] * y + pose[axis][2] * z + pose[axis][3]);
+    }
+}
+
+/// The other way round.
+pub fn in_sensor(points: &mut [[f64; 3]], pose: &Matrix) {
+    for point in points {
+        let offset = [0, 1, 2].map(|axis| point[axis] - pose[axis][3]);
+        // Of a rigid pose the inverse turns back.
+        *point = [0, 1, 2].map(|axis| (0..3).map(|row| offset[row] * pose[row][axis]).sum());
+    }
+}
+
 /// How limbs moved, and how far points may go on with them.
 #[derive(Clone, Copy, Debug)]
 pub struct Carrying<'a> {
@@ -118,5 +135,9 @@ mod tests {
         let mut jumped = points;
         Carrying { max_speed: 0.1, ..carrying }.carry(&mut jumped, &[0], &[0.1]);
         assert_eq!(jumped, points);
+        let mut there = points;
+        in_world(&mut there, &poses[0]);
+        in_sensor(&mut there, &poses[0]);
+        assert!(there.iter().flatten().zip(points.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 }

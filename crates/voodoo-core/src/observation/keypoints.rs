@@ -2,14 +2,24 @@
 
 use crate::math::Vec3;
 use crate::observation::eye::Eye;
+use crate::observation::sites::{SiteGate, SiteRay};
+
+/// Standard deviation along a ray of a place on it, where none is told, metres.
+const ALONG_SIGMA: f64 = 0.04;
+/// Standard deviation of a site behind so many metres of the person's own body, beyond half a limb: the network guesses it.
+const GUESSED: f64 = 0.4;
 
 /// A site, and the keypoints that it is made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
+    /// Its name.
+    pub site: String,
     /// Number and share of each.
     pub shares: Vec<(usize, f64)>,
     /// How far the network's idea of the site lies from ours, metres.
     pub spread: f64,
+    /// How far behind the visible surface it lies, metres.
+    pub behind: f64,
 }
 
 /// A site seen in a picture.
@@ -37,28 +47,84 @@ impl Part {
     }
 }
 
-/// A site on the ray on which it was seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SiteSight {
-    /// Unit vector in the world; NaN where the lens cannot be inverted.
-    pub direction: Vec3,
-    /// Of the place where the site is expected, along the optical axis, metres.
-    pub depth: f64,
-    /// From that place to the ray, metres.
-    pub away: f64,
-    /// Standard deviation across the ray, metres.
-    pub sigma: f64,
+/// The camera of a picture, and how its keypoints become measurements.
+#[derive(Clone, Copy, Debug)]
+pub struct Sensor<'a> {
+    /// Where it stands.
+    pub eye: Eye,
+    /// Its name.
+    pub source: &'a str,
+    /// Standard deviation of a keypoint that is believed, pixels.
+    pub noise: f64,
+    /// Least standard deviation of a place by a depth camera, metres: how well it is known how far behind a surface a site lies.
+    pub place_sigma: f64,
+    /// Time of the frame, seconds.
+    pub stamp: f64,
 }
 
-impl SitePixel {
-    /// The ray behind `flat`, the pixel without the lens (`x/z`, `y/z`), for a site that is expected at a place of the world.
-    pub fn sight(&self, eye: &Eye, flat: [f64; 2], place: Vec3, spread: f64, noise: f64) -> SiteSight {
-        let direction = eye.direction(flat);
-        let depth = eye.in_sensor(place).z;
-        let offset = place - eye.origin();
+/// A site that was seen, and what else is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sighting {
+    /// Where in the picture.
+    pub seen: SitePixel,
+    /// The pixel without the lens: `x/z` and `y/z`, NaN where that is not known.
+    pub flat: [f64; 2],
+    /// Where the site is expected, world, metres.
+    pub expected: Vec3,
+    /// How much of the person's own body lies before it, metres.
+    pub hidden: f64,
+    /// What a depth camera sees there, along the optical axis, metres.
+    pub surface: Option<f64>,
+}
+
+/// What a site that was seen becomes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    /// A ray.
+    Ray(SiteRay),
+    /// A place in the world, and its standard deviation, metres.
+    Place(Vec3, f64),
+    /// Nothing: it is too far from where the site is expected, or the lens shows nothing there.
+    Dropped,
+}
+
+impl Part {
+    /// What a sighting becomes: a place where a depth camera sees a surface that is near enough, else a ray that passes near enough.
+    pub fn told(&self, sighting: &Sighting, sensor: &Sensor, mut gate: Option<&mut SiteGate>) -> Told {
+        let (eye, expected) = (&sensor.eye, sighting.expected);
+        let direction = eye.direction(sighting.flat);
+        let depth = eye.in_sensor(expected).z;
+        let offset = expected - eye.origin();
         let away = (offset - offset.dot(direction).max(0.0) * direction).length();
-        let across = noise / self.confidence.min(1.0) * depth / eye.focal();
-        SiteSight { direction, depth, away, sigma: across.hypot(spread) }
+        if !(depth > 0.0 && away >= 0.0) {
+            return Told::Dropped;
+        }
+        let across = sensor.noise / sighting.seen.confidence.min(1.0) * depth / eye.focal();
+        let sigma = across.hypot(self.spread);
+        let mut accepts = |distance: f64, source: &str| {
+            gate.as_deref_mut().is_none_or(|gate| gate.accepts(&self.site, distance, sensor.stamp, source))
+        };
+        if let Some(surface) = sighting.surface {
+            let place = eye.origin() + direction * (surface / direction.dot(eye.axis()) + self.behind);
+            if accepts(place.distance(expected), "points") {
+                return Told::Place(place, sigma.max(sensor.place_sigma));
+            }
+        }
+        if !accepts(away, sensor.source) {
+            return Told::Dropped;
+        }
+        let hidden = sighting.hidden - self.behind;
+        Told::Ray(SiteRay {
+            site: self.site.clone(),
+            origin: eye.origin(),
+            direction,
+            sigma: if hidden > 0.0 { sigma.hypot(GUESSED * hidden) } else { sigma },
+            source: sensor.source.to_owned(),
+            trust: 1.0,
+            bias: 0.0,
+            place: None,
+            place_sigma: ALONG_SIGMA,
+        })
     }
 }
 
@@ -93,7 +159,7 @@ mod tests {
     use super::*;
 
     fn part(shares: &[(usize, f64)]) -> Part {
-        Part { shares: shares.to_vec(), spread: 0.02 }
+        Part { site: "l_wrist".to_owned(), shares: shares.to_vec(), spread: 0.02, behind: 0.03 }
     }
 
     #[test]
@@ -119,5 +185,35 @@ mod tests {
         assert_eq!(choose(&[&far, &near], &expected), Some(1));
         assert_eq!(choose(&[], &expected), None);
         assert_eq!(choose(&[&near], &[[f64::NAN; 2]; 3]), None);
+    }
+    #[test]
+    fn what_was_seen_becomes_a_ray_or_a_place_or_is_dropped() {
+        let world_from_sensor =
+            [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+        let eye = Eye { world_from_sensor, intrinsics: [300.0, 300.0, 160.0, 120.0] };
+        let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
+        let seen = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
+        let sighting =
+            Sighting { seen, flat: [0.0; 2], expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
+        let wrist = part(&[(0, 1.0)]);
+        let mut gate = SiteGate::new(0.1, 0.0, 0.1);
+        let sigma = |told: Told| match told {
+            Told::Ray(ray) => ray.sigma,
+            _ => f64::NAN,
+        };
+        let clear = sigma(wrist.told(&sighting, &sensor, Some(&mut gate)));
+        assert!((clear - 0.02_f64.hypot(0.02)).abs() < 1e-12);
+        let behind = Sighting { hidden: 0.13, ..sighting };
+        assert!((sigma(wrist.told(&behind, &sensor, None)) - clear.hypot(0.04)).abs() < 1e-12);
+        let deep = Sighting { surface: Some(1.95), ..sighting };
+        let Told::Place(place, least) = wrist.told(&deep, &sensor, Some(&mut gate)) else { panic!("a place") };
+        assert!(place.distance(Vec3::new(0.0, 0.0, 1.98)) < 1e-12 && least == 0.03);
+        let before = Sighting { surface: Some(1.0), ..sighting };
+        assert!(matches!(wrist.told(&before, &sensor, Some(&mut gate)), Told::Ray(_)), "what hides it is refused");
+        let far = Sighting { expected: Vec3::new(0.2, 0.0, 2.0), ..sighting };
+        assert_eq!(wrist.told(&far, &sensor, Some(&mut gate)), Told::Dropped);
+        for wrong in [Sighting { flat: [f64::NAN; 2], ..sighting }, Sighting { expected: -Vec3::Z, ..sighting }] {
+            assert_eq!(wrist.told(&wrong, &sensor, None), Told::Dropped);
+        }
     }
 }

@@ -3,128 +3,8 @@
 use std::ops::Range;
 
 use crate::error::TrackError;
-use crate::math::widest;
 use crate::observation::far_edges::far_edges;
 use crate::observation::masks::grown;
-
-/// Part of a depth image (metres, along the optical axis) in which the body is expected.
-#[derive(Clone, Debug)]
-pub struct Window<'a> {
-    /// Depths, row by row; what is not finite and above zero is no return.
-    pub depth: &'a [f32],
-    /// Rows and columns of that image.
-    pub size: [usize; 2],
-    /// `(x/z, y/z)` of every pixel of the camera, row by row.
-    pub rays: &'a [[f32; 2]],
-    /// Rows and columns of the camera.
-    pub camera: [usize; 2],
-    /// The image has every so-many-th row and column of the camera.
-    pub step: usize,
-    /// Rows of the image that are looked at.
-    pub rows: Range<usize>,
-    /// And columns.
-    pub columns: Range<usize>,
-}
-
-impl Window<'_> {
-    fn check(&self) -> Result<(), TrackError> {
-        let [height, width] = self.size;
-        let fits = self.step > 0
-            && self.size.iter().zip(&self.camera).all(|(size, camera)| *size == camera.div_ceil(self.step.max(1)))
-            && self.camera[0].checked_mul(self.camera[1]) == Some(self.rays.len())
-            && height.checked_mul(width) == Some(self.depth.len());
-        if fits && self.rows.end <= height && self.columns.end <= width {
-            return Ok(());
-        }
-        let found = format!(
-            "{} depths for {:?}, {} rays for {:?}, step {}, rows {:?} and columns {:?}",
-            self.depth.len(),
-            self.size,
-            self.rays.len(),
-            self.camera,
-            self.step,
-            self.rows,
-            self.columns
-        );
-        Err(TrackError::measurement(
-            "window",
-            "a depth, and a ray, for every pixel, and rows and columns of them",
-            found,
-        ))
-    }
-
-    /// The points within the box from `low` to `high` (world, metres), in the frame of another camera, metres; and the index
-    /// of each one's pixel in the image.
-    ///
-    /// # Errors
-    /// [`TrackError::Measurement`] when sizes do not fit together.
-    pub fn within(
-        &self,
-        low: [f64; 3],
-        high: [f64; 3],
-        world_from_sensor: &[[f64; 4]; 4],
-        other_from_sensor: &[[f64; 4]; 4],
-    ) -> Result<(Vec<[f64; 3]>, Vec<isize>), TrackError> {
-        self.check()?;
-        let to_world = world_from_sensor.map(|row| row.map(|entry| entry as f32));
-        // Values of single precision are between these where they are between the corners.
-        let (low, high) = (low.map(below), high.map(|value| -below(-value)));
-        let (mut points, mut pixels) = (Vec::new(), Vec::new());
-        let mut inside = vec![false; self.columns.len()];
-        for row in self.rows.clone() {
-            let first = row * self.size[1];
-            let depths = &self.depth[first..][self.columns.clone()];
-            let rays = &self.rays[(row * self.camera[1] + self.columns.start) * self.step..];
-            widest(
-                #[inline(always)]
-                || {
-                    // One column after the other fills whole registers.
-                    if self.step == 1 {
-                        gate(&mut inside, depths.iter().zip(rays), (low, high), &to_world);
-                    } else {
-                        gate(&mut inside, depths.iter().zip(rays.iter().step_by(self.step)), (low, high), &to_world);
-                    }
-                },
-            );
-            for (offset, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
-                let (z, ray) = (depths[offset], rays[offset * self.step]);
-                let [x, y, z] = [ray[0] * z, ray[1] * z, z].map(f64::from);
-                points.push([0, 1, 2].map(|axis| {
-                    let turn = &other_from_sensor[axis];
-                    turn[0] * x + turn[1] * y + turn[2] * z + turn[3]
-                }));
-                pixels.push((first + self.columns.start + offset) as isize);
-            }
-        }
-        Ok((points, pixels))
-    }
-}
-
-/// The greatest value of single precision that is not above another one.
-fn below(value: f64) -> f32 {
-    let near = value as f32;
-    if f64::from(near) > value { near.next_down() } else { near }
-}
-
-/// Which depths along rays are returns from within a box (world, metres).
-#[inline(always)]
-fn gate<'a>(
-    inside: &mut [bool],
-    pixels: impl Iterator<Item = (&'a f32, &'a [f32; 2])>,
-    (low, high): ([f32; 3], [f32; 3]),
-    to_world: &[[f32; 4]; 4],
-) {
-    for (inside, (z, ray)) in inside.iter_mut().zip(pixels) {
-        let (x, y) = (ray[0] * z, ray[1] * z);
-        let mut passes = z.is_finite() & (*z > 0.0);
-        for axis in 0..3 {
-            let turn = &to_world[axis];
-            let place = turn[0] * x + turn[1] * y + turn[2] * z + turn[3];
-            passes &= (place > low[axis]) & (place < high[axis]);
-        }
-        *inside = passes;
-    }
-}
 
 /// Sums with numbers of a picture's size have no digits left for fractions of them: three times 2^51.
 const NO_FRACTION: f64 = (1_u64 << 52) as f64 + (1_u64 << 51) as f64;
@@ -139,10 +19,6 @@ fn nearest_whole(value: f64) -> f64 {
 /// Points in a picture of so many rows and columns.
 #[derive(Clone, Debug)]
 pub struct ProjectedPoints {
-    /// 1 where a point is, row by row.
-    pub seen: Vec<u8>,
-    /// 1 where a marked point is; empty without marks.
-    pub marked: Vec<u8>,
     /// Indices of the points that lie in the picture.
     pub inside: Vec<isize>,
     /// Rows that hold them.
@@ -151,6 +27,8 @@ pub struct ProjectedPoints {
     pub columns: Range<usize>,
     /// Depth of the nearest point in each pixel of those, infinite where none is.
     pub nearest: Vec<f32>,
+    /// 1 in each pixel of those where a marked point is; none without marks.
+    pub marked: Option<Vec<u8>>,
 }
 
 impl ProjectedPoints {
@@ -185,19 +63,16 @@ impl ProjectedPoints {
         }
         let [rows, columns] = [0, 1].map(|axis| low[axis].min(high[axis])..high[axis]);
         let mut nearest = vec![f32::INFINITY; rows.len() * columns.len()];
-        let mut seen = vec![0; height * width];
-        let mut marked = vec![0; if marks.is_some() { seen.len() } else { 0 }];
+        let mut marked = marks.map(|_| vec![0; nearest.len()]);
         for (&index, [row, column]) in inside.iter().zip(cells) {
             let index = index as usize;
-            let place = row * width + column;
-            seen[place] = 1;
-            if marks.is_some_and(|marks| marks[index]) {
-                marked[place] = 1;
+            let place = (row - rows.start) * columns.len() + column - columns.start;
+            if let (Some(marks), Some(marked)) = (marks, &mut marked) {
+                marked[place] |= u8::from(marks[index]);
             }
-            let least = &mut nearest[(row - rows.start) * columns.len() + column - columns.start];
-            *least = least.min(points[index][2] as f32);
+            nearest[place] = nearest[place].min(points[index][2] as f32);
         }
-        Ok(Self { seen, marked, inside, rows, columns, nearest })
+        Ok(Self { inside, rows, columns, nearest, marked })
     }
 }
 
@@ -216,32 +91,49 @@ impl ProjectedPoints {
         reach: usize,
         [height, width]: [usize; 2],
     ) -> Result<(Vec<bool>, Option<Vec<bool>>), TrackError> {
-        if beyond.len() != self.seen.len() || height.checked_mul(width) != Some(beyond.len()) {
-            let found = format!("{} for {}", beyond.len(), self.seen.len());
+        if height.checked_mul(width) != Some(beyond.len()) || self.rows.end > height || self.columns.end > width {
+            let found = format!("{} for {height} rows of {width}", beyond.len());
             return Err(TrackError::measurement("beyond", "as many pixels as the picture has", found));
         }
-        let around = self.rows.start.saturating_sub(reach) * width..(self.rows.end + reach).min(height) * width;
-        let grow = |mask: &[u8]| {
-            let mut whole = vec![0; mask.len()];
-            whole[around.clone()].copy_from_slice(&grown(&mask[around.clone()], width, reach));
-            whole
-        };
-        let mut seen = grow(&self.seen);
-        let mut before = (!self.marked.is_empty()).then(|| grow(&self.marked));
         let count = self.columns.len();
-        let edges = far_edges(&self.nearest, count, SURFACES_APART, reach);
         let mut mask = beyond.to_vec();
-        mask.iter_mut().zip(&seen).for_each(|(pixel, seen)| *pixel |= *seen != 0);
-        for (row, edges) in self.rows.clone().zip(edges.chunks_exact(count.max(1))) {
-            let here = row * width + self.columns.start..row * width + self.columns.end;
-            let seen = &mut seen[here.clone()];
-            seen.iter_mut().zip(edges).for_each(|(seen, edge)| *seen &= u8::from(*edge));
-            mask[here.clone()].iter_mut().zip(&*seen).for_each(|(pixel, edge)| *pixel &= *edge == 0);
-            if let Some(before) = &mut before {
-                before[here].iter_mut().zip(&*seen).for_each(|(pixel, edge)| *pixel &= !*edge);
+        let mut before = self.marked.as_ref().map(|_| vec![false; beyond.len()]);
+        if count == 0 {
+            return Ok((mask, before));
+        }
+        // All that is seen, and what is within reach of it.
+        let wider = |span: &Range<usize>, size: usize| span.start.saturating_sub(reach)..(span.end + reach).min(size);
+        let (rows, columns) = (wider(&self.rows, height), wider(&self.columns, width));
+        let stride = columns.len();
+        let inner = (self.rows.start - rows.start) * stride + self.columns.start - columns.start;
+        let part = |fill: &mut dyn FnMut(usize, &mut [u8])| {
+            let mut part = vec![0; rows.len() * stride];
+            let lines = part[inner..].chunks_mut(stride).take(self.rows.len());
+            lines.enumerate().for_each(|(row, line)| fill(row * count, &mut line[..count]));
+            grown(&part, stride, reach)
+        };
+        let seen = part(&mut |first, line| {
+            line.iter_mut().zip(&self.nearest[first..]).for_each(|(seen, depth)| *seen = u8::from(depth.is_finite()));
+        });
+        let here = |row: usize| row * width + columns.start..row * width + columns.end;
+        for (row, seen) in rows.clone().zip(seen.chunks_exact(stride)) {
+            mask[here(row)].iter_mut().zip(seen).for_each(|(pixel, seen)| *pixel |= *seen != 0);
+        }
+        if let (Some(before), Some(marked)) = (&mut before, &self.marked) {
+            let marked = part(&mut |first, line| line.copy_from_slice(&marked[first..][..count]));
+            for (row, marked) in rows.clone().zip(marked.chunks_exact(stride)) {
+                before[here(row)].iter_mut().zip(marked).for_each(|(pixel, marked)| *pixel = *marked != 0);
             }
         }
-        let before = before.map(|before| before.into_iter().map(|pixel| pixel != 0).collect());
+        let edges = far_edges(&self.nearest, count, SURFACES_APART, reach);
+        for (index, (row, edges)) in self.rows.clone().zip(edges.chunks_exact(count)).enumerate() {
+            let here = row * width + self.columns.start..row * width + self.columns.end;
+            let edges = || edges.iter().zip(&seen[inner + index * stride..]).map(|(edge, seen)| *edge & (*seen != 0));
+            mask[here.clone()].iter_mut().zip(edges()).for_each(|(pixel, edge)| *pixel &= !edge);
+            if let Some(before) = &mut before {
+                before[here].iter_mut().zip(edges()).for_each(|(pixel, edge)| *pixel &= !edge);
+            }
+        }
         Ok((mask, before))
     }
 }

@@ -8,7 +8,7 @@ use crate::error::TrackError;
 use crate::math::{Points, Pose, Vec3};
 use crate::observation::frame::{Frame, PointSlice};
 use crate::regions::{Posed, RegionLine, Regions};
-use crate::shape::SurfaceBatch;
+use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
 
 /// So much of a line of sight is looked at, metres: more than a trunk's width, and half a forearm's.
 const LOOKED_THROUGH: f64 = 0.75;
@@ -16,6 +16,14 @@ const LOOKED_THROUGH: f64 = 0.75;
 const PLACES: usize = 30;
 /// Distances in single precision are off by less: metres, and share of a distance.
 const ROUNDING: f64 = 1e-3;
+
+/// Whether all between two places in a limb's frame is surely outside of it, for all of it lies to one side.
+fn passes_by(shape: &TaperedEllipticCylinder, [from, to]: [Vec3; 2]) -> bool {
+    let (low, high) = (from.min(to), from.max(to));
+    // Rounding is far below this.
+    let [wide, deep] = [shape.a0().max(shape.a1()), shape.b0().max(shape.b1())].map(|most| 1.000_001 * most);
+    high.z <= 0.0 || low.z >= shape.length() || low.x >= wide || high.x <= -wide || low.y >= deep || high.y <= -deep
+}
 
 impl Tracker {
     /// The lines along which the last step looked for edges of colours in a camera's picture.
@@ -124,19 +132,22 @@ impl Tracker {
         if !self.is_started() {
             return Err(TrackError::NotInitialised);
         }
-        let poses: Vec<Pose> = self.motion.world_from_limb().collect();
+        let poses: Vec<Pose> = self.motion.world_from_limb().map(|pose| pose.inverse()).collect();
         let limbs = || self.model.body.limbs().iter().zip(&poses);
         let hidden = |site: &Vec3| {
             let towards = camera - *site;
             let reach = towards.length().min(LOOKED_THROUGH);
             let direction = towards / towards.length().max(1e-9);
             let mut inside = [false; PLACES];
-            for (limb, world_from_limb) in limbs() {
-                let limb_from_world = world_from_limb.inverse();
+            let far = |step: usize| (step as f64 + 0.5) / PLACES as f64 * reach;
+            for (limb, limb_from_world) in limbs() {
                 let (start, along) = (limb_from_world.transform_point(*site), limb_from_world.rotation * direction);
+                // Most limbs are beside the whole way.
+                if passes_by(&limb.shape, [0, PLACES - 1].map(|step| start + far(step) * along)) {
+                    continue;
+                }
                 for (step, inside) in inside.iter_mut().enumerate() {
-                    let far = (step as f64 + 0.5) / PLACES as f64 * reach;
-                    *inside = *inside || limb.shape.contains(start + far * along);
+                    *inside = *inside || limb.shape.contains(start + far(step) * along);
                 }
             }
             inside.iter().filter(|inside| **inside).count() as f64 / PLACES as f64 * reach

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 
-import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
@@ -18,7 +19,7 @@ from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.gating import SiteGate, SitePredictor
 from voodoo.sensors.model import RangeNoise
 from voodoo.sensors.motion import LimbMotion
-from voodoo.sensors.pixels import FloatArray, in_sensor
+from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
@@ -94,7 +95,12 @@ class Context:
     others: Sequence[Followed] = ()
     rays: list[SiteRay] = field(default_factory=list)
 
-    @property
+    @cached_property
+    def estimate(self) -> Estimate:
+        """The tracker's last one; with the tracker it is made anew at every look."""
+        return self.tracker.estimate
+
+    @cached_property
     def depth_images(self) -> list[DepthImage]:
         """Those of the frame, if depth is used."""
         if "depth" not in self.settings.use:
@@ -107,19 +113,19 @@ class Context:
             return 1.0
         if not self.predicted:
             return self.settings.model.weight(noise.sigma(_TYPICAL_RANGE_M), sharing=sharing)
-        body = np.mean(list(self.predicted.values()), axis=0)
-        away = max(float(np.linalg.norm(in_sensor(root_from_sensor, body[None])[0])), 0.1)
+        # Numbers by themselves: a few of them are faster without arrays.
+        sums = map(sum, zip(*(place.tolist() for place in self.predicted.values()), strict=True))
+        body = [value / len(self.predicted) for value in sums]
+        away = max(math.dist(body, root_from_sensor[:3, 3].tolist()), 0.1)
         return self.settings.model.weight(noise.sigma(away), sharing=sharing)
 
     def motion_compensated(
         self, points: npt.NDArray[Any], root_from_sensor: FloatArray, stamp: float
     ) -> npt.NDArray[Any]:
         """Points of a sensor (N, 3) [m] measured at `stamp`, those on the body where they are at the frame's time."""
-        elapsed = self.stamp - stamp
-        if not self.motion.moves(elapsed):
-            return points
-        places = points.astype(np.float64) @ root_from_sensor[:3, :3].T + root_from_sensor[:3, 3]
-        return in_sensor(root_from_sensor, self.motion.motion_compensated(places, elapsed, self.tracker.limb_distances))
+        return self.motion.motion_compensated(
+            points, self.stamp - stamp, self.tracker.limb_distances, world_from_sensor=root_from_sensor
+        )
 
 
 class Adapter(ABC, Generic[M]):

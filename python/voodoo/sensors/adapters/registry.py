@@ -9,6 +9,8 @@ from voodoo.sensors.adapters.base import Adapter
 from voodoo.sensors.kinds import add_kind, remove_kind
 
 _adapters: dict[str, Adapter[Any]] = {}
+_by_class: dict[type, tuple[Adapter[Any], ...]] = {}
+"""What `adapters_of` found for classes of measurements: a front end asks some ten times a frame."""
 
 
 def register(adapter: Adapter[Any]) -> None:
@@ -24,12 +26,14 @@ def register(adapter: Adapter[Any]) -> None:
             f"{known.kind!r} for {known.measurement.__name__}"
         )
     _adapters[adapter.kind] = adapter
+    _by_class.clear()
     add_kind(adapter.kind, adapter.recorded_as or adapter.kind)
 
 
 def unregister(kind: str) -> None:
     """Forget an adapter; nothing happens if there is none."""
     _adapters.pop(kind, None)
+    _by_class.clear()
     remove_kind(kind)
 
 
@@ -44,9 +48,13 @@ def adapters_of(item: object) -> tuple[Adapter[Any], ...]:
     Raises:
         MeasurementError: there is none.
     """
+    found = _by_class.get(type(item))
+    if found is not None:
+        return found
     for known in type(item).__mro__:
         found = tuple(adapter for adapter in _adapters.values() if adapter.measurement is known)
         if found:
+            _by_class[type(item)] = found
             return found
     names = ", ".join(dict.fromkeys(adapter.measurement.__name__ for adapter in _adapters.values()))
     raise MeasurementError(f"measurement: expected one of {names}, found {type(item).__name__}; see adapters.register")

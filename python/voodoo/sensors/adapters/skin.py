@@ -43,7 +43,7 @@ class SkinAdapter(Adapter[ColorImage]):
         then = context.predictor.predict(item.stamp)
         view = _body_view(item, context)
         sites = skin.settings.sites if view is not None else ()
-        tracker, status = context.tracker, context.tracker.estimate.limb_status
+        tracker, status = context.tracker, context.estimate.limb_status
         rays = skin.observe(
             item.image,
             item.camera,

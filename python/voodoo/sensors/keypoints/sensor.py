@@ -3,7 +3,6 @@ depth."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -22,9 +21,8 @@ from voodoo.sensors.keypoints.sites import (
     check_confidence,
     checked_rows,
     compiled,
-    expected_places,
 )
-from voodoo.sensors.keypoints.surface import DepthArray, behind_surface, window_depth
+from voodoo.sensors.keypoints.surface import DepthArray, window_depth
 from voodoo.sensors.model import PixelNoise, SensorModel
 from voodoo.sensors.pixels import checked_camera, normalized
 from voodoo.sensors.rays import SiteRay, add_rays
@@ -33,9 +31,6 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 POINT_SIGMA_M = 0.03
 """Least standard deviation of a 3-D point from depth: how well `BEHIND_SURFACE_M` is known."""
-
-GUESSED = 0.4
-"""Standard deviation of a site behind so many metres of the person's own body, beyond half a limb: the network guesses it."""
 
 
 @dataclass(frozen=True)
@@ -161,55 +156,25 @@ class KeypointSensor:
         if depth is not None and depth.shape != (self.camera.height, self.camera.width):
             expected = (self.camera.height, self.camera.width)
             raise MeasurementError(f"depth: expected the camera's shape {expected}, found {depth.shape}")
-        camera, parts = self.camera, layout_of(self.layout).parts
-        found = compiled(self.layout).sights(
+        camera = self.camera
+        found, places, unseen, dropped = compiled(self.layout).observe(
             checked_rows(keypoints, self.layout),
-            expected_places(self.layout, predicted),
+            predicted,
+            stamp=stamp,
+            source=self.source,
             world_from_sensor=pose,
             intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
             lens=(lambda pixels: normalized(camera, pixels)) if camera.distorted else None,
             noise=self.noise.pixels,
+            place_sigma=POINT_SIGMA_M,
             least=self.min_confidence,
+            only=self.sites,
+            gate=None if gate is None else gate.core,
+            surface=None
+            if depth is None
+            else lambda pixel: window_depth(depth, pixel, metres_per_unit=metres_per_unit),
+            before=before,
         )
-        origin, before = pose[:3, 3], before or {}
-        rays: list[SiteRay] = []
-        points: dict[str, tuple[FloatArray, float]] = {}
-        dropped: list[str] = []
-        for part, sight in zip(parts, found, strict=True):
-            site = part.site
-            if sight is None or site not in predicted or (self.sites is not None and site not in self.sites):
-                continue
-            pixel, direction, z, away, sigma = sight
-            # NaN: the lens shows nothing there.
-            if not (z > 0.0 and away >= 0.0):
-                dropped.append(site)
-                continue
-            if depth is not None:
-                point = self._point(site, pixel, direction, pose, depth, metres_per_unit)
-                if point is not None and (gate is None or gate.accepts_point(site, predicted[site], point, stamp)):
-                    points[site] = (point, max(sigma, POINT_SIGMA_M))
-                    continue
-            if gate is None or gate.accepts(site, away, stamp, self.source):
-                hidden = before.get(site, 0.0) - behind_surface(site)
-                if hidden > 0.0:
-                    sigma = math.hypot(sigma, GUESSED * hidden)
-                rays.append(SiteRay(site, origin, direction, sigma, self.source))
-            else:
-                dropped.append(site)
-        unseen = tuple(part.site for part, sight in zip(parts, found, strict=True) if sight is None)
-        return KeypointReport(tuple(ray.site for ray in rays), tuple(points), unseen, tuple(dropped)), rays, points
-
-    def _point(
-        self,
-        site: str,
-        pixel: tuple[float, float],
-        direction: FloatArray,
-        pose: FloatArray,
-        depth: DepthArray,
-        metres_per_unit: float,
-    ) -> FloatArray | None:
-        z = window_depth(depth, pixel, metres_per_unit=metres_per_unit)
-        if z is None:
-            return None
-        cosine = float(direction @ pose[:3, 2])
-        return np.asarray(pose[:3, 3] + direction * (z / cosine + behind_surface(site)))
+        points = {site: (place, sigma) for site, place, sigma in places}
+        report = KeypointReport(tuple(ray.site for ray in found), tuple(points), tuple(unseen), tuple(dropped))
+        return report, found, points

@@ -15,8 +15,8 @@ from voodoo.errors import MeasurementError
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.sensors.keypoints.surface import behind_surface
 
-_NOWHERE = np.full(3, np.nan)
 MIN_CONFIDENCE = 0.1
 """Keypoints that a network itself believes less than this are not measurements."""
 
@@ -74,12 +74,12 @@ def checked_rows(keypoints: npt.ArrayLike, layout: str) -> npt.NDArray[np.float6
 @lru_cache(maxsize=32)
 def compiled(layout: str) -> _core.KeypointLayout:
     """A layout as the core holds it."""
-    return _core.KeypointLayout([(list(part.shares.items()), part.spread) for part in layout_of(layout).parts])
-
-
-def expected_places(layout: str, predicted: Mapping[str, npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
-    """Where the sites of a layout's parts are predicted (P, 3) [m]; NaN: nowhere."""
-    return np.array([predicted.get(part.site, _NOWHERE) for part in layout_of(layout).parts], dtype=np.float64)
+    return _core.KeypointLayout(
+        [
+            (part.site, list(part.shares.items()), part.spread, behind_surface(part.site))
+            for part in layout_of(layout).parts
+        ]
+    )
 
 
 def check_confidence(least: object) -> None:
@@ -110,7 +110,7 @@ def nearest_person(
     pose = rigid(world_from_sensor)
     nearest = compiled(layout).nearest(
         [checked_rows(person, layout) for person in people],
-        expected_places(layout, predicted),
+        predicted,
         world_from_sensor=pose,
         intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
         project=camera.project if camera.distorted else None,

@@ -68,10 +68,6 @@ class SkinTracker:
         """Start with the colours of all skins; `learn` makes them one person's."""
         self.settings = chosen = settings or SkinSettings()
         self._sites = tuple(chosen.sites)
-        # Shoulder, elbow and hand of each site's side.
-        self._arms = [
-            (site, *(f"{site[:1]}_{joint}" for joint in ("shoulder", "elbow", "hand"))) for site in self._sites
-        ]
         self._teacher = _core.SkinTeacher()
         self._cue = _core.SkinCue(
             self._sites,
@@ -168,11 +164,10 @@ class SkinTracker:
         _check_image(image, camera)
         self._stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
         self._image = image
-        joints = np.array([[predicted.get(name, _NOWHERE) for name in names] for names in self._arms], dtype=np.float64)
         places = self._cue.look(
             self._teacher,
             np.ascontiguousarray(image),
-            joints,
+            predicted,
             stamp=self._stamp,
             world_from_sensor=pose,
             intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
@@ -195,10 +190,8 @@ class SkinTracker:
             bias = self.settings.sites[site]
             if site in head_visible:
                 bias = max(bias, self.settings.shown_bias.get(site, bias))
-            if moved is not None:
-                shift = moved[site] - predicted[site]
-                origin, place = origin + shift, None if place is None else place + shift
-            rays.append(SiteRay(site, origin, direction, noise.sigma(z, focal), source, bias=bias, place=place))
+            ray = SiteRay(site, origin, direction, noise.sigma(z, focal), source, bias=bias, place=place)
+            rays.append(ray if moved is None else ray.moved(moved[site] - predicted[site]))
         return rays
 
     def learn(
@@ -229,11 +222,11 @@ class SkinTracker:
             return
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
-        joints = estimate.joints
+        names, positions = estimate.joint_names, estimate.joint_positions
         self._teacher.learn(
             self._cue,
             None if image is self._image else np.ascontiguousarray(image),
-            np.array([joints.get(site, _NOWHERE) for site in self._sites], dtype=np.float64),
+            np.array([positions[names.index(site)] if site in names else _NOWHERE for site in self._sites]),
             world_from_sensor=pose,
             intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
             project=camera.project if camera.distorted else None,

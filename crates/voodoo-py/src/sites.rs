@@ -1,0 +1,222 @@
+//! Named sites: where they will be, gates around them, and rays on which they were seen.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use voodoo_core::math::Vec3;
+use voodoo_core::observation::sites::{SiteGate, SiteMotion, SiteRay};
+
+use crate::arrays::{rows, vector};
+use crate::errors::exception;
+
+type Row<'py> = Bound<'py, PyArray1<f64>>;
+
+fn row(py: Python<'_>, place: Vec3) -> Row<'_> {
+    PyArray1::from_slice(py, &place.to_array())
+}
+
+/// Where some sites are, in a mapping of their names to places; none of those that it lacks.
+pub fn places_of<'a>(places: &Bound<'_, PyAny>, sites: impl Iterator<Item = &'a str>) -> PyResult<Vec<Option<Vec3>>> {
+    let dict = places.cast::<PyDict>().ok();
+    sites
+        .map(|site| {
+            let place = match dict {
+                Some(dict) => dict.get_item(site)?,
+                None => Some(places.call_method1("get", (site,))?).filter(|place| !place.is_none()),
+            };
+            place.map(|place| vector(site, &place)).transpose()
+        })
+        .collect()
+}
+
+#[pyclass(name = "SiteMotion", module = "voodoo._core")]
+pub struct PySiteMotion {
+    motion: SiteMotion,
+    /// Names of the sites, as they came.
+    names: Option<Py<PyTuple>>,
+}
+
+#[pymethods]
+impl PySiteMotion {
+    #[new]
+    #[pyo3(signature = (*, share, max_speed))]
+    fn new(share: f64, max_speed: f64) -> Self {
+        Self { motion: SiteMotion::new(share, max_speed), names: None }
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        Self { motion: self.motion.clone(), names: self.names.as_ref().map(|names| names.clone_ref(py)) }
+    }
+
+    /// Takes up an estimate's named positions.
+    fn update(&mut self, stamp: f64, names: Bound<'_, PyTuple>, positions: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
+        let (known, places): (Vec<String>, _) = (names.extract()?, rows("positions", &positions)?);
+        if known.len() != places.len() {
+            let text = format!("positions: expected one of each of {} names, found {}", known.len(), places.len());
+            return Err(exception(names.py(), "MeasurementError", text));
+        }
+        self.motion.update(stamp, known, places.to_vec());
+        self.names = Some(names.unbind());
+        Ok(())
+    }
+
+    /// Name of every site and where it will be.
+    fn predict<'py>(&self, py: Python<'py>, stamp: f64) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        if let Some(names) = &self.names {
+            for (name, place) in names.bind(py).iter().zip(self.motion.at(stamp)) {
+                dict.set_item(name, PyArray1::from_slice(py, &place))?;
+            }
+        }
+        Ok(dict)
+    }
+
+    /// The same of all sites as rows.
+    fn positions<'py>(&self, py: Python<'py>, stamp: f64) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let places = self.motion.at(stamp);
+        PyArray1::from_slice(py, places.as_flattened()).reshape([places.len(), 3])
+    }
+
+    fn __len__(&self) -> usize {
+        self.motion.names().len()
+    }
+}
+
+#[pyclass(name = "SiteGate", module = "voodoo._core")]
+pub struct PySiteGate(pub SiteGate);
+
+#[pymethods]
+impl PySiteGate {
+    #[new]
+    fn new(radius: f64, growth: f64, widest: f64) -> Self {
+        Self(SiteGate::new(radius, growth, widest))
+    }
+
+    fn __copy__(&self) -> Self {
+        Self(self.0.clone())
+    }
+
+    fn limit(&mut self, site: &str, source: &str, stamp: f64) -> f64 {
+        self.0.limit(site, source, stamp)
+    }
+
+    fn accepts(&mut self, site: &str, distance: f64, stamp: f64, source: &str) -> bool {
+        self.0.accepts(site, distance, stamp, source)
+    }
+
+    #[getter]
+    fn accepted(&self) -> Vec<(&str, &str, f64)> {
+        self.0.accepted().collect()
+    }
+}
+
+/// A site was seen on a ray.
+///
+/// Args:
+///     site: its name.
+///     origin: focal point (3,) in the world [m].
+///     direction: (3,) unit vector in the world.
+///     sigma: standard deviation across the ray at the site [m].
+///     source: name for `Estimate.sources`.
+///     trust: factor of its weight, in [0, 1].
+///     bias: it may always be this far off [m]; see `Frame.add_position`.
+///     place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
+///     place_sigma: standard deviation of `place` along the ray [m].
+#[pyclass(name = "SiteRay", module = "voodoo._core", frozen)]
+pub struct PySiteRay(pub SiteRay);
+
+#[pymethods]
+impl PySiteRay {
+    #[new]
+    #[pyo3(signature = (site, origin, direction, sigma, source, trust=1.0, bias=0.0, place=None, place_sigma=0.04))]
+    #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn new(
+        site: String,
+        origin: &Bound<'_, PyAny>,
+        direction: &Bound<'_, PyAny>,
+        sigma: f64,
+        source: String,
+        trust: f64,
+        bias: f64,
+        place: Option<&Bound<'_, PyAny>>,
+        place_sigma: f64,
+    ) -> PyResult<Self> {
+        let (origin, direction) = (vector("origin", origin)?, vector("direction", direction)?);
+        let place = place.map(|place| vector("place", place)).transpose()?;
+        Ok(Self(SiteRay { site, origin, direction, sigma, source, trust, bias, place, place_sigma }))
+    }
+
+    /// Its name.
+    #[getter]
+    fn site(&self) -> &str {
+        &self.0.site
+    }
+
+    /// Focal point (3,) in the world [m].
+    #[getter]
+    fn origin<'py>(&self, py: Python<'py>) -> Row<'py> {
+        row(py, self.0.origin)
+    }
+
+    /// (3,) unit vector in the world.
+    #[getter]
+    fn direction<'py>(&self, py: Python<'py>) -> Row<'py> {
+        row(py, self.0.direction)
+    }
+
+    /// Standard deviation across the ray at the site [m].
+    #[getter]
+    fn sigma(&self) -> f64 {
+        self.0.sigma
+    }
+
+    /// Name for `Estimate.sources`.
+    #[getter]
+    fn source(&self) -> &str {
+        &self.0.source
+    }
+
+    /// Factor of its weight, in [0, 1].
+    #[getter]
+    fn trust(&self) -> f64 {
+        self.0.trust
+    }
+
+    /// It may always be this far off [m].
+    #[getter]
+    fn bias(&self) -> f64 {
+        self.0.bias
+    }
+
+    /// (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
+    #[getter]
+    fn place<'py>(&self, py: Python<'py>) -> Option<Row<'py>> {
+        self.0.place.map(|place| row(py, place))
+    }
+
+    /// Standard deviation of `place` along the ray [m].
+    #[getter]
+    fn place_sigma(&self) -> f64 {
+        self.0.place_sigma
+    }
+
+    /// The ray of a site that has gone on by (3,) [m] since it was seen.
+    fn moved(&self, shift: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (shift, ray) = (vector("shift", shift)?, &self.0);
+        let place = ray.place.map(|place| place + shift);
+        Ok(Self(SiteRay { origin: ray.origin + shift, place, ..ray.clone() }))
+    }
+
+    /// The ray with another trust.
+    fn trusted(&self, trust: f64) -> Self {
+        Self(SiteRay { trust, ..self.0.clone() })
+    }
+
+    fn __repr__(&self) -> String {
+        let SiteRay { site, origin, direction, sigma, source, trust, .. } = &self.0;
+        let (origin, direction) = (origin.to_array(), direction.to_array());
+        format!(
+            "SiteRay({site:?}, origin={origin:.3?}, direction={direction:.3?}, sigma={sigma:.4}, source={source:?}, trust={trust})"
+        )
+    }
+}
