@@ -284,16 +284,12 @@ fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f3
     Face { inside, proximal: proximal & !distal, distal, decided, squared }
 }
 
-/// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
-///
-/// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
-/// Newton's iteration takes `STEPS` steps before the last one.
+/// The queries in the limb frame, and the angles (cosine, sine) after `STEPS` steps of Newton's iteration.
 #[inline(always)]
-pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
+fn angles<const FMA: bool, const N: usize, const STEPS: usize>(
     k: &Constants,
     queries: &Block<N>,
-    out: &mut BlockResult<N>,
-) {
+) -> (Block<N>, [f32; N], [f32; N]) {
     let mut limb = Block::<N>::ZERO;
     let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
     for i in 0..N {
@@ -308,6 +304,20 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
             (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
         }
     }
+    (limb, cosine, sine)
+}
+
+/// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
+///
+/// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
+/// Newton's iteration takes `STEPS` steps before the last one.
+#[inline(always)]
+pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
+    k: &Constants,
+    queries: &Block<N>,
+    out: &mut BlockResult<N>,
+) {
+    let (limb, cosine, sine) = angles::<FMA, N, STEPS>(k, queries);
     for i in 0..N {
         let (qx, qy, z) = (limb.x[i], limb.y[i], limb.z[i]);
         let (x, y) = (qx.abs(), qy.abs());
