@@ -3,6 +3,7 @@
 use super::belief::ENOUGH_ODDS;
 use crate::body::Body;
 use crate::detect::Detection;
+use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
@@ -12,14 +13,12 @@ const EVERY: [usize; 2] = [3, 15];
 /// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips
 /// and ankles 10 cm from where a detector tells them.
 const ELSEWHERE: f64 = 0.15;
-/// The same of arms.
-const ARMS_ELSEWHERE: f64 = 0.10;
 /// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
 pub(super) const SIGMAS: f64 = 3.5;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
-/// A body that has been lost for so long is gone, seconds.
-const GONE: f64 = 2.0;
+/// A body that has been lost for so long is gone, seconds; and who was hidden is waited for so long.
+pub(super) const GONE: f64 = 2.0;
 /// Joints that tell where the trunk is and which way round.
 const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 
@@ -110,7 +109,7 @@ impl Doubt {
             apart > least && apart > sigmas * spread
         };
         let limbs = young || among;
-        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, ARMS_ELSEWHERE));
+        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, APART));
         if elsewhere(&TRUNK, ELSEWHERE) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
             self.agreed = false;

@@ -30,8 +30,8 @@ use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
 use exclusive::Exclusive;
-use limb_history::{LimbHistory, SUPPORT};
-use two_state::{all, either, said_by};
+use limb_history::LimbHistory;
+use two_state::{EVEN, all, either, said_by};
 
 /// Shares are of this many visible patches at least.
 const LEAST_VISIBLE: f64 = 8.0;
@@ -40,10 +40,8 @@ const FEW: f64 = 5.0;
 /// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
 const FLAT: f64 = 0.2;
 const ROUNDNESS_MEMORY: f64 = 0.9;
-/// Share of the limbs of a tracked body that are measured at least; with fewer than `SOME` measured it is lost, and with fewer
-/// than `HALF` where the root is none of them.
-const TRACKED: f64 = 0.75;
-const HALF: f64 = 0.5;
+/// Of a tracked body no larger share of the limbs is not measured. One of which no larger share is measured is lost, and so is one of
+/// which less than twice that is where the root is not.
 const SOME: f64 = 0.25;
 /// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
 const AT_JOINT: f64 = 0.03;
@@ -167,7 +165,7 @@ impl Assessor {
             }
         }
         let status = if self.told_by_edges() { overall(statuses) } else { self.status };
-        let doubtful = status == Status::Tracking && measured_share(statuses) < TRACKED;
+        let doubtful = status == Status::Tracking && measured_share(statuses) < 1.0 - SOME;
         estimate.status = if doubtful { Status::Degraded } else { status };
     }
 
@@ -190,7 +188,7 @@ impl Assessor {
                 let past = seen.free_space / seen.front_facing;
                 [exclusive / visible.max(LEAST_VISIBLE), past, visible / seen.front_facing]
             } else {
-                [SUPPORT * exclusive / FEW, 0.0, 0.0]
+                [2.0 * EVEN * exclusive / FEW, 0.0, 0.0]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
@@ -262,9 +260,9 @@ fn measured_share(limbs: &[LimbStatus]) -> f64 {
 /// Lost without a measured root and half of the limbs; degraded when more than a quarter of the limbs are not measured.
 fn overall(limbs: &[LimbStatus]) -> Status {
     let measured = measured_share(limbs);
-    if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < HALF) {
+    if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < 2.0 * SOME) {
         Status::Lost
-    } else if measured < TRACKED {
+    } else if measured < 1.0 - SOME {
         Status::Degraded
     } else {
         Status::Tracking

@@ -6,7 +6,7 @@
 
 /// What speaks for a limb less what speaks against it, as a share, is weighed by this: here the odds are even, and every time as
 /// much again makes them e times greater.
-const EVEN: f64 = 0.075;
+pub(super) const EVEN: f64 = 0.075;
 /// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
 /// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
 const CHANGES: f64 = 0.05;
