@@ -75,7 +75,7 @@ impl Exchange {
 
     /// Whether to look in this frame; to be called in every one.
     fn is_due(&mut self, doubtful: bool) -> bool {
-        self.frames = (self.frames + 1) % (REST / 2);
+        self.frames = (self.frames + 1) % REST;
         self.frames == 0 || doubtful || self.goes_on()
     }
 

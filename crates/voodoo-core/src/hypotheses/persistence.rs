@@ -4,7 +4,7 @@
 /// a hidden arm is refused for seconds.
 pub(super) const WEARY: usize = 8;
 /// But at least in every `REST`th, which is as well the next one where nothing came near to what the frame shows.
-pub(super) const REST: usize = 8;
+pub(super) const REST: usize = 4;
 
 /// What past frames said against one arm or leg.
 #[derive(Clone, Copy, Debug, Default)]
