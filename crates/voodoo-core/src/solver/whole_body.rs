@@ -21,8 +21,8 @@ const STILL_FROM: usize = 3;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
-/// Share by which what is expected of a hand, foot or head is drawn to its posture at rest in 1/30 s: what few points say of its turn
-/// would else be carried on for ever. In a quarter of a second it comes half of the way where nothing of it shows.
+/// Share by which a hand, foot or head that does not show at all is drawn to its posture at rest in 1/30 s: else it would keep for
+/// ever how it was seen last. In a quarter of a second it comes half of the way.
 const TO_REST: f64 = 0.1;
 /// By contours alone every joint moves by so much at least, radians: no points hold a shoulder where it is not.
 const LEAST_MOTION: f64 = 0.1;
@@ -184,7 +184,7 @@ impl WholeBody {
             let shown = (measured / FREE_WEIGHT).min(1.0);
             let end = part.match_caps[1] && !contours_alone;
             let rests = end && part.parent.as_ref().is_some_and(|(_, joint)| joint.kind() == JointKind::Elliptic);
-            self.rests.push(if rests { (TO_REST * problem.time_scale).min(1.0) } else { 0.0 });
+            self.rests.push(if rests { ((1.0 - shown) * TO_REST * problem.time_scale).min(1.0) } else { 0.0 });
             let shown = shown.max(HIDDEN_MOTION);
             self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
         }
