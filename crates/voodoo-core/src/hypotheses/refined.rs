@@ -85,8 +85,12 @@ impl Refined {
 
     /// Refines a hypothesis with the whole body; `fit` then holds its matches, and `matched` those of before.
     pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> Cost {
-        let (_, cost) = self.refine_up_to(context, fit, hypothesis, f64::INFINITY, |_| false);
-        cost.unwrap_or(Cost { evidence: f64::INFINITY, total: f64::INFINITY })
+        self.begin(fit, hypothesis);
+        for step in 0..REFINE {
+            self.match_at(context, fit, step);
+            self.solve_at(context, fit, hypothesis, step);
+        }
+        self.end(context, fit)
     }
 
     /// The same; it is given up on the way when it costs more than `most`, or `comes_back` to the current pose: then it is not
@@ -99,27 +103,46 @@ impl Refined {
         most: f64,
         comes_back: impl Fn(&[Pose]) -> bool,
     ) -> (usize, Option<Cost>) {
-        self.poses.clear();
-        self.poses.extend_from_slice(hypothesis);
-        fit.exchange(&mut self.matched);
-        let last = context.config.max_steps;
+        self.begin(fit, hypothesis);
         for step in 0..REFINE {
-            let at = last.saturating_sub(REFINE - step);
             if step == BACK_AFTER && comes_back(&self.poses) {
                 return (step, None);
             }
-            let here = if step < ROUGH_STEPS { context.roughly() } else { context };
-            fit.match_all(here, &self.poses, at);
+            self.match_at(context, fit, step);
             if step == GIVE_UP_AFTER && most.is_finite() {
                 let cost = self.own_cost(context, fit);
                 if cost.total > most {
                     return (step, Some(cost));
                 }
             }
-            fit.solve(here, hypothesis, &mut self.poses, at);
+            self.solve_at(context, fit, hypothesis, step);
         }
+        (REFINE, Some(self.end(context, fit)))
+    }
+
+    /// Starts from a hypothesis; `matched` keeps what `fit` held.
+    fn begin(&mut self, fit: &mut Fit, hypothesis: &[Pose]) {
+        self.poses.clear();
+        self.poses.extend_from_slice(hypothesis);
+        fit.exchange(&mut self.matched);
+    }
+
+    /// Matches for one of the steps.
+    fn match_at(&self, context: Context, fit: &mut Fit, step: usize) {
+        let (here, at) = scheduled(context, step);
+        fit.match_all(here, &self.poses, at);
+    }
+
+    /// Solves what one of the steps has matched.
+    fn solve_at(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], step: usize) {
+        let (here, at) = scheduled(context, step);
+        fit.solve(here, hypothesis, &mut self.poses, at);
+    }
+
+    /// Matches as it stands after the last step, and what that costs.
+    fn end(&mut self, context: Context, fit: &mut Fit) -> Cost {
         fit.match_last(context, &self.poses);
-        (REFINE, Some(self.own_cost(context, fit)))
+        self.own_cost(context, fit)
     }
 
     /// What its own poses cost.
@@ -166,4 +189,10 @@ impl Refined {
         }
         cost
     }
+}
+
+/// What a step is done by, with few points at first, and its number in a frame's schedule.
+fn scheduled(context: Context, step: usize) -> (Context, usize) {
+    let here = if step < ROUGH_STEPS { context.roughly() } else { context };
+    (here, context.config.max_steps.saturating_sub(REFINE - step))
 }
