@@ -2,25 +2,20 @@
 //!
 //! By then sizes have followed the wrong ones: exchanged legs that explain as much are followed beside the body for some frames.
 
+use super::persistence::{REST, WEARY};
 use super::refined::{REFINE, Refined};
-use super::score::{Cost, GAIN};
+use super::score::{Cost, SURE_GAIN};
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3, shifted};
 
-/// One looks in so many frames, and in every one in which a leg is in doubt.
-const EXCHANGED_EVERY: usize = 4;
 /// What explains a smaller share of what is explained now is not refined: legs that stand right lose more when they are exchanged.
 const WORTH_A_LOOK: f64 = 0.88;
-/// What is followed explains this share at least, and is given up after so many frames.
+/// What is followed explains this share at least.
 const WORTH_FOLLOWING: f64 = 0.96;
-const FOLLOWED: usize = 8;
-/// What has to be gained in all, patches, and what one frame counts for at most: it may be disturbed.
-const GAINED: f64 = 4.0 * GAIN;
-const MOST_GAINED: f64 = 2.0 * GAIN;
 /// A pelvis that turns by more than this, radians, is another body's: the legs alone were exchanged.
-const MOST_TURNED: f64 = 0.5;
+pub const MOST_TURNED: f64 = 0.5;
 
 /// When one looks, and where the legs would be.
 #[derive(Debug, Default)]
@@ -80,7 +75,7 @@ impl Exchange {
 
     /// Whether to look in this frame; to be called in every one.
     fn is_due(&mut self, doubtful: bool) -> bool {
-        self.frames = (self.frames + 1) % EXCHANGED_EVERY;
+        self.frames = (self.frames + 1) % REST;
         self.frames == 0 || doubtful || self.goes_on()
     }
 
@@ -104,11 +99,12 @@ impl Exchange {
 
     /// Takes note of what a frame says of it, and of how far its pelvis is turned, radians; true when it is to be taken.
     fn gains(&mut self, now: Cost, exchanged: Cost, turned: f64) -> bool {
-        self.gained = (self.gained + (now.total - exchanged.total).min(MOST_GAINED)).max(0.0);
+        // No frame counts for more than half: it may be disturbed.
+        self.gained = (self.gained + (now.total - exchanged.total).min(0.5 * SURE_GAIN)).max(0.0);
         self.age += 1;
         let close = exchanged.evidence < WORTH_FOLLOWING * now.evidence && turned < MOST_TURNED;
-        let taken = close && self.gained > GAINED;
-        if taken || !close || self.age > FOLLOWED {
+        let taken = close && self.gained > SURE_GAIN;
+        if taken || !close || self.age > WEARY {
             (self.age, self.gained) = (0, 0.0);
         }
         taken
@@ -180,7 +176,7 @@ mod tests {
     fn one_looks_every_so_often_and_at_once_where_a_leg_is_in_doubt() {
         let mut exchange = Exchange::default();
         let due: Vec<bool> = (0..8).map(|_| exchange.is_due(false)).collect();
-        assert_eq!(due.iter().filter(|due| **due).count(), 8 / EXCHANGED_EVERY);
+        assert_eq!(due.iter().filter(|due| **due).count(), 8 / REST);
         assert!(exchange.is_due(true));
     }
 }

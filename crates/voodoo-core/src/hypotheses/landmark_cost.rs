@@ -5,7 +5,7 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::Matched;
 use crate::math::{Pose, Vec3};
 
-/// A site this far from its measurement contradicts it wholly, metres: about a hand's length.
+/// What is this far from where it was seen, or expected, is not there, metres: about a hand's length.
 pub const APART: f64 = 0.10;
 
 /// Cost of the sites on an arm or leg that are not where they were seen, in unexplained patches: one for each unit of weight.

@@ -13,8 +13,10 @@ mod second;
 mod suspicion;
 mod unexplained;
 
+pub use exchange::MOST_TURNED;
 pub use landmark_cost::{APART, body_landmark_cost};
-pub use score::{Cost, GAIN, explain, limit_strain, overall_cost};
+pub use score::{CLEAR_GAIN, Cost, GAIN, SURE_GAIN, explain, limit_strain, overall_cost};
+pub use unexplained::CLUTTER;
 
 use crate::association::correspondence::RegionSupport;
 use crate::body::{Body, Model};
@@ -30,19 +32,14 @@ use proposals::{
 use refined::{Outcome, Present, Refined};
 use rough::{Extremity, RoughSearch};
 use second::Second;
-use suspicion::Suspicion;
+use suspicion::{IDLE, Suspicion};
 use unexplained::Unexplained;
 
-/// So many unexplained patches near an arm make it suspect whatever else speaks for it: nothing else than the arm is expected
-/// about an arm.
-const STRIKING: f64 = 40.0;
 /// Unexplained points are near an arm or leg within this many times its length.
 const NEARBY: f64 = 1.15;
 /// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
 /// a single frame may be disturbed.
 const PATIENCE: usize = 2;
-/// In pictures, an arm or leg is suspect that explains a smaller share of its area, and no other limb.
-const CLAIMED: f64 = 0.3;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]
@@ -179,14 +176,14 @@ impl Hypotheses {
             let sum =
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
-            let suspect = gained < CLAIMED * area;
+            let suspect = gained < IDLE * area;
             return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE), false);
         }
         let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), NEARBY * chain.stretched_length(), near);
         let unexplained = near.total();
-        // Furniture stays open beside legs.
-        let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= STRIKING;
+        // Nothing else than the arm is expected about an arm, but furniture stays open beside legs.
+        let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= CLEAR_GAIN;
         let suspect = unexplained >= GAIN && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
         // Of a leg that was refused for long a detector may tell something new.

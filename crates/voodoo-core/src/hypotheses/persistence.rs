@@ -2,9 +2,9 @@
 
 /// A chain is tried in every second frame only after so many refusals in a row, in every third after twice as many, and so on:
 /// a hidden arm is refused for seconds.
-const WEARY: usize = 8;
+pub(super) const WEARY: usize = 8;
 /// But at least in every `REST`th, which is as well the next one where nothing came near to what the frame shows.
-const REST: usize = 4;
+pub(super) const REST: usize = 4;
 
 /// What past frames said against one arm or leg.
 #[derive(Clone, Copy, Debug, Default)]

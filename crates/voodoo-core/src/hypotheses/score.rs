@@ -8,20 +8,21 @@ use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Ground;
-use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
+use crate::visibility::{ALONG_LIMB, OVERLAP, SEEN_PAST};
 
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
 /// are soft; a joint may turn by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
-/// How deep (metres) a place of an axis lies in another limb, or below the floor, when there is no room for it: surfaces touch.
-const INSIDE: f64 = 0.01;
-/// A rough pose explains points up to this distance, metres: they are drawn in when it is refined.
-const ROUGHLY: f64 = 0.08;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub const GAIN: f64 = 25.0;
+/// A gain of so many patches, an area of eight by eight centimetres, is clear by itself: what moves the body, or makes an arm suspect
+/// whatever else speaks for it. Of several frames together, or of one direction over the opposite one, more is asked.
+pub const CLEAR_GAIN: f64 = 40.0;
+/// See `CLEAR_GAIN`.
+pub const SURE_GAIN: f64 = 100.0;
 /// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
 const SEEN_GAIN: f64 = 10.0;
 /// Points looked at when rough poses are compared, at most: costs time in proportion.
@@ -84,14 +85,14 @@ fn overlap_cost(body: &Body, floor: Option<Ground>, chain: &TwoBone, poses: &[Po
         let first = if limb == chain.upper { 2 } else { 0 };
         for place in &ALONG_LIMB[first..] {
             let point = poses[limb] * Vec3::new(0.0, 0.0, place * shape.length());
-            let below = floor.is_some_and(|floor| floor.height(point) < -INSIDE);
+            let below = floor.is_some_and(|floor| floor.height(point) < -OVERLAP);
             let within = below
                 || (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
                     let shape = &body.limbs()[other].shape;
                     // Most limbs are too far away to hold it.
                     let reach = shape.length() + shape.a0().max(shape.b0()).max(shape.a1()).max(shape.b1());
                     (point - poses[other].translation).length_squared() < reach * reach
-                        && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -INSIDE
+                        && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -OVERLAP
                 });
             cost += if within { patches / ALONG_LIMB.len() as f64 } else { 0.0 };
         }
@@ -118,9 +119,10 @@ pub fn explain(body: &Body, limb: usize, poses: &[Pose], points: &Points, least:
     }
 }
 
-/// Cost of points at these distances from the nearest limb of a rough pose.
+/// Cost of points at these distances from the nearest limb of a rough pose, which explains what the camera does not see past: it is
+/// drawn in when the pose is refined.
 pub fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
-    distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / ROUGHLY).powi(2).min(1.0)).sum()
+    distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / SEEN_PAST).powi(2).min(1.0)).sum()
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! elsewhere there, and to the same place wherever the pictures tell. Where an arm or leg of the two is not in one place, the one
 //! that explains clearly more of the pictures is taken; how far they lie apart tells how little the pictures do.
 
+use super::landmark_cost::APART;
 use super::refined::{REFINE, Refined};
 use super::score::GAIN;
 use crate::config::Config;
@@ -14,9 +15,6 @@ use crate::math::{Pose, Vec3, shifted};
 const FEW_CAMERAS: usize = 2;
 /// The second body may move so many times as far as is expected of the first, and be held so much less to a usual posture.
 const LOOSER: f64 = 3.0;
-/// Ends of arms and legs that lie farther apart than this are not in one place, metres: nearer ones are hardly told by what they
-/// explain.
-const TWO_PLACES: f64 = 0.1;
 
 /// The other body.
 #[derive(Debug, Default)]
@@ -82,7 +80,8 @@ impl Second {
         }
         set_shifted(&mut self.poses, &self.motion.poses, origin);
         for chain in &context.model.extremities {
-            if chain.end(poses).distance(chain.end(&self.poses)) < TWO_PLACES {
+            // Nearer ones are hardly told by what they explain.
+            if chain.end(poses).distance(chain.end(&self.poses)) < APART {
                 continue;
             }
             let now = refined.cost(context, fit, poses);

@@ -6,8 +6,8 @@ use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
 use crate::visibility::evidence::{EXPLAINED, Visibility, limb_visibility};
 
-/// It is idle when the patches that it alone explains are a smaller share of those it shows.
-const IDLE: f64 = 0.3;
+/// It is idle when the patches that it alone explains are a smaller share of those it shows, in pictures of its area.
+pub(super) const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
 const REFUTED: f64 = 0.2;
 /// Either share is of this many patches at least (of those seen past, of the image): few patches flicker.

@@ -5,7 +5,7 @@ use crate::math::{Vec3, WeightedPoints};
 use crate::visibility::evidence::EXPLAINED;
 
 /// A larger share of the frame's weight than this unexplained is clutter: a heap of points in it says nothing.
-const CLUTTER: f64 = 0.15;
+pub const CLUTTER: f64 = 0.15;
 
 /// What the current matches leave unexplained.
 #[derive(Debug, Default)]

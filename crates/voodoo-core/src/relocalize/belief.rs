@@ -9,8 +9,6 @@ pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 pub(crate) const LOOK_COSTS: f64 = 1.0;
 /// What is seen within this of the last place is the same, metres.
 pub(crate) const SAME_PERSON: f64 = 0.5;
-/// Share that is left of what was believed after a frame without it.
-const FADES: f64 = 0.5;
 
 /// What past looks said.
 #[derive(Debug, Default)]
@@ -24,7 +22,8 @@ impl Belief {
     pub(super) fn observe(&mut self, seen: Option<&Detection>) -> bool {
         let root = seen.and_then(|seen| Some((seen.joint("humanoid_root")?.position, seen.person)));
         let Some((place, person)) = root else {
-            self.sum *= FADES;
+            // What flickers is forgotten.
+            self.sum *= 0.5;
             return false;
         };
         if place.distance(self.place) > SAME_PERSON {

@@ -3,6 +3,7 @@
 use super::belief::ENOUGH_ODDS;
 use crate::body::Body;
 use crate::detect::Detection;
+use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
@@ -13,14 +14,12 @@ const EVERY: [f64; 2] = [0.09, 0.45];
 /// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips
 /// and ankles 10 cm from where a detector tells them.
 const ELSEWHERE: f64 = 0.15;
-/// The same of arms.
-const ARMS_ELSEWHERE: f64 = 0.10;
 /// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
 pub(super) const SIGMAS: f64 = 3.5;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
-/// A body that has been lost for so long is gone, seconds.
-const GONE: f64 = 2.0;
+/// A body that has been lost for so long is gone, seconds; and who was hidden is waited for so long.
+pub(super) const GONE: f64 = 2.0;
 /// What a detection says of where the body is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
@@ -129,7 +128,7 @@ impl Doubt {
             apart > least && apart > sigmas * spread
         };
         let limbs = young || among;
-        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, ARMS_ELSEWHERE));
+        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, APART));
         if elsewhere(&TRUNK, ELSEWHERE) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
             self.agreed = false;

@@ -3,12 +3,12 @@
 
 use super::posture::Postures;
 use super::segment_motion::SegmentMotion;
+use crate::hypotheses::MOST_TURNED;
 use crate::math::{Quat, Vec3};
 
 /// Cost of the opposite direction, in patches, for a body that just stood the other way or that walks backwards.
 const TURNED: f64 = 120.0;
-/// How far a body turns before that counts: at once, radians, and for every second, radians a second.
-const FREE_TURN: f64 = 0.5;
+/// How far a body turns before that counts, beside what it may at once, for every second, radians a second.
 const TURN_RATE: f64 = 2.0;
 
 /// What is known of a lost body.
@@ -28,7 +28,7 @@ pub(super) fn facing_cost(known: Known, root: Quat, stamp: f64) -> f64 {
     let mut cost = 0.0;
     if let (Some(tracked), Some(pose)) = (postures.tracked_at, postures.tracked.first()) {
         let turn = level(pose.rotation * Vec3::X).angle_between(ahead);
-        let free = FREE_TURN + TURN_RATE * (stamp - tracked);
+        let free = MOST_TURNED + TURN_RATE * (stamp - tracked);
         cost += TURNED * if turn.is_finite() { (turn / free).powi(2).min(1.0) } else { 0.0 };
     }
     motion.walks(postures.up, stamp).map_or(cost, |direction| cost + TURNED * (1.0 - ahead.dot(direction)))

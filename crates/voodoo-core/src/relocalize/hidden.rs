@@ -1,5 +1,6 @@
 //! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
 
+use super::doubt::GONE;
 use crate::math::Vec3;
 use crate::observation::depth_view::{DepthViews, Pixel};
 use crate::observation::frame::Frame;
@@ -12,8 +13,6 @@ const HIDDEN_SHARE: f64 = 0.33;
 const IN_FRONT: f64 = 0.4;
 /// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
 const SEEN_FRAMES: usize = 10;
-/// Who was hidden is waited for so long, seconds.
-const WAITS: f64 = 2.0;
 
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
@@ -53,7 +52,7 @@ impl Hidden {
             return;
         }
         self.seen += usize::from(seen);
-        let last = self.last.filter(|(last, _)| stamp - last < WAITS);
+        let last = self.last.filter(|(last, _)| stamp - last < GONE);
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
 
@@ -105,7 +104,7 @@ mod tests {
                 "it may come back"
             );
         }
-        assert_eq!(after(&open, 0.3 + WAITS, true), [false; 3], "long ago");
+        assert_eq!(after(&open, 0.3 + GONE, true), [false; 3], "long ago");
         // Where it goes on to while it is hidden counts as well, and furniture does not.
         let beyond = moved(&poses, 0.3 * Vec3::Z);
         with_frame(&covered, 2.6, |frame| {

@@ -5,22 +5,18 @@ use super::posture::Place;
 use super::seeds::{RoughLook, Seed, find_seeds, put};
 use crate::body::Model;
 use crate::fit::{Context, Fit};
-use crate::hypotheses::{body_landmark_cost, explain, limit_strain, overall_cost};
+use crate::hypotheses::{CLEAR_GAIN, CLUTTER, SURE_GAIN, body_landmark_cost, explain, limit_strain, overall_cost};
 use crate::math::{Pose, Vec3};
 use crate::observation::segments::Segment;
 
-/// The opposite facing explains a frame worse by this, in patches, or it is waited for so long for evidence, seconds.
-const DECIDED: f64 = 100.0;
+/// Where the opposite facing does not explain a frame surely worse it is waited for so long for evidence, seconds.
 const WAIT: f64 = 0.5;
 /// Points that rough looks are taken at: costs time in proportion.
 const SEED_SAMPLE: usize = 300;
 /// ICP steps that refine a rough look.
 const STEPS: usize = 10;
-/// A segment of which a larger share lies farther than this (m) from the body is none.
-const MOST_STRAY: f64 = 0.15;
+/// What lies farther than this (m) from the body is stray: a segment of which too much is stray is no body.
 const STRAY_DISTANCE: f64 = 0.07;
-/// Patches by which a place must be better than the present pose: an area of eight by eight centimetres.
-const PLACE_GAIN: f64 = 40.0;
 /// What cameras have against a place counts at most this many times the weight of its points: so much says that it is wrong.
 const MOST_COST: f64 = 4.0;
 
@@ -62,7 +58,7 @@ impl Trials {
         let total = self.take_sample(context);
         fit.match_all(context, present, context.config.max_steps);
         let mut present_score = place_score(context, known, fit, present, total);
-        let explained = stray_share(&mut self.rough, context, present) < MOST_STRAY;
+        let explained = stray_share(&mut self.rough, context, present) < CLUTTER;
         if explained {
             // Refined as the others are: a body that is 2 cm off shall not be turned about for that.
             self.poses.clear();
@@ -71,7 +67,7 @@ impl Trials {
             present_score = present_score.min(place_score(context, known, fit, &self.poses, total));
         }
         find_seeds(&mut self.rough, context, known, segment, &mut self.seeds);
-        let mut least = present_score - PLACE_GAIN;
+        let mut least = present_score - CLEAR_GAIN;
         let mut found = false;
         let mut opposite = f64::INFINITY;
         let stood = present[0].rotation * Vec3::X;
@@ -85,7 +81,7 @@ impl Trials {
             let stray = stray_share(&mut self.rough, context, &self.poses);
             // A body that is where it should be may only turn out to face the other way.
             let allowed = !explained && known.lost || faces.dot(stood) < 0.0;
-            if allowed && score < least && stray < MOST_STRAY {
+            if allowed && score < least && stray < CLUTTER {
                 if turned {
                     opposite = least;
                 }
@@ -98,7 +94,7 @@ impl Trials {
             }
         }
         let waited = context.seen.frame().stamp - known.motion.seen_since > WAIT;
-        let decided = opposite - least > DECIDED || waited;
+        let decided = opposite - least > SURE_GAIN || waited;
         Outcome { gain: (found && decided).then_some(present_score - least), explained }
     }
 
@@ -114,8 +110,8 @@ impl Trials {
         let stray = stray_share(&mut self.rough, context, &self.poses);
         // Depth hardly tells a person's front from the back; the detector does.
         let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
-        let allowed = present_score + if turned { DECIDED } else { 0.0 };
-        let found = pose_score(context, fit, &self.poses, total) < allowed && stray < MOST_STRAY;
+        let allowed = present_score + if turned { SURE_GAIN } else { 0.0 };
+        let found = pose_score(context, fit, &self.poses, total) < allowed && stray < CLUTTER;
         if found {
             self.best.clone_from(&self.poses);
         }

@@ -8,14 +8,17 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ALONG_LIMB, SEEN_PAST};
+use crate::visibility::{ALONG_LIMB, SEEN_PAST, evenly};
 
 /// A point this far from the model's surface is not explained by it, metres.
 pub const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
-/// Where across a limb patches are looked at, in shares of its radius from the middle; nearer to the rim it was worse.
-const PATCHES_ACROSS: [f64; 3] = [-0.6, 0.0, 0.6];
+/// How far from a limb's middle the outer ones of three patches across it are looked at, in shares of its radius; nearer to the rim
+/// it was worse.
+const PATCH_RIM: f64 = 0.6;
+/// Where across a limb patches are looked at.
+const PATCHES_ACROSS: [f64; 3] = evenly(PATCH_RIM);
 /// A camera nearer to a limb's axis than this, metres, looks along it and sees no patch of its side.
 const END_ON: f64 = 1e-6;
 

@@ -12,12 +12,7 @@ use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::evidence::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, SEEN_PAST};
-
-/// The outer part of a limb begins at this share of its length.
-const OUTER: f64 = 0.6;
-/// A limb stands before a place when it is nearer to the camera by this, metres: limbs overlap at their joints.
-const BEFORE: f64 = 0.01;
+use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP, SEEN_PAST};
 
 /// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
 /// of each.
@@ -83,12 +78,12 @@ fn support_seen_by(
 ) -> LimbSupport {
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
-    let outer_sections = ALONG_LIMB.iter().filter(|t| **t > OUTER).count();
+    let outer_sections = ALONG_LIMB.iter().filter(|t| **t > 0.5).count();
     for t in ALONG_LIMB {
         let Some(facing) = shape.section(t).facing(&camera_from_limb) else { continue };
         // The weights of all places add up to one, in the whole and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);
-        let outer = if t > OUTER { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
+        let outer = if t > 0.5 { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
         let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
         for s in ACROSS_LIMB {
             let point = camera_from_limb * facing.point(s);
@@ -99,7 +94,7 @@ fn support_seen_by(
             support.known = true;
             let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
             let others = || raycasters.iter().enumerate().filter(|(other, _)| *other != limb);
-            if others().any(|(_, other)| depth(other) < point.z - BEFORE) {
+            if others().any(|(_, other)| depth(other) < point.z - OVERLAP) {
                 continue;
             }
             match pixel {

@@ -8,11 +8,40 @@ pub mod limb_support;
 pub mod render;
 pub mod roundness;
 
-/// Where along a limb its surface is compared with images, in shares of its length: evenly, and not at the ends, which belong
-/// to the neighbours as well.
-pub(crate) const ALONG_LIMB: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-/// Where across a limb, in shares of its radius from the middle; nearer to the rim, a pixel shows what lies beside it.
-pub(crate) const ACROSS_LIMB: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+/// At so many places along and across a limb its surface is compared with images.
+const PLACES: usize = 5;
+/// The outermost of those across, in shares of the radius from the middle: nearer to the rim, a pixel shows what lies beside it.
+const RIM: f64 = 0.7;
+/// Where they are along a limb, in shares of its length: evenly, and not at the ends, which belong to the neighbours as well.
+pub(crate) const ALONG_LIMB: [f64; PLACES] = middles();
+/// Where they are across a limb, in shares of its radius from the middle: evenly.
+pub(crate) const ACROSS_LIMB: [f64; PLACES] = evenly(RIM);
 /// A camera sees past the model's surface when what may be the body lies this much behind it, metres; half as much of what is
 /// known to be the background, since that is not the body.
 pub(crate) const SEEN_PAST: f64 = 0.08;
+/// Surfaces of limbs lie in each other by so much at their joints, and touch elsewhere, metres: no less stands before another one,
+/// or where there is no room for it.
+pub(crate) const OVERLAP: f64 = 0.01;
+
+/// The middles of as many equal parts of a length of one.
+const fn middles<const N: usize>() -> [f64; N] {
+    let mut places = [0.0; N];
+    let mut index = 0;
+    while index < N {
+        places[index] = (2 * index + 1) as f64 / (2 * N) as f64;
+        index += 1;
+    }
+    places
+}
+
+/// As many places, evenly from one side to the other, as far as `rim` from the middle.
+pub(crate) const fn evenly<const N: usize>(rim: f64) -> [f64; N] {
+    let mut places = [0.0; N];
+    let (step, middle) = (2.0 * rim / (N - 1) as f64, (N - 1) as f64 / 2.0);
+    let mut index = 0;
+    while index < N {
+        places[index] = (index as f64 - middle) * step;
+        index += 1;
+    }
+    places
+}

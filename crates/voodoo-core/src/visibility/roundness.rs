@@ -6,10 +6,8 @@
 use crate::body::Body;
 use crate::math::Pose;
 use crate::observation::depth_view::{DepthViews, Pixel};
-use crate::visibility::{ACROSS_LIMB, ALONG_LIMB};
+use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, SEEN_PAST};
 
-/// What is seen farther than this from the model's surface, metres along the ray, is something else.
-const SAME_THING: f64 = 0.08;
 /// Fewer places along limbs than this, of all cameras, say nothing.
 const FEWEST_SECTIONS: usize = 20;
 
@@ -29,7 +27,7 @@ pub fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> 
                 let depths = |across: f64| {
                     let point = camera_from_limb * facing.point(across);
                     match view.at(point) {
-                        Pixel::Foreground(z) if (z - point.z).abs() < SAME_THING => Some([point.z, z]),
+                        Pixel::Foreground(z) if (z - point.z).abs() < SEEN_PAST => Some([point.z, z]),
                         _ => None,
                     }
                 };

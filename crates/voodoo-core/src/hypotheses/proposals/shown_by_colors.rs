@@ -12,8 +12,9 @@ use crate::math::{Pose, Quat, Vec3};
 /// Directions of the upper limb that are tried, and how many of them with a lower limb.
 const DIRECTIONS: usize = 128;
 const UPPER_LIMBS: usize = 12;
-/// Turns of the upper limb about its own axis that are tried, radians, and bends of the hinge between its limits.
-const TWISTS: [f64; 5] = [0.0, 0.5, -0.5, 1.0, -1.0];
+/// Turns of the upper limb about its own axis that are tried, radians, none, one and two either way; and bends of the hinge between
+/// its limits.
+const TWIST: f64 = 0.5;
 const BENDS: usize = 5;
 /// Steps of the last look about the best: turns, radians.
 const CLOSER: [f64; 2] = [0.15, 0.08];
@@ -36,7 +37,7 @@ impl Propose for ShownByColors {
         self.find_directions(at, rough);
         let mut best = None;
         for &(_, upper) in &self.kept {
-            for twist in TWISTS {
+            for twist in [0.0, 1.0, -1.0, 2.0, -2.0].map(|step| step * TWIST) {
                 for bend in 0..BENDS {
                     let share = (bend as f64 + 0.5) / BENDS as f64;
                     let change = |poses: &mut [Pose]| set(at, poses, upper, twist, share);

@@ -13,8 +13,8 @@ use crate::hypotheses::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::visibility::evidence::limb_visibility;
 
-/// Leans that are tried after none, radians: coarser or finer ones were no better.
-const LEANS: [f64; 4] = [-0.2, 0.2, -0.4, 0.4];
+/// Leans that are tried after none, radians, and twice as far: coarser or finer ones were no better.
+const LEAN: f64 = 0.2;
 
 /// What leans and what stands, and working memory.
 #[derive(Debug, Default)]
@@ -101,11 +101,12 @@ impl TrunkLean {
         let origin = context.seen.origin();
         let legs = [(&extremities[one], one_end - origin), (&extremities[two], two_end - origin)];
         let (shoulders, axis) = self.shoulders(context, matched);
-        let leans = if axis == Vec3::ZERO { &[] } else { LEANS.as_slice() };
+        let steps = [0.0, -1.0, 1.0, -2.0, 2.0];
+        let leans = if axis == Vec3::ZERO { &steps[..1] } else { &steps[..] };
         self.explain_what_stays(context, matched, legs);
         let (mut least, mut stance) = (f64::INFINITY, None);
-        for angle in [&0.0].into_iter().chain(leans) {
-            let mut cost = self.lean_trunk(context, matched, shoulders, Quat::from_axis_angle(axis, *angle));
+        for angle in leans.iter().map(|step| step * LEAN) {
+            let mut cost = self.lean_trunk(context, matched, shoulders, Quat::from_axis_angle(axis, angle));
             for leg in legs {
                 cost += self.stand(context, matched, leg);
             }

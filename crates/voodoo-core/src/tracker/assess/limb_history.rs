@@ -1,10 +1,8 @@
 //! What is known about one limb, over a few frames: evidence flickers.
 
-use super::two_state::TwoState;
+use super::two_state::{EVEN, TwoState};
 use crate::tracker::estimate::LimbStatus;
 
-/// Share of the visible patches that a measured limb alone explains at least.
-pub(super) const SUPPORT: f64 = 0.15;
 /// Share of the patches facing a camera that it may see past.
 const CONTRADICTED: f64 = 0.3;
 /// A limb of which a smaller share shows is hidden.
@@ -53,7 +51,8 @@ impl LimbHistory {
 
     /// The status by what the limb alone explains.
     pub(super) fn supported(&self) -> LimbStatus {
-        if self.exclusive >= SUPPORT && self.contradicted <= CONTRADICTED {
+        // What it alone explains has to be twice that at which images leave it open.
+        if self.exclusive >= 2.0 * EVEN && self.contradicted <= CONTRADICTED {
             LimbStatus::Measured
         } else if self.shown < SHOWN && self.contradicted <= CONTRADICTED {
             LimbStatus::Inferred

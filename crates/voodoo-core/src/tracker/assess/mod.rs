@@ -31,8 +31,8 @@ use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
 use exclusive::Exclusive;
-use limb_history::{LimbHistory, SUPPORT};
-use two_state::{all, either, said_by, said_by_detector};
+use limb_history::LimbHistory;
+use two_state::{EVEN, SKELETONS_DIFFER, all, either, said_by, said_by_detector};
 
 /// Shares are of this many visible patches at least.
 const LEAST_VISIBLE: f64 = 8.0;
@@ -41,13 +41,9 @@ const FEW: f64 = 5.0;
 /// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
 const FLAT: f64 = 0.2;
 const ROUNDNESS_MEMORY: f64 = 0.9;
-/// Share of the limbs of a tracked body that are measured at least; with fewer than `SOME` measured it is lost, and with fewer
-/// than `HALF` where the root is none of them.
-const TRACKED: f64 = 0.75;
-const HALF: f64 = 0.5;
+/// Of a tracked body no larger share of the limbs is not measured. One of which no larger share is measured is lost, and so is one of
+/// which less than twice that is where the root is not.
 const SOME: f64 = 0.25;
-/// A site this near the joint of its limb is where the joint is, metres: models put hips and shoulders a little apart.
-const AT_JOINT: f64 = 0.03;
 
 /// Assesses every frame, and remembers what past ones said.
 #[derive(Debug, Default)]
@@ -174,7 +170,7 @@ impl Assessor {
             }
         }
         let status = if self.told_by_edges() { overall(statuses) } else { self.status };
-        let doubtful = status == Status::Tracking && measured_share(statuses) < TRACKED;
+        let doubtful = status == Status::Tracking && measured_share(statuses) < 1.0 - SOME;
         estimate.status = if doubtful { Status::Degraded } else { status };
     }
 
@@ -197,7 +193,7 @@ impl Assessor {
                 let past = seen.free_space / seen.front_facing;
                 [exclusive / visible.max(LEAST_VISIBLE), past, visible / seen.front_facing]
             } else {
-                [SUPPORT * exclusive / FEW, 0.0, 0.0]
+                [2.0 * EVEN * exclusive / FEW, 0.0, 0.0]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
@@ -281,7 +277,7 @@ fn joint_apart(body: &Body, poses: &[Pose], limb: usize, detection: &Detection, 
 fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize> {
     let (parent, joint) = body.limbs()[pair.limb].parent.as_ref()?;
     let centre = poses[pair.limb].transform_point(joint.limb_from_joint.translation);
-    ((pair.x - centre).length() < AT_JOINT).then_some(*parent)
+    ((pair.x - centre).length() < SKELETONS_DIFFER).then_some(*parent)
 }
 
 /// Hands and feet show too few patches to tell on their own: they have the status of what they hang on.
@@ -298,9 +294,9 @@ fn measured_share(limbs: &[LimbStatus]) -> f64 {
 /// Lost without a measured root and half of the limbs; degraded when more than a quarter of the limbs are not measured.
 fn overall(limbs: &[LimbStatus]) -> Status {
     let measured = measured_share(limbs);
-    if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < HALF) {
+    if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < 2.0 * SOME) {
         Status::Lost
-    } else if measured < TRACKED {
+    } else if measured < 1.0 - SOME {
         Status::Degraded
     } else {
         Status::Tracking

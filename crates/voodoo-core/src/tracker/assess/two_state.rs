@@ -6,7 +6,7 @@
 
 /// What speaks for a limb less what speaks against it, as a share, is weighed by this: here the odds are even, and every time as
 /// much again makes them e times greater.
-const EVEN: f64 = 0.075;
+pub(super) const EVEN: f64 = 0.075;
 /// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
 /// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
 const CHANGES: f64 = 0.05;
@@ -15,7 +15,7 @@ const CHANGES: f64 = 0.05;
 const FAR: f64 = 0.3;
 /// How far a right joint lies from where a detector is told to see it, metres along each axis, beside the detector's own standard
 /// deviation: skeletons differ.
-const SKELETONS_DIFFER: f64 = 0.03;
+pub(super) const SKELETONS_DIFFER: f64 = 0.03;
 
 /// Log odds that something is right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
