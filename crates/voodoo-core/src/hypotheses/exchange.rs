@@ -176,7 +176,7 @@ mod tests {
     fn one_looks_every_so_often_and_at_once_where_a_leg_is_in_doubt() {
         let mut exchange = Exchange::default();
         let due: Vec<bool> = (0..8).map(|_| exchange.is_due(false)).collect();
-        assert_eq!(due.iter().filter(|due| **due).count(), 8 / (REST / 2));
+        assert_eq!(due.iter().filter(|due| **due).count(), 8 / REST);
         assert!(exchange.is_due(true));
     }
 }
