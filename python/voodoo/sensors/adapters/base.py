@@ -123,8 +123,11 @@ class Context:
         self, points: npt.NDArray[Any], root_from_sensor: FloatArray, stamp: float
     ) -> npt.NDArray[Any]:
         """Points of a sensor (N, 3) [m] measured at `stamp`, those on the body where they are at the frame's time."""
+        elapsed = self.stamp - stamp
+        if not self.motion.moves(elapsed):
+            return points
         return self.motion.motion_compensated(
-            points, self.stamp - stamp, self.tracker.limb_distances, world_from_sensor=root_from_sensor
+            points, elapsed, self.tracker.limb_distances, world_from_sensor=root_from_sensor
         )
 
 
