@@ -110,7 +110,7 @@ impl Refined {
             }
             let here = if step < ROUGH_STEPS { context.roughly() } else { context };
             // As in a frame's own steps, points mostly stay with the limbs they have.
-            if step > BACK_AFTER && step % 2 == 1 || step == BACK_AFTER {
+            if step >= BACK_AFTER && step % 2 == 1 {
                 fit.match_again(here, &self.poses, at);
             } else {
                 fit.match_all(here, &self.poses, at);

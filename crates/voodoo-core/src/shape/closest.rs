@@ -43,7 +43,8 @@ impl TaperedEllipticCylinder {
     ///
     /// For a query folded to `x, y >= 0` the side asks for the least of `g(θ) = min_t |P(θ, t) - q|²` on a quadrant, where
     /// `g'(0) <= 0 <= g'(π/2)`: Newton's iteration, kept in a bracket by bisection, always ends in a minimum. `g` has only
-    /// one when `a0 b1 = a1 b0` and no end is nearly a tip; otherwise a scan finds the basins first. The caps compete where the query projects into
+    /// one when `a0 b1 = a1 b0` and no end is nearly a tip, and where these differ little and it is a distinct one; otherwise a scan
+    /// finds the basins first. The caps compete where the query projects into
     /// them. Where several points are equally near (on the medial axis) one of them is returned.
     ///
     /// A query that is not finite gives a point and a distance that are not a number.
