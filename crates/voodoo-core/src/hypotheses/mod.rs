@@ -15,7 +15,7 @@ mod unexplained;
 
 pub use exchange::MOST_TURNED;
 pub use landmark_cost::{APART, body_landmark_cost};
-pub use score::{CLEAR_GAIN, Cost, GAIN, SURE_GAIN, explain, limit_strain, overall_cost};
+pub use score::{CLEAR_GAIN, Cost, GAIN, ROUGH_SAMPLE, SEEN_GAIN, SURE_GAIN, explain, limit_strain, overall_cost};
 pub use unexplained::CLUTTER;
 
 use crate::association::correspondence::RegionSupport;
@@ -23,6 +23,7 @@ use crate::body::{Body, Model};
 use crate::detect::Detection;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
+use crate::visibility::LITTLE;
 use exchange::Exchange;
 use history::History;
 use proposals::{
@@ -32,7 +33,7 @@ use proposals::{
 use refined::{Outcome, Present, Refined};
 use rough::{Extremity, RoughSearch};
 use second::Second;
-use suspicion::{IDLE, Suspicion};
+use suspicion::Suspicion;
 use unexplained::Unexplained;
 
 /// Unexplained points are near an arm or leg within this many times its length.
@@ -176,7 +177,7 @@ impl Hypotheses {
             let sum =
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
-            let suspect = gained < IDLE * area;
+            let suspect = gained < LITTLE * area;
             return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE), false);
         }
         let near = &mut self.rough.score.unexplained;

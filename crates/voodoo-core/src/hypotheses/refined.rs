@@ -2,7 +2,7 @@
 
 use super::history::Basis;
 use super::proposals::Proposal;
-use super::score::{Cost, overall_cost};
+use super::score::{Cost, SEEN_GAIN, overall_cost};
 use super::suspicion::Suspicion;
 use crate::association::correspondence::Correspondences;
 use crate::fit::{Context, Fit, Matched};
@@ -11,10 +11,9 @@ use crate::regions::{Backdrop, Posed};
 
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 pub(super) const REFINE: usize = 8;
-/// After so many of them a hypothesis is given up that costs so many patches more than the current pose: of 63 that were taken in the
+/// After so many of them a hypothesis is given up that costs clearly more than the current pose: of 63 that were taken in the
 /// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
 const GIVE_UP_AFTER: usize = 6;
-const FALLEN_BEHIND: f64 = 15.0;
 /// Steps with few points: they need not be exact. The hypothesis is judged by all of them.
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
 /// After so many steps an arm or leg whose joint and end are this near to those of the current pose, metres, will be the same: a
@@ -65,7 +64,7 @@ impl Refined {
         let chain = &context.model.extremities[index];
         let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
         // What colours alone tell on the way says little.
-        let most = if pictures { f64::INFINITY } else { present.cost.total + FALLEN_BEHIND };
+        let most = if pictures { f64::INFINITY } else { present.cost.total + SEEN_GAIN };
         let alone = matches!(basis, Basis::Points | Basis::Rest) && !pictures;
         let comes_back = |poses: &[Pose]| alone && chain.distance(poses, present.poses) < BACK;
         let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most, comes_back);

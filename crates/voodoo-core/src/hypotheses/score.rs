@@ -24,8 +24,9 @@ pub const GAIN: f64 = 25.0;
 pub const CLEAR_GAIN: f64 = 40.0;
 /// See `CLEAR_GAIN`.
 pub const SURE_GAIN: f64 = 100.0;
-/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump.
-const SEEN_GAIN: f64 = 10.0;
+/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump. Fewer
+/// flicker: so many more than the current pose a hypothesis may cost on its way, and shares are of so many at least.
+pub const SEEN_GAIN: f64 = 10.0;
 /// Points looked at when rough poses are compared, at most: costs time in proportion.
 pub const ROUGH_SAMPLE: usize = 400;
 

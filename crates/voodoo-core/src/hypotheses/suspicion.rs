@@ -1,18 +1,14 @@
 //! Whether the frame speaks against an arm or leg where it is.
 
-use super::score::{GAIN, bounds, explain, may_explain};
+use super::score::{GAIN, SEEN_GAIN, bounds, explain, may_explain};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
+use crate::visibility::LITTLE;
 use crate::visibility::evidence::{EXPLAINED, Visibility, limb_visibility};
 
-/// It is idle when the patches that it alone explains are a smaller share of those it shows, in pictures of its area.
-pub(super) const IDLE: f64 = 0.3;
 /// It is refuted when cameras see past a larger share of it.
 const REFUTED: f64 = 0.2;
-/// Either share is of this many patches at least (of those seen past, of the image): few patches flicker.
-const LEAST_SHOWN: f64 = 20.0;
-const LEAST_PAST: f64 = 12.0;
 
 /// What an arm or leg explains now, and working memory.
 #[derive(Debug, Default)]
@@ -52,8 +48,9 @@ impl Suspicion {
         let mut seen = Visibility::default();
         let mut against = |limb: usize, exclusive: f64| {
             seen += limb_visibility(context.seen.views, &body.limbs()[limb], &matched.poses[limb]);
-            exclusive <= IDLE * (seen.image.front_facing - seen.image.occluded).max(LEAST_SHOWN)
-                || seen.image.free_space > (REFUTED * seen.image.front_facing).max(LEAST_PAST)
+            // Few patches flicker.
+            exclusive <= LITTLE * (seen.image.front_facing - seen.image.occluded).max(GAIN)
+                || seen.image.free_space > (REFUTED * seen.image.front_facing).max(SEEN_GAIN)
         };
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
@@ -61,7 +58,7 @@ impl Suspicion {
         let lower = against(chain.lower, exclusive(upper));
         let upper = against(chain.upper, exclusive(0));
         let shown = seen.image.front_facing - seen.image.occluded - seen.image.free_space;
-        let past = seen.side.free_space > (REFUTED * seen.side.front_facing).max(LEAST_SHOWN);
+        let past = seen.side.free_space > (REFUTED * seen.side.front_facing).max(GAIN);
         let drawn = drawn && (past || shown < GAIN);
         [upper || drawn, lower || drawn]
     }

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 /// What a look counts less than its log odds: looks at a thing that stands still err alike.
 pub(crate) const LOOK_COSTS: f64 = 1.0;
-/// What is seen within this of the last place is the same, metres.
+/// What is seen within this of the last place is the same, metres; what appears farther away is another one.
 pub(crate) const SAME_PERSON: f64 = 0.5;
 
 /// What past looks said.

@@ -3,11 +3,9 @@
 
 use super::posture::Postures;
 use super::segment_motion::SegmentMotion;
-use crate::hypotheses::MOST_TURNED;
+use crate::hypotheses::{MOST_TURNED, SURE_GAIN};
 use crate::math::{Quat, Vec3};
 
-/// Cost of the opposite direction, in patches, for a body that just stood the other way or that walks backwards.
-const TURNED: f64 = 120.0;
 /// How far a body turns before that counts, beside what it may at once, for every second, radians a second.
 const TURN_RATE: f64 = 2.0;
 
@@ -29,9 +27,9 @@ pub(super) fn facing_cost(known: Known, root: Quat, stamp: f64) -> f64 {
     if let (Some(tracked), Some(pose)) = (postures.tracked_at, postures.tracked.first()) {
         let turn = level(pose.rotation * Vec3::X).angle_between(ahead);
         let free = MOST_TURNED + TURN_RATE * (stamp - tracked);
-        cost += TURNED * if turn.is_finite() { (turn / free).powi(2).min(1.0) } else { 0.0 };
+        cost += SURE_GAIN * if turn.is_finite() { (turn / free).powi(2).min(1.0) } else { 0.0 };
     }
-    motion.walks(postures.up, stamp).map_or(cost, |direction| cost + TURNED * (1.0 - ahead.dot(direction)))
+    motion.walks(postures.up, stamp).map_or(cost, |direction| cost + SURE_GAIN * (1.0 - ahead.dot(direction)))
 }
 
 #[cfg(test)]
@@ -55,7 +53,7 @@ mod tests {
         );
         postures.remember(&poses, 1.0);
         assert!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, same, 1.1) < 1e-9);
-        assert_eq!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, about, 1.1), TURNED);
-        assert!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, about, 6.0) < 0.2 * TURNED);
+        assert_eq!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, about, 1.1), SURE_GAIN);
+        assert!(facing_cost(Known { postures: &postures, motion: &motion, lost: true }, about, 6.0) < 0.2 * SURE_GAIN);
     }
 }

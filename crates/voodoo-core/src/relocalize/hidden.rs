@@ -4,11 +4,10 @@ use super::doubt::GONE;
 use crate::math::Vec3;
 use crate::observation::depth_view::{DepthViews, Pixel};
 use crate::observation::frame::Frame;
+use crate::visibility::LITTLE;
 
 /// What is measured so much nearer than a joint hides it, metres: more than half of a body is thick.
 const COVERS: f64 = 0.3;
-/// A body is hidden when this share of its joints is: its own arms hide less of it, and who stands before it may be slimmer.
-const HIDDEN_SHARE: f64 = 0.33;
 /// What stands before a hidden body is at least so much nearer to a camera, metres.
 const IN_FRONT: f64 = 0.4;
 /// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
@@ -46,7 +45,8 @@ impl Hidden {
         let stamp = views.frame.stamp;
         let Some(root) = root else { return };
         self.now = root;
-        if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
+        // Its own arms hide less of it, and who stands before it may be slimmer.
+        if f64::from(hidden) >= LITTLE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
             self.last = (self.seen >= SEEN_FRAMES).then_some((stamp, place));
             return;

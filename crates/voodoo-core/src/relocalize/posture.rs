@@ -7,8 +7,8 @@ use crate::observation::segments::Segment;
 
 /// A segment shows at least this share of the surface that a camera can see of the body: the rest may be hidden.
 const LEAST_SURFACE: f64 = 0.25;
-/// Its extents as shares of the body's height at rest: the longer one at least, the upright one and the others at most.
-const EXTENTS: [f64; 3] = [0.35, 1.4, 1.5];
+/// Its extents as shares of the body's height at rest: the longer one at least, and all at most.
+const EXTENTS: [f64; 2] = [0.35, 1.5];
 
 /// Poses of the whole body, working frame.
 pub(super) type Place = Vec<Pose>;
@@ -64,10 +64,10 @@ impl Postures {
     /// Whether a segment may be the body.
     pub(super) fn fits(&self, segment: &Segment) -> bool {
         let extents = segment.high - segment.low;
-        let [least, upright, across] = EXTENTS.map(|share| share * self.height);
+        let [least, most] = EXTENTS.map(|share| share * self.height);
         let tall = extents.dot(self.up.abs());
         let wide = (extents - self.up.abs() * tall).max_element();
-        segment.patches > LEAST_SURFACE * self.patches && tall.max(wide) > least && tall < upright && wide < across
+        segment.patches > LEAST_SURFACE * self.patches && tall.max(wide) > least && tall < most && wide < most
     }
 }
 

@@ -1,13 +1,11 @@
 //! How the largest thing that may be the body moves: a person who walks faces where he goes.
 
+use super::belief::SAME_PERSON;
 use crate::math::Vec3;
 
-/// A segment that moves faster than this (m/s), and by more than this (m), walks; seen over so many seconds.
+/// A segment that moves faster than this (m/s), and as far as that takes it in so many seconds, over which it is seen, walks.
 const WALKING_SPEED: f64 = 0.3;
-const WALKING_DISTANCE: f64 = 0.2;
 const WALKING_TIME: f64 = 0.7;
-/// A segment farther than this from where it was in the frame before is another one, metres.
-const JUMP: f64 = 0.4;
 
 /// Where it was a while ago and last; world frame.
 #[derive(Debug, Default)]
@@ -30,7 +28,7 @@ impl SegmentMotion {
             self.first = None;
             return;
         };
-        let jumped = (place - self.last).length() > JUMP;
+        let jumped = (place - self.last).length() > SAME_PERSON;
         if self.first.is_none() || jumped {
             self.seen_since = stamp;
         }
@@ -45,7 +43,7 @@ impl SegmentMotion {
         let (since, first) = self.first?;
         let way = self.last - first;
         let way = way - up * way.dot(up);
-        let walks = way.length() > WALKING_DISTANCE.max(WALKING_SPEED * (stamp - since));
+        let walks = way.length() > WALKING_SPEED * (stamp - since).max(WALKING_TIME);
         walks.then(|| way.normalize_or_zero())
     }
 }

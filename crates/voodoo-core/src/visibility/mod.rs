@@ -19,6 +19,9 @@ pub(crate) const ACROSS_LIMB: [f64; SECTIONS] = evenly(LIMB_RIM);
 /// A camera sees past the model's surface when what may be the body lies this much behind it, metres; half as much of what is
 /// known to be the background, since that is not the body.
 pub(crate) const SEEN_PAST: f64 = 0.08;
+/// A smaller share of what a limb should show is little: it is idle that alone explains no more, hidden that shows no more, and of one
+/// that is right cameras may see past so much.
+pub(crate) const LITTLE: f64 = 0.3;
 /// Surfaces of limbs lie in each other by so much at their joints, and touch elsewhere, metres: no less stands before another one,
 /// or where there is no room for it.
 pub(crate) const OVERLAP: f64 = 0.01;

@@ -1,14 +1,13 @@
 //! The arm or leg ends at a cluster of points that no limb explains.
 
 use super::{Pool, Propose, SWIVELS};
+use crate::hypotheses::APART;
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
 
 /// Places where the end is tried, at most: costs time in proportion.
 const MOST_ENDS: usize = 5;
-/// Size of what stands for one cluster, metres: a hand.
-const CLUSTER_RADIUS: f64 = 0.08;
 /// Patches of a cluster that may be stray: a few stray points are no hand.
 const STRAY_PATCHES: f64 = 3.0;
 
@@ -48,7 +47,7 @@ fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> 
     while found < MOST_ENDS {
         let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
         let place = points.get(next);
-        if f64::from(apart[next]) < CLUSTER_RADIUS {
+        if f64::from(apart[next]) < APART {
             break;
         }
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
@@ -56,7 +55,7 @@ fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> 
             let point = points.get(index);
             let distance = (point - place).length();
             *apart = apart.min(distance as f32);
-            if distance < CLUSTER_RADIUS {
+            if distance < APART {
                 sum += weights[index] * point;
                 total += weights[index];
             }

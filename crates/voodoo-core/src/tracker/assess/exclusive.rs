@@ -1,12 +1,10 @@
 //! What each limb explains and no other but its neighbours.
 
 use crate::body::Body;
+use crate::hypotheses::ROUGH_SAMPLE;
 use crate::math::{Points, Pose};
 use crate::observation::candidates::Candidates;
 use crate::visibility::evidence::EXPLAINED;
-
-/// Candidates that are looked at, about: costs time in proportion.
-const EXCLUSIVE_SAMPLE: usize = 250;
 
 /// Weight of such candidates, and working memory.
 #[derive(Debug, Default)]
@@ -31,7 +29,7 @@ impl Exclusive {
             counts.clear();
             counts.resize(count, 0.0);
         }
-        let step = (candidates.len() / EXCLUSIVE_SAMPLE).max(1);
+        let step = (candidates.len() / ROUGH_SAMPLE).max(1);
         let points = &candidates.points;
         sample.clear();
         for index in (0..points.len()).step_by(step) {

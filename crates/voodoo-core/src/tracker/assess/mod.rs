@@ -22,7 +22,7 @@ use crate::association::correspondence::SitePair;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::fit::{Context, Matched};
-use crate::hypotheses::APART;
+use crate::hypotheses::{APART, SEEN_GAIN};
 use crate::math::{Pose, Vec3};
 use crate::uncertainty::{ByEdges, Uncertainty};
 use crate::visibility::evidence::limb_visibility;
@@ -33,8 +33,6 @@ use exclusive::Exclusive;
 use limb_history::LimbHistory;
 use two_state::{EVEN, all, either, said_by};
 
-/// Shares are of this many visible patches at least.
-const LEAST_VISIBLE: f64 = 8.0;
 /// Without a depth image, points on a limb that make it measured.
 const FEW: f64 = 5.0;
 /// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
@@ -186,7 +184,7 @@ impl Assessor {
             let exclusive = self.exclusive.weight[limb];
             let mut now = if seen.front_facing > 0.0 {
                 let past = seen.free_space / seen.front_facing;
-                [exclusive / visible.max(LEAST_VISIBLE), past, visible / seen.front_facing]
+                [exclusive / visible.max(SEEN_GAIN), past, visible / seen.front_facing]
             } else {
                 [2.0 * EVEN * exclusive / FEW, 0.0, 0.0]
             };
