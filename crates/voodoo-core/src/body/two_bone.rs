@@ -99,12 +99,6 @@ impl TwoBone {
         poses[self.lower] * (Vec3::Z * self.lengths[1])
     }
 
-    /// How far its hinge or its end, whichever is farther, lies from where it is in other poses, metres.
-    pub fn distance(&self, poses: &[Pose], other: &[Pose]) -> f64 {
-        let hinge = poses[self.lower].translation.distance(other[self.lower].translation);
-        hinge.max(self.end(poses).distance(self.end(other)))
-    }
-
     /// Puts the chain so that it bends towards one place and ends in the direction of another one; the joints stay closed.
     pub fn put(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
         let root = self.root(body, poses);

@@ -1,7 +1,6 @@
 //! Trying other configurations of arms and legs where the frame speaks against the current ones, and keeping the best by one
 //! score.
 
-mod exchange;
 mod history;
 mod landmark_cost;
 mod persistence;
@@ -13,9 +12,10 @@ mod second;
 mod suspicion;
 mod unexplained;
 
-pub use exchange::MOST_TURNED;
 pub use landmark_cost::{APART, body_landmark_cost};
-pub use score::{CLEAR_GAIN, Cost, GAIN, ROUGH_SAMPLE, SEEN_GAIN, SURE_GAIN, explain, limit_strain, overall_cost};
+pub use persistence::PATIENCE;
+pub use refined::REFINE;
+pub use score::{Cost, GAIN, ROUGH_SAMPLE, SURE_GAIN, explain, limit_strain, overall_cost};
 pub use unexplained::CLUTTER;
 
 use crate::association::correspondence::RegionSupport;
@@ -24,23 +24,16 @@ use crate::detect::Detection;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
 use crate::visibility::LITTLE;
-use exchange::Exchange;
 use history::History;
 use proposals::{
-    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
-    UnexplainedCluster,
+    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean, UnexplainedCluster,
 };
-use refined::{Outcome, Present, Refined};
+use refined::{Outcome, Refined};
 use rough::{Extremity, RoughSearch};
+use score::CLEAR_GAIN;
 use second::Second;
 use suspicion::Suspicion;
 use unexplained::Unexplained;
-
-/// Unexplained points are near an arm or leg within this many times its length.
-const NEARBY: f64 = 1.15;
-/// Frames in a row that have to speak against an arm or leg, and twice as many against an arm by nothing but unexplained points:
-/// a single frame may be disturbed.
-const PATIENCE: usize = 2;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]
@@ -51,9 +44,7 @@ pub struct Hypotheses {
     rough: RoughSearch,
     clusters: UnexplainedCluster,
     lean: TrunkLean,
-    shown: ShownByColors,
     pool: Pool,
-    exchange: Exchange,
     refined: Refined,
     second: Second,
 }
@@ -70,7 +61,6 @@ impl Hypotheses {
         // Room at once, not when the first hard frame comes.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
-        self.exchange.prepare(limbs);
         self.lean.prepare(model);
         self.second.prepare(limbs);
         self.refined.poses.clear();
@@ -120,10 +110,6 @@ impl Hypotheses {
             steps += taken;
         }
         if pictures {
-            let doubtful = |index: usize| !self.history[index].persistence.is_clear();
-            steps += self.exchange.attempt(context, doubtful, &mut self.refined, fit, poses, predicted);
-        }
-        if pictures {
             steps += self.second.compare(context, &mut self.refined, fit, poses, predicted);
         }
         if pictures && steps > 0 {
@@ -163,7 +149,6 @@ impl Hypotheses {
             for backdrop in [&mut self.rough.score.backdrop, &mut self.refined.backdrop] {
                 backdrop.make_room(frame, limbs);
             }
-            self.shown.make_room(limbs);
         }
         self.refined.matched.reserve_as(fit.correspondences());
     }
@@ -181,7 +166,7 @@ impl Hypotheses {
             return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE), false);
         }
         let near = &mut self.rough.score.unexplained;
-        self.unexplained.near(at.root(), NEARBY * chain.stretched_length(), near);
+        self.unexplained.near(at.root(), chain.stretched_length(), near);
         let unexplained = near.total();
         // Nothing else than the arm is expected about an arm, but furniture stays open beside legs.
         let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= CLEAR_GAIN;
@@ -193,18 +178,17 @@ impl Hypotheses {
 
     /// Fills the pool with other configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<&Detection>, detected: &[Pose]) {
-        let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
+        let Self { history, suspicion, rough, clusters, lean, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current - GAIN);
         // The kinds of proposals: one more is a file and a line here.
-        let kinds: [&mut dyn Propose; 8] = [
+        let kinds: [&mut dyn Propose; 7] = [
             clusters,
             &mut LastGoodEnd,
             &mut CarriedByParent,
             &mut LastProposal,
             lean,
-            shown,
             &mut DetectedEnd(detection),
             &mut DetectedBody(detected),
         ];
@@ -232,8 +216,7 @@ impl Hypotheses {
         let present = refined.cost(context, fit, poses);
         let (mut steps, mut hopeless) = (0, true);
         for proposal in pool.found() {
-            let (taken, outcome) =
-                refined.improves(context, Present { poses, cost: present }, index, fit, proposal, suspicion);
+            let (taken, outcome) = refined.improves(context, present, index, fit, proposal, suspicion);
             steps += taken;
             hopeless &= outcome == Outcome::Hopeless;
             if outcome != Outcome::Better {
@@ -263,7 +246,7 @@ impl Hypotheses {
 mod tests {
     use super::history::Basis;
     use super::proposals::Proposal;
-    use super::refined::{BACK_AFTER, REFINE};
+    use super::refined::REFINE;
     use super::*;
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
@@ -327,11 +310,11 @@ mod tests {
             let before = format!("{:?}", fit.correspondences());
             let (wrong, _) = raised(&model, &poses, 0.2);
             // The others are as good as the current one, and no better.
-            let present = Present { poses: &poses, cost: refined.cost(context, &fit, &poses) };
+            let present = refined.cost(context, &fit, &poses);
             for (tried, basis, ended) in [
                 (&wrong, Basis::Rest, |steps, outcome| steps < REFINE && outcome == Outcome::Hopeless),
-                (&poses, Basis::Lean, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
-                (&poses, Basis::Rest, |steps, outcome| (steps, outcome) == (BACK_AFTER, Outcome::Refused)),
+                (&poses, Basis::Body, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
+                (&poses, Basis::Rest, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
             ] as [(_, _, fn(usize, Outcome) -> bool); 3]
             {
                 let tried = Proposal { found: true, basis, poses: tried.clone() };

@@ -1,18 +1,14 @@
 //! How long frames have spoken against an arm or leg, and whether two in a row asked for the same change.
 
-/// A chain is tried in every second frame only after so many refusals in a row, in every third after twice as many, and so on:
-/// a hidden arm is refused for seconds.
-pub(super) const WEARY: usize = 8;
-/// But at least in every `REST`th, which is as well the next one where nothing came near to what the frame shows.
-pub(super) const REST: usize = 4;
+/// Frames in a row that have to speak against an arm or leg, or against the whole body, and twice as many against an arm by nothing but
+/// unexplained points: a single frame may be disturbed. An arm or leg rests for as many where nothing came near.
+pub const PATIENCE: usize = 2;
 
 /// What past frames said against one arm or leg.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Persistence {
     /// Frames in a row that spoke against it.
     frames: usize,
-    /// How often it was refused a change since it was in order, or since a frame asked for one.
-    refused: usize,
     /// This frame voted for a change, and the frame before did.
     voted: bool,
     voted_before: bool,
@@ -22,8 +18,7 @@ pub(super) struct Persistence {
 
 impl Persistence {
     /// Takes note of a frame, which speaks against the chain when it names how many such frames it takes; whether it is time
-    /// to try other configurations: of a chain that was refused for long in few frames, but where there is something `new`. To be
-    /// called in every frame.
+    /// to try other configurations, and it does not rest, or there is something `new`. To be called in every frame.
     pub(super) fn observe(&mut self, patience: Option<usize>, new: bool) -> bool {
         let voted_before = self.voted;
         self.voted = false;
@@ -33,23 +28,19 @@ impl Persistence {
         };
         self.voted_before = voted_before;
         self.frames += 1;
-        self.refused += 1;
-        let every = self.refused.div_ceil(WEARY).min(REST);
-        let rests = self.rest > 0 || !self.refused.is_multiple_of(every);
-        let rests = rests && !new;
+        let rests = self.rest > 0 && !new;
         self.rest = self.rest.saturating_sub(1);
         self.frames >= patience && !rests
     }
 
     /// Nothing that was tried in this frame came near to what it shows: the next frames will hardly think otherwise.
     pub(super) fn rest(&mut self) {
-        self.rest = REST - 1;
+        self.rest = PATIENCE;
     }
 
     /// This frame asks for a change; whether it is made, because the frame before asked as well: a single frame may be disturbed.
     pub(super) fn vote(&mut self) -> bool {
         self.voted = true;
-        self.refused = 0;
         self.voted_before
     }
 
@@ -104,28 +95,14 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_for_which_nothing_came_near_rests_for_three_frames_unless_it_was_in_order() {
+    fn a_chain_for_which_nothing_came_near_rests_unless_it_was_in_order_or_there_is_something_new() {
         let mut persistence = Persistence::default();
         assert!(persistence.observe(Some(1), false));
         persistence.rest();
-        let tried: Vec<bool> = (1..2 * REST).map(|_| persistence.observe(Some(1), false)).collect();
-        assert_eq!(tried, [false, false, false, true, true, true, true]);
+        let tried: Vec<bool> = (0..5).map(|_| persistence.observe(Some(1), false)).collect();
+        assert_eq!(tried, [false, false, true, true, true]);
         persistence.rest();
+        assert!(persistence.observe(Some(1), true));
         assert!(!persistence.observe(None, false) && persistence.observe(Some(1), false));
-    }
-
-    #[test]
-    fn a_chain_is_tried_less_the_longer_it_is_refused_until_it_asks() {
-        let mut persistence = Persistence::default();
-        let tried: Vec<bool> =
-            (0..(REST - 1) * WEARY + 10 * REST).map(|_| persistence.observe(Some(1), false)).collect();
-        let due = |tried: &[bool]| tried.iter().filter(|due| **due).count();
-        let eights = [0, 1, 2, 3].map(|eight| due(&tried[eight * WEARY..][..WEARY]));
-        assert_eq!((eights, due(&tried[(REST - 1) * WEARY..])), ([8, 4, 3, 2], 10));
-        let mut tired = persistence;
-        assert!((0..REST).all(|_| tired.observe(Some(1), true)), "there is something new");
-        while !persistence.observe(Some(1), false) {}
-        persistence.vote();
-        assert!(persistence.observe(Some(1), false) && persistence.vote());
     }
 }

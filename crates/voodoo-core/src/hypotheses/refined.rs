@@ -10,17 +10,12 @@ use crate::math::Pose;
 use crate::regions::{Backdrop, Posed};
 
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
-pub(super) const REFINE: usize = 8;
+pub const REFINE: usize = 8;
 /// After so many of them a hypothesis is given up that costs clearly more than the current pose: of 63 that were taken in the
 /// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
 const GIVE_UP_AFTER: usize = 6;
 /// Steps with few points: they need not be exact. The hypothesis is judged by all of them.
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
-/// After so many steps an arm or leg whose joint and end are this near to those of the current pose, metres, will be the same: a
-/// quarter of all, of which nine in a hundred explained more in the end, all less than 3 cm away.
-pub(super) const BACK_AFTER: usize = 3;
-const BACK: f64 = 0.03;
-
 /// How the look at a hypothesis ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
@@ -30,13 +25,6 @@ pub(super) enum Outcome {
     Refused,
     /// It is so much worse that the next frame will hardly think otherwise.
     Hopeless,
-}
-
-/// The current poses, and what they cost.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Present<'a> {
-    pub(super) poses: &'a [Pose],
-    pub(super) cost: Cost,
 }
 
 /// A hypothesis after its ICP steps.
@@ -51,11 +39,11 @@ pub(super) struct Refined {
 
 impl Refined {
     /// Refines a hypothesis of one arm or leg, with the whole body. Returns the ICP steps that took, and whether
-    /// it explains the frame better as a whole: then `fit` holds its matches, else it is as before.
+    /// it explains the frame better as a whole than what costs `present`: then `fit` holds its matches, else it is as before.
     pub(super) fn improves(
         &mut self,
         context: Context,
-        present: Present,
+        present: Cost,
         index: usize,
         fit: &mut Fit,
         hypothesis: &Proposal,
@@ -64,12 +52,10 @@ impl Refined {
         let chain = &context.model.extremities[index];
         let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
         // What colours alone tell on the way says little.
-        let most = if pictures { f64::INFINITY } else { present.cost.total + SEEN_GAIN };
-        let alone = matches!(basis, Basis::Points | Basis::Rest) && !pictures;
-        let comes_back = |poses: &[Pose]| alone && chain.distance(poses, present.poses) < BACK;
-        let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most, comes_back);
-        let hopeless = cost.is_some_and(|cost| cost.total > most);
-        if steps == REFINE && !hopeless && cost.is_some_and(|cost| cost.is_better_than(&present.cost)) {
+        let most = if pictures { f64::INFINITY } else { present.total + SEEN_GAIN };
+        let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most);
+        let hopeless = cost.total > most;
+        if steps == REFINE && !hopeless && cost.is_better_than(&present) {
             let matched = fit.matched(&self.poses);
             // What is as suspect as before is not worth a jump.
             let mut sure =
@@ -84,46 +70,34 @@ impl Refined {
 
     /// Refines a hypothesis with the whole body; `fit` then holds its matches, and `matched` those of before.
     pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> Cost {
-        let (_, cost) = self.refine_up_to(context, fit, hypothesis, f64::INFINITY, |_| false);
-        cost.unwrap_or(Cost { evidence: f64::INFINITY, total: f64::INFINITY })
+        self.refine_up_to(context, fit, hypothesis, f64::INFINITY).1
     }
 
-    /// The same; it is given up on the way when it costs more than `most`, or `comes_back` to the current pose: then it is not
-    /// known what it costs. With the number of ICP steps.
-    fn refine_up_to(
-        &mut self,
-        context: Context,
-        fit: &mut Fit,
-        hypothesis: &[Pose],
-        most: f64,
-        comes_back: impl Fn(&[Pose]) -> bool,
-    ) -> (usize, Option<Cost>) {
+    /// The same; it is given up on the way when it costs more than `most`. With the number of ICP steps.
+    fn refine_up_to(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], most: f64) -> (usize, Cost) {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.exchange(&mut self.matched);
         let last = context.config.max_steps;
         for step in 0..REFINE {
             let at = last.saturating_sub(REFINE - step);
-            if step == BACK_AFTER && comes_back(&self.poses) {
-                return (step, None);
-            }
             let here = if step < ROUGH_STEPS { context.roughly() } else { context };
-            // As in a frame's own steps, points mostly stay with the limbs they have.
-            if step >= BACK_AFTER && step % 2 == 1 {
-                fit.match_again(here, &self.poses, at);
-            } else {
+            // As in a frame's own steps, points mostly stay with the limbs they have, once it has come near.
+            if step.is_multiple_of(2) || 2 * step < REFINE {
                 fit.match_all(here, &self.poses, at);
+            } else {
+                fit.match_again(here, &self.poses, at);
             }
             if step == GIVE_UP_AFTER && most.is_finite() {
                 let cost = self.own_cost(context, fit);
                 if cost.total > most {
-                    return (step, Some(cost));
+                    return (step, cost);
                 }
             }
             fit.solve(here, hypothesis, &mut self.poses, at);
         }
         fit.match_last(context, &self.poses);
-        (REFINE, Some(self.own_cost(context, fit)))
+        (REFINE, self.own_cost(context, fit))
     }
 
     /// What its own poses cost.

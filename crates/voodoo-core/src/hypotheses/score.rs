@@ -19,14 +19,13 @@ const MOTION_STRAIN: f64 = 0.6;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub const GAIN: f64 = 25.0;
-/// A gain of so many patches, an area of eight by eight centimetres, is clear by itself: what moves the body, or makes an arm suspect
-/// whatever else speaks for it. Of several frames together, or of one direction over the opposite one, more is asked.
-pub const CLEAR_GAIN: f64 = 40.0;
-/// See `CLEAR_GAIN`.
-pub const SURE_GAIN: f64 = 100.0;
-/// Patches that a hypothesis must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump. Fewer
-/// flicker: so many more than the current pose a hypothesis may cost on its way, and shares are of so many at least.
+/// So many of them it must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump. Fewer
+/// flicker: so many more than the current pose a hypothesis may cost on its way.
 pub const SEEN_GAIN: f64 = 10.0;
+/// An area of eight by eight centimetres makes an arm suspect whatever else speaks for it.
+pub const CLEAR_GAIN: f64 = 40.0;
+/// Of one direction over the opposite one so many are asked.
+pub const SURE_GAIN: f64 = 100.0;
 /// Points looked at when rough poses are compared, at most: costs time in proportion.
 pub const ROUGH_SAMPLE: usize = 400;
 

@@ -48,7 +48,6 @@ impl Suspicion {
         let mut seen = Visibility::default();
         let mut against = |limb: usize, exclusive: f64| {
             seen += limb_visibility(context.seen.views, &body.limbs()[limb], &matched.poses[limb]);
-            // Few patches flicker.
             exclusive <= LITTLE * (seen.image.front_facing - seen.image.occluded).max(GAIN)
                 || seen.image.free_space > (REFUTED * seen.image.front_facing).max(SEEN_GAIN)
         };

@@ -7,7 +7,7 @@ use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
-const YOUNG: f64 = 1.0;
+pub(super) const YOUNG: f64 = 1.0;
 /// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
 const EVERY: [usize; 2] = [3, 15];
 /// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips

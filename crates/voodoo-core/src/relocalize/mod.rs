@@ -1,60 +1,42 @@
-//! Finding a lost body again: wherever in the frame something of its size is seen that is not background.
+//! Finding a body where a detector sees a person: one that nobody said where it is, a lost one, and one that is elsewhere than it
+//! is tracked.
 //!
-//! The body is put there as it stood when it was last tracked and as it stands at rest, upright, turned every way; the best are
-//! refined, and the one that explains the frame best by the score of all hypotheses is taken if it is not lost itself.
+//! The body is put there as the detector sees it and refined; it is taken where it explains the frame no worse by the score of all
+//! hypotheses and is not lost itself.
 
 mod belief;
 mod doubt;
-mod facing;
 mod hidden;
 mod people;
-mod posture;
-mod seeds;
-mod segment_motion;
 mod trials;
 mod watch;
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Model};
 use crate::detect::{Detection, Wanted};
-use crate::fit::{Context, Fit};
+use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::depth_view::DepthViews;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
-use crate::observation::segments::{Segment, Segments};
 use crate::observation::share::Share;
 use belief::Belief;
 pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 use doubt::{Doubt, SIGMAS};
-use facing::Known;
 use people::People;
 pub(crate) use people::sized;
-use posture::{Place, Postures};
-use segment_motion::SegmentMotion;
 use trials::Trials;
 pub use watch::Sighting;
 use watch::Watch;
 
-/// A segment's box is enlarged by this, metres: returns at its edges are missing.
-const MARGIN: f64 = 0.20;
-/// Segments that are tried, the largest first: costs time in proportion.
-const MOST_SEGMENTS: usize = 2;
-/// While the body is searched its motion is so many times freer than between two frames.
-const FREEDOM: f64 = 6.0;
-
-/// Searches a lost body. Remembers how it stood, and how what may be it moves.
+/// Finds bodies. Remembers what a detector said, and how long the body has been lost.
 #[derive(Debug, Default)]
 pub struct Relocalizer {
     watch: Watch,
-    postures: Postures,
-    motion: SegmentMotion,
-    segments: Segments,
     candidates: Candidates,
     matched: Correspondences,
     trials: Trials,
-    winner: Place,
     people: People,
     doubt: Doubt,
     belief: Belief,
@@ -63,15 +45,13 @@ pub struct Relocalizer {
 }
 
 impl Relocalizer {
-    /// Forgets everything that was remembered of an earlier track. `poses` are those the body was set in.
-    pub fn restart(&mut self, model: &Model, poses: &[Pose]) {
+    /// Forgets everything that was remembered of an earlier track.
+    pub fn restart(&mut self, model: &Model) {
         self.watch.restart();
         self.doubt.restart();
         self.belief = Belief::default();
         self.known = People::know(&model.body);
         self.people.keep_floor(false);
-        self.motion.clear();
-        self.postures.restart(&model.body, poses);
     }
 
     /// Whether a body can be found without a pose.
@@ -206,9 +186,10 @@ impl Relocalizer {
         let mut place = people::posed(&context.model.body, detection)?;
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
         let (low, high) = (detection.low - origin, detection.high - origin);
-        let there = Aabb::new(low - Vec3::splat(MARGIN), high + Vec3::splat(MARGIN));
+        let margin = context.config.body_box_margin;
+        let there = Aabb::new(low - Vec3::splat(margin), high + Vec3::splat(margin));
         // What the present pose explains must not be left behind, unless it is `lost` there.
-        let here = if lost { there } else { body_box(&context.model.body, present, MARGIN) };
+        let here = if lost { there } else { body_box(&context.model.body, present, margin) };
         let bounds = Aabb::new(there.mins.min(here.mins), there.maxs.max(here.maxs));
         // What was believed is tried now: the next time it has to be believed anew.
         self.doubt.tried();
@@ -216,141 +197,19 @@ impl Relocalizer {
         fit.exchange(&mut self.matched);
         self.candidates.gather(context.seen.frame(), origin, &bounds, context.seen.views.backgrounds, context.config);
         let seen = context.seen.with(&self.candidates);
-        let at = Context { seen, previous: &[], time_scale: FREEDOM, ..context };
+        let at = Context { seen, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
         let better = self.trials.at_detection(at, fit, present, &place);
         fit.exchange(&mut self.matched);
-        better.then(|| self.trials.best().as_slice())
+        better.then(|| self.trials.tried())
     }
 
-    /// In how many of the last frames the body was lost, from the one on in which the search began; `None` otherwise.
+    /// In how many of the last frames the body was lost, from the one on in which that is no blur; `None` otherwise.
     pub fn searched(&self) -> Option<usize> {
         self.watch.searched()
     }
 
-    /// Notes what a frame said of the body; whether it has to be searched in this frame.
-    pub fn observe(&mut self, sighting: Sighting, poses: &[Pose]) -> bool {
-        if self.watch.due(sighting) {
-            // Which way a body faces that was found a moment ago, a detector tells better.
-            return self.watch.lost() || !self.known;
-        }
-        if !self.watch.open() {
-            self.motion.clear();
-            if sighting.tracked {
-                self.postures.remember(poses, sighting.stamp);
-            }
-        }
-        false
-    }
-
-    /// Looks for the body at everything of its size; its poses where it explains the frame better than at `present`. What `fit`
-    /// has matched is as before when it returns.
-    pub fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
-        let (frame, origin) = (context.seen.frame(), context.seen.origin());
-        let backgrounds = context.seen.views.backgrounds;
-        self.segments.find(frame, origin, backgrounds, context.config);
-        let place = self.segments.found().iter().find(|segment| self.postures.fits(segment));
-        self.motion.observe(place.map(|segment| segment.centre + origin), frame.stamp);
-        if let Some(ground) = frame.ground {
-            self.postures.up = ground.normal;
-        }
-        self.watch.explained = None;
-        fit.exchange(&mut self.matched);
-        let mut found: Option<f64> = None;
-        let apart = |segment: &&Segment| !self.watch.hidden.by(frame, segment.centre + origin);
-        let fitting = self.segments.found().iter().filter(|segment| self.postures.fits(segment)).filter(apart);
-        for segment in fitting.take(MOST_SEGMENTS) {
-            let bounds = Aabb::new(segment.low - Vec3::splat(MARGIN), segment.high + Vec3::splat(MARGIN));
-            self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);
-            // Nothing is known of the motion.
-            let seen = context.seen.with(&self.candidates);
-            let at = Context { seen, previous: &[], time_scale: FREEDOM, ..context };
-            let known = Known { postures: &self.postures, motion: &self.motion, lost: self.watch.lost() };
-            let outcome = self.trials.at_segment(at, known, fit, present, segment);
-            self.watch.explained = Some(outcome.explained || self.watch.explained == Some(true));
-            if let Some(gain) = outcome.gain
-                && found.is_none_or(|best| gain > best)
-            {
-                found = Some(gain);
-                self.winner.clone_from(self.trials.best());
-            }
-        }
-        fit.exchange(&mut self.matched);
-        found.map(|_| self.winner.as_slice())
-    }
-
-    /// Takes note of how the search ended, with the body at `poses`; whether it is to be given up: what a lost tracker slid onto
-    /// is no body as long as it leaves much of every segment unexplained.
-    pub fn conclude(&mut self, found: bool, sighting: Sighting, poses: &[Pose]) -> bool {
-        let walked = self.motion.walks(self.postures.up, sighting.stamp);
-        let ahead = walked.is_some_and(|walked| (poses[0].rotation * Vec3::X).dot(walked) > 0.5);
-        self.watch.conclude(found, sighting, ahead)
-    }
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-mod tests {
-    use super::*;
-    use crate::testing::{depth, farthest, moved, put_board, standing, turned, with_context, without_background};
-
-    /// Where a lost body is in the frame after it was found, which was last tracked half a metre beside the camera's axis, and
-    /// whether the place where it was found explains what may be the body.
-    fn found(pixels: &[u16]) -> (Option<Vec<Pose>>, Option<bool>) {
-        let (model, poses) = standing();
-        let present = moved(&poses, -0.5 * Vec3::X);
-        let config = without_background();
-        let mut relocalizer = Relocalizer::default();
-        relocalizer.restart(&model, &present);
-        let sighting = |stamp, lost| Sighting { stamp, lost, tracked: !lost, silent: false };
-        assert!(!relocalizer.observe(sighting(-0.4, false), &present));
-        let due: Vec<bool> =
-            [-0.3, -0.2, -0.1].into_iter().map(|stamp| relocalizer.observe(sighting(stamp, true), &present)).collect();
-        assert_eq!(due, [false, false, true]);
-        with_context(pixels, &config, &model, &present, |context| {
-            let mut fit = Fit::new(&config).unwrap();
-            fit.match_last(context, &present);
-            let before = format!("{:?}", fit.correspondences());
-            let mut found = relocalizer.search(context, &mut fit, &present).map(<[Pose]>::to_vec);
-            assert_eq!(format!("{:?}", fit.correspondences()), before);
-            // The next frame, which shows the same.
-            found.iter_mut().for_each(|poses| {
-                let predicted = poses.clone();
-                with_context(pixels, &config, &model, &predicted, |context| fit.run(context, &predicted, poses));
-            });
-            (found, relocalizer.watch.explained)
-        })
-    }
-
-    #[test]
-    fn a_body_a_metre_beside_its_last_place_is_found() {
-        let (model, poses) = standing();
-        for turn in [0.0, 0.4] {
-            let place = turned(&moved(&poses, 0.5 * Vec3::X), poses[0].translation + 0.5 * Vec3::X, Vec3::Y, turn);
-            let (found, explained) = found(&depth(&model.body, &place));
-            let found = found.unwrap();
-            assert_eq!(explained, Some(false));
-            assert!(farthest(&found, &place) < 0.028, "{} m off", farthest(&found, &place));
-        }
-    }
-
-    #[test]
-    fn nothing_is_found_where_nothing_is_seen_or_what_is_seen_is_too_small_or_too_large() {
-        let empty = vec![0; depth(&standing().0.body, &standing().1).len()];
-        assert_eq!(found(&empty), (None, None));
-        for (depth, size) in [(2.6, [0.15, 0.2]), (3.5, [1.9, 1.4])] {
-            let mut pixels = empty.clone();
-            put_board(&mut pixels, Vec3::new(0.0, 0.0, depth), size);
-            assert_eq!(found(&pixels), (None, None), "{size:?}");
-        }
-    }
-
-    #[test]
-    fn a_body_about_where_it_is_expected_is_not_moved() {
-        let (model, poses) = standing();
-        for off in [0.0, 0.01] {
-            let place = moved(&poses, Vec3::new(-0.5 + off, 0.0, off));
-            // To come nearer is left to the steps of a frame.
-            assert_eq!(found(&depth(&model.body, &place)), (None, Some(true)), "{off} m off");
-        }
+    /// Notes what a frame said of the body.
+    pub fn observe(&mut self, sighting: Sighting) {
+        self.watch.observe(sighting);
     }
 }

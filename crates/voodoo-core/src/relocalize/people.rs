@@ -8,9 +8,8 @@ use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::share::Share;
 
-/// Height of an ankle above the floor on which a person stands, and how far it may be off, metres.
-const ANKLE: f64 = 0.08;
-const ON_FLOOR: f64 = 0.12;
+/// The lower ankle of a person who stands on a floor is no farther from it, metres.
+const ON_FLOOR: f64 = 0.2;
 
 /// Looks for people, from the first time on that it is asked to; keeps what it last saw.
 #[derive(Debug, Default)]
@@ -49,7 +48,7 @@ impl People {
         seen.floor.filter(|floor| {
             let ankles = [above(floor, "l_ankle"), above(floor, "r_ankle")].into_iter().flatten();
             let lowest = ankles.fold(f64::INFINITY, f64::min);
-            (lowest - ANKLE).abs() < ON_FLOOR
+            lowest.abs() < ON_FLOOR
         })
     }
 

@@ -1,13 +1,8 @@
-//! When a body is searched: after some frames in which it was lost, and for a while after it was found.
+//! How long a body has been lost, and for how long it is looked after once it is back.
 
+use super::doubt::YOUNG;
 use super::hidden::Hidden;
-
-/// The body is searched from this many frames on in which it was lost: a blurred frame is no loss.
-const LOST_PATIENCE: usize = 3;
-/// After it was found, every so manyth frame is searched again for so long, seconds, or until it was seen to walk: another
-/// facing may prove better.
-const WATCH: f64 = 5.0;
-const WATCHED: usize = 5;
+use crate::hypotheses::PATIENCE;
 
 /// What a frame said of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,16 +17,13 @@ pub struct Sighting {
     pub silent: bool,
 }
 
-/// How long the body has been lost, and since when it is back.
+/// How long the body has been lost, and until when it is looked after.
 #[derive(Debug, Default)]
 pub(super) struct Watch {
     /// Frames in a row in which it was lost.
     lost: usize,
-    /// Until when the search goes on, seconds.
+    /// Until when a body that is back is looked after, seconds.
     until: Option<f64>,
-    frames: usize,
-    /// Whether the present pose explains what may be the body, if anything may.
-    pub(super) explained: Option<bool>,
     /// What stands before it.
     pub(super) hidden: Hidden,
 }
@@ -39,50 +31,31 @@ pub(super) struct Watch {
 impl Watch {
     /// The body was set anew: nothing is lost.
     pub(super) fn restart(&mut self) {
-        (self.lost, self.until) = (0, None);
-        self.hidden.restart();
+        *self = Self::default();
     }
 
-    /// In how many of the last frames the body was lost, from the one on in which the search began; `None` otherwise.
+    /// In how many of the last frames the body was lost, from the one on in which that is no blur; `None` otherwise.
     pub(super) fn searched(&self) -> Option<usize> {
-        self.lost.checked_sub(LOST_PATIENCE)
+        self.lost.checked_sub(PATIENCE)
     }
 
-    /// The body is lost, or was a moment ago.
-    pub(super) fn lost(&self) -> bool {
-        self.lost > 0
-    }
-
-    /// The search goes on although the body was found.
+    /// The body is back since a moment ago.
     pub(super) fn open(&self) -> bool {
         self.until.is_some()
     }
 
-    /// Counts a frame; whether it is searched.
-    pub(super) fn due(&mut self, sighting: Sighting) -> bool {
-        if sighting.lost {
-            self.lost += usize::from(!sighting.silent);
-        } else if self.lost < LOST_PATIENCE {
+    /// Counts a frame.
+    pub(super) fn observe(&mut self, sighting: Sighting) {
+        let Sighting { stamp, lost, tracked, silent } = sighting;
+        self.until = self.until.filter(|until| stamp < *until);
+        if lost {
+            self.lost += usize::from(!silent);
+        } else if tracked || self.searched().is_none() {
+            if self.searched().is_some() {
+                self.until = Some(stamp + YOUNG);
+            }
             self.lost = 0;
         }
-        self.until = self.until.filter(|until| sighting.stamp < *until);
-        self.frames += 1;
-        self.lost >= LOST_PATIENCE || (self.open() && self.frames.is_multiple_of(WATCHED))
-    }
-
-    /// Ends the search of a frame; `ahead`: it walks where it faces. Whether the pose is to be given up.
-    pub(super) fn conclude(&mut self, found: bool, sighting: Sighting, ahead: bool) -> bool {
-        let mut given_up = false;
-        if found || (self.explained != Some(false) && sighting.tracked) {
-            self.lost = 0;
-            self.until = self.until.or(Some(sighting.stamp + WATCH));
-        } else {
-            given_up = self.lost > 0 && self.explained == Some(false);
-        }
-        if self.lost == 0 && ahead {
-            self.until = None;
-        }
-        given_up
     }
 }
 
@@ -90,52 +63,38 @@ impl Watch {
 mod tests {
     use super::*;
 
+    fn after(frames: impl IntoIterator<Item = Sighting>) -> Watch {
+        let mut watch = Watch::default();
+        frames.into_iter().for_each(|sighting| watch.observe(sighting));
+        watch
+    }
+
     fn sighting(stamp: f64, lost: bool) -> Sighting {
         Sighting { stamp, lost, tracked: !lost, silent: false }
     }
 
     #[test]
-    fn a_body_is_searched_from_the_third_lost_frame_on() {
-        let mut watch = Watch::default();
-        let due: Vec<bool> = (0..4).map(|frame| watch.due(sighting(f64::from(frame), true))).collect();
-        assert_eq!((due, watch.searched()), (vec![false, false, true, true], Some(1)));
+    fn a_body_is_lost_from_the_second_frame_on_that_says_so() {
+        let searched = |frames: i32| after((0..frames).map(|frame| sighting(f64::from(frame), true))).searched();
+        assert_eq!([1, 2, 3, 4].map(searched), [None, Some(0), Some(1), Some(2)]);
     }
 
     #[test]
-    fn two_lost_frames_are_forgotten_and_a_silent_camera_counts_for_nothing() {
-        let mut watch = Watch::default();
-        watch.due(sighting(0.0, true));
-        watch.due(sighting(0.1, true));
-        watch.due(sighting(0.2, false));
-        assert!(!watch.lost());
-        for frame in 0..20 {
-            assert!(!watch.due(Sighting { silent: true, ..sighting(1.0 + f64::from(frame), true) }));
-        }
+    fn a_lost_frame_is_forgotten_and_a_silent_camera_counts_for_nothing() {
+        let blurred = [(0.0, false), (0.1, true), (0.2, false), (0.3, true)].map(|(stamp, lost)| sighting(stamp, lost));
+        let watch = after(blurred);
+        assert_eq!((watch.searched(), watch.open()), (None, false));
+        let silent = (0..20).map(|frame| Sighting { silent: true, ..sighting(f64::from(frame), true) });
+        assert_eq!(after(silent).searched(), None);
     }
 
     #[test]
-    fn a_found_body_is_looked_at_again_until_it_walks_or_time_is_up() {
-        let mut watch = Watch::default();
-        (0..3).for_each(|frame| {
-            watch.due(sighting(f64::from(frame), true));
-        });
-        assert!(!watch.conclude(true, sighting(2.0, false), false) && watch.open());
-        let again = (1..=10).filter(|frame| watch.due(sighting(2.0 + 0.1 * f64::from(*frame), false))).count();
-        assert_eq!(again, 2, "every fifth frame");
-        assert!(!watch.conclude(false, sighting(3.0, false), true) && !watch.open());
-        watch.conclude(true, sighting(3.0, false), false);
-        assert!(!watch.due(sighting(3.0 + WATCH, false)) && !watch.open());
-    }
-
-    #[test]
-    fn what_explains_nothing_of_what_may_be_the_body_is_given_up() {
-        let mut watch = Watch::default();
-        (0..3).for_each(|frame| {
-            watch.due(sighting(f64::from(frame), true));
-        });
-        watch.explained = Some(false);
-        assert!(watch.conclude(false, sighting(3.0, false), false) && watch.lost());
-        watch.explained = Some(true);
-        assert!(!watch.conclude(false, sighting(3.1, false), false) && !watch.lost());
+    fn a_body_that_is_back_is_looked_after_for_a_while_and_one_that_is_degraded_is_not_back() {
+        let lost = [0.1, 0.2].map(|stamp| sighting(stamp, true));
+        let back = |stamp| after(lost.into_iter().chain([sighting(0.3, false), sighting(stamp, false)]));
+        assert!(back(0.4).open() && back(0.4).searched().is_none());
+        assert!(!back(0.3 + YOUNG).open());
+        let degraded = Sighting { tracked: false, ..sighting(0.3, false) };
+        assert_eq!(after(lost.into_iter().chain([degraded])).searched(), Some(0));
     }
 }

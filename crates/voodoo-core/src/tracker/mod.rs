@@ -84,7 +84,7 @@ impl Tracker {
         self.observer.clear();
         self.fit.clear();
         self.hypotheses.restart(&self.model);
-        self.relocalizer.restart(&self.model, &self.motion.poses);
+        self.relocalizer.restart(&self.model);
         let start = if fit_sizes { Start::Positions } else { Start::SizesKnown };
         self.sizes.restart(&self.model, start, &self.config);
         self.assessor.trust_pose();
@@ -255,8 +255,8 @@ impl Tracker {
         self.fit.regions().check(frame)
     }
 
-    /// Remembers a tracked body; looks for a lost one, unless it is one `among` several, and takes it where it is found. A track
-    /// that is not `known` for long starts anew instead, in this frame: whether it does.
+    /// Takes a body that a detector has seen elsewhere for long enough there. A young track starts anew instead, in this frame:
+    /// whether it does.
     fn relocalize(&mut self, frame: &Frame, known: bool, among: bool) -> bool {
         let lost = self.assessor.status() == Status::Lost;
         if !among {
@@ -277,18 +277,8 @@ impl Tracker {
                 self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
             }
         }
-        if among || !self.relocalizer.observe(self.sighting(frame), &self.motion.poses) {
-            return false;
-        }
-        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
-        let seen = observer.seen(frame, motion.origin);
-        let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-        let place = relocalizer.search(setting.of(model), fit, &motion.poses);
-        let found =
-            place.map(|place| motion.predicted.clone_from_slice(place)).is_some() && self.move_to_predicted(frame);
-        let sighting = self.sighting(frame);
-        if self.relocalizer.conclude(found, sighting, &self.motion.poses) {
-            self.assessor.give_up();
+        if !among {
+            self.relocalizer.observe(self.sighting(frame));
         }
         false
     }

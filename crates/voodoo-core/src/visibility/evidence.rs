@@ -8,19 +8,12 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ALONG_LIMB, SEEN_PAST, evenly};
+use crate::visibility::{ALONG_LIMB, LIMB_RIM, SEEN_PAST};
 
 /// A point this far from the model's surface is not explained by it, metres.
 pub const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
-/// How far from a limb's middle the outer ones of three patches across it are looked at, in shares of its radius; nearer to the rim
-/// it was worse.
-const PATCH_RIM: f64 = 0.6;
-/// Where across a limb patches are looked at.
-const PATCHES_ACROSS: [f64; 3] = evenly(PATCH_RIM);
-/// A camera nearer to a limb's axis than this, metres, looks along it and sees no patch of its side.
-const END_ON: f64 = 1e-6;
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,23 +70,20 @@ impl Visibility {
 
 /// How much of a limb's surface is seen by the cameras and how much contradicted.
 pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Visibility {
-    let shape = &limb.shape;
+    let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
     let mut found = Visibility::default();
     for view in views.iter() {
         let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
         for t in ALONG_LIMB {
             let section = shape.section(t);
             let Some(facing) = section.facing(&camera_from_limb) else { continue };
-            if facing.across.length() < END_ON {
-                continue;
-            }
             let (a, b) = (section.a, section.b);
             // A limb seen aslant covers so much less of the image, as the points seen on it do.
             let aslant = facing.across.length() / (camera_from_limb * section.centre()).length();
-            for s in PATCHES_ACROSS {
+            for s in across {
                 let point = camera_from_limb * facing.point(s);
                 let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
-                    / (REFERENCE_PATCH * (ALONG_LIMB.len() * PATCHES_ACROSS.len()) as f64);
+                    / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
                 let Some(sight) = sight(&view, point) else { continue };
                 for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
                     match sight {

@@ -18,22 +18,15 @@ pub const NO_LIMB: u16 = u16::MAX;
 /// Most pixels of a predicted image: those of an 8K picture. More would be a mistyped size, and memory by the gigabyte.
 pub const MOST_RENDERED: usize = 1 << 25;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
-const ROWS_TOGETHER: usize = 16;
-/// Limbs nearer to the camera plane than this have no usable bounds in the image, metres; every ray is tried.
-const NEAREST_CORNER: f64 = 0.01;
-/// Bounds in the image are widened by this, in units of `x / z`, against rounding.
-const BOUNDS_SLACK: f64 = 1e-9;
+const ROWS_TOGETHER: usize = LANES;
+/// The precision of predicted depths, of one metre. Bounds in the image are widened by as much, in units of `x / z`, against rounding,
+/// and a limb that comes nearer to the camera plane has none: every ray is tried.
+const PRECISION: f64 = f32::EPSILON as f64;
 /// Greatest `|ln(a0 b1 / (a1 b0))|` for which the aspect may be held fixed (method section 2).
 const PLAIN_ASPECT: f64 = 0.3;
-/// A ray whose least squared distance from the axis is within this share of the squared radius grazes the limb.
+/// A ray whose least squared distance from the axis is within this share of the squared radius grazes the limb, and one whose squared
+/// way across the axis is a smaller share of that of the radius along it looks along the limb.
 const GRAZING: f64 = 0.02;
-/// Looking along the axis, a cone is no ellipse any more: where the square of the ray's direction across the axis is less than
-/// this share of the square of the growth of the semi-axes along it.
-const AXIAL_SLOPE: f64 = 0.01;
-/// The same for a cylinder: the least square of the ray's direction across the axis (about half a degree).
-const AXIAL: f64 = 1e-4;
-/// Where the last Newton step was longer than this, metres, the root is not trusted.
-const ROOT_STEP: f64 = 1e-6;
 
 /// Where a depth camera stands and how its pixels look out.
 #[derive(Clone, Copy, Debug)]
@@ -200,7 +193,7 @@ impl LimbRaycaster {
             };
             let sign = |bit: usize| if index & bit == 0 { 1.0 } else { -1.0 };
             let corner = sensor_from_limb * Vec3::new(sign(1) * a, sign(2) * b, z);
-            corners = corners.filter(|_| corner.z > NEAREST_CORNER);
+            corners = corners.filter(|_| corner.z > PRECISION);
             if let Some(corners) = &mut corners {
                 corners[index] = [corner.x / corner.z, corner.y / corner.z];
             }
@@ -208,8 +201,8 @@ impl LimbRaycaster {
         if let Some(corners) = &corners {
             for axis in 0..2 {
                 let values = || corners.iter().map(|corner| corner[axis]);
-                low[axis] = values().fold(f64::INFINITY, f64::min) - BOUNDS_SLACK;
-                high[axis] = values().fold(f64::NEG_INFINITY, f64::max) + BOUNDS_SLACK;
+                low[axis] = values().fold(f64::INFINITY, f64::min) - PRECISION;
+                high[axis] = values().fold(f64::NEG_INFINITY, f64::max) + PRECISION;
             }
         }
         // A cone's tip or a wedge has no aspect: the logarithm is not finite, and the comparison false.
@@ -259,11 +252,11 @@ impl LimbRaycaster {
         for (index, from) in corners.iter().enumerate() {
             for to in &corners[index + 1..] {
                 let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
-                if low[1] > y + BOUNDS_SLACK || high[1] < y - BOUNDS_SLACK {
+                if low[1] > y + PRECISION || high[1] < y - PRECISION {
                     continue;
                 }
                 let rise = high[1] - low[1];
-                if rise < BOUNDS_SLACK {
+                if rise < PRECISION {
                     first = first.min(low[0]).min(high[0]);
                     last = last.max(low[0]).max(high[0]);
                 } else {
@@ -274,8 +267,8 @@ impl LimbRaycaster {
             }
         }
         let column = |x: f64| (fx * x + cx).clamp(-1.0, view.width as f64);
-        let start = column(first - 2.0 * BOUNDS_SLACK).ceil().max(0.0) as usize;
-        let end = (column(last + 2.0 * BOUNDS_SLACK).floor() + 1.0).clamp(0.0, view.width as f64) as usize;
+        let start = column(first - 2.0 * PRECISION).ceil().max(0.0) as usize;
+        let end = (column(last + 2.0 * PRECISION).floor() + 1.0).clamp(0.0, view.width as f64) as usize;
         (start, end.max(start))
     }
 
@@ -360,7 +353,8 @@ impl LimbRaycaster {
             let discriminant = q * q - p * r;
             let radius = a0 + da * z;
             grazing = discriminant.abs() < GRAZING * p * radius * radius;
-            grazing |= p < AXIAL_SLOPE * slope * slope + AXIAL;
+            // Looking along the axis, a cone is no ellipse any more, and a ray hardly crosses a cylinder within its length.
+            grazing |= p < GRAZING * (slope * slope + (radius / length) * (radius / length));
             // A ray that misses comes nearest where the root's real part is.
             root = (-q - select(discriminant > 0.0, discriminant, 0.0).sqrt()) / p;
             root = select(discriminant >= 0.0, root, f64::NAN);
@@ -380,7 +374,7 @@ impl LimbRaycaster {
         }
         let on_side = (root >= enter) & (root <= leave) & (root > 0.0);
         let depth = select(on_side, root, f64::NAN);
-        let unsure = !through_cap & (grazing | (on_side & !(step.abs() < ROOT_STEP)) | (d.z.abs() < 1e-9));
+        let unsure = !through_cap & (grazing | (on_side & !(step.abs() < PRECISION * root)) | (d.z.abs() < 1e-9));
         (select(through_cap, enter, depth), unsure)
     }
 }

