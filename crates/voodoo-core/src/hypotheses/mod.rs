@@ -14,6 +14,7 @@ mod unexplained;
 
 pub use landmark_cost::{APART, body_landmark_cost};
 pub use persistence::PATIENCE;
+pub use proposals::SWIVELS;
 pub use refined::REFINE;
 pub use score::{Cost, GAIN, ROUGH_SAMPLE, SURE_GAIN, explain, limit_strain, overall_cost};
 pub use unexplained::CLUTTER;

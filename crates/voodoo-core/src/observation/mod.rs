@@ -2,7 +2,7 @@
 //!
 //! `frame` is what goes in (K06 IV-A). Step 1 of the method, the choice of points that may lie on the body (K06 IV-B.1), is
 //! `candidates`, with `pixels` and `background`; `clusters` sorts them for the next step. `depth_view` asks the images about places in
-//! space, `window` for what is near the body, and `registration` brings that into the picture of
+//! space, `segments` looks for a lost body, `window` for what is near the body, and `registration` brings that into the picture of
 //! another camera, with `far_edges` between surfaces, `chroma` tells colours, `masks` and `mask_regions` where skin's are, and
 //! `still` what stands. `sites` knows where named sites will be, and which measurements of them are believed.
 
@@ -25,6 +25,7 @@ pub mod observer;
 pub mod picture;
 pub(crate) mod pixels;
 pub mod registration;
+pub(crate) mod segments;
 pub mod share;
 pub mod sites;
 pub mod still;

@@ -8,6 +8,7 @@ mod belief;
 mod doubt;
 mod hidden;
 mod people;
+mod search;
 mod trials;
 mod watch;
 
@@ -26,6 +27,7 @@ pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 use doubt::{Doubt, SIGMAS};
 use people::People;
 pub(crate) use people::sized;
+use search::Search;
 use trials::Trials;
 pub use watch::Sighting;
 use watch::Watch;
@@ -37,6 +39,7 @@ pub struct Relocalizer {
     candidates: Candidates,
     matched: Correspondences,
     trials: Trials,
+    search: Search,
     people: People,
     doubt: Doubt,
     belief: Belief,
@@ -46,12 +49,13 @@ pub struct Relocalizer {
 
 impl Relocalizer {
     /// Forgets everything that was remembered of an earlier track.
-    pub fn restart(&mut self, model: &Model) {
+    pub fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.watch.restart();
         self.doubt.restart();
         self.belief = Belief::default();
         self.known = People::know(&model.body);
         self.people.keep_floor(false);
+        self.search.remember(poses);
     }
 
     /// Whether a body can be found without a pose.
@@ -208,8 +212,94 @@ impl Relocalizer {
         self.watch.searched()
     }
 
-    /// Notes what a frame said of the body.
-    pub fn observe(&mut self, sighting: Sighting) {
+    /// Notes what a frame said of the body at these poses.
+    pub fn observe(&mut self, sighting: Sighting, poses: &[Pose]) {
         self.watch.observe(sighting);
+        if sighting.tracked {
+            self.search.remember(poses);
+        }
+    }
+
+    /// Looks for a lost body that no detector sees; its poses where it explains the frame better than at `present`. What `fit` has
+    /// matched is as before when it returns.
+    pub fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
+        let (frame, origin) = (context.seen.frame(), context.seen.origin());
+        if self.searched().is_none() || self.known && !frame.images.is_empty() {
+            return None;
+        }
+        let backgrounds = context.seen.views.backgrounds;
+        self.search.segments.find(frame, origin, backgrounds, context.config);
+        fit.exchange(&mut self.matched);
+        let fitting: Vec<_> = self.search.fitting(&context.model.body).collect();
+        let found = fitting.into_iter().any(|segment| {
+            let margin = Vec3::splat(context.config.body_box_margin);
+            let bounds = Aabb::new(segment.low - margin, segment.high + margin);
+            self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);
+            let seen = context.seen.with(&self.candidates);
+            let at = Context { seen, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
+            self.search.at(segment, at, fit, &mut self.trials, present)
+        });
+        fit.exchange(&mut self.matched);
+        found.then(|| self.trials.tried())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::testing::{depth, farthest, moved, put_board, standing, turned, with_context, without_background};
+
+    /// Where a lost body of another kind is in the frame after it was found, which was last tracked half a metre beside the
+    /// camera's axis.
+    fn found(pixels: &[u16]) -> Option<Vec<Pose>> {
+        let (model, poses) = standing();
+        let present = moved(&poses, -0.5 * Vec3::X);
+        let config = without_background();
+        let mut relocalizer = Relocalizer::default();
+        relocalizer.restart(&model, &present);
+        relocalizer.known = false;
+        let sighting = |stamp, lost| Sighting { stamp, lost, tracked: !lost, silent: false };
+        with_context(pixels, &config, &model, &present, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            fit.match_last(context, &present);
+            let before = format!("{:?}", fit.correspondences());
+            for (stamp, lost) in [(-0.4, false), (-0.3, true)] {
+                relocalizer.observe(sighting(stamp, lost), &present);
+                assert!(relocalizer.search(context, &mut fit, &present).is_none());
+            }
+            relocalizer.observe(sighting(-0.2, true), &present);
+            let mut found = relocalizer.search(context, &mut fit, &present).map(<[Pose]>::to_vec);
+            assert_eq!(format!("{:?}", fit.correspondences()), before);
+            // The next two frames, which show the same.
+            for _ in 0..2 {
+                found.iter_mut().for_each(|poses| {
+                    let predicted = poses.clone();
+                    with_context(pixels, &config, &model, &predicted, |context| fit.run(context, &predicted, poses));
+                });
+            }
+            found
+        })
+    }
+
+    #[test]
+    fn a_body_that_no_detector_knows_is_found_a_metre_beside_its_last_place() {
+        let (model, poses) = standing();
+        for turn in [0.0, 0.4] {
+            let place = turned(&moved(&poses, 0.5 * Vec3::X), poses[0].translation + 0.5 * Vec3::X, Vec3::Y, turn);
+            let off = farthest(&found(&depth(&model.body, &place)).unwrap(), &place);
+            assert!(off < 0.028, "{off} m off");
+        }
+    }
+
+    #[test]
+    fn nothing_is_found_where_nothing_is_seen_or_what_is_seen_is_too_small_or_too_large() {
+        let empty = vec![0; depth(&standing().0.body, &standing().1).len()];
+        assert_eq!(found(&empty), None);
+        for (depth, size) in [(2.6, [0.15, 0.2]), (3.5, [1.9, 1.4])] {
+            let mut pixels = empty.clone();
+            put_board(&mut pixels, Vec3::new(0.0, 0.0, depth), size);
+            assert_eq!(found(&pixels), None, "{size:?}");
+        }
     }
 }

@@ -29,29 +29,39 @@ impl Trials {
     /// Tries the body where a detector saw it, with the points there as the candidates of `context`; whether it explains them no
     /// worse than the present pose does.
     pub(super) fn at_detection(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
-        self.take_sample(context);
+        // Depth hardly tells a person's front from the back; the detector does.
+        self.at(context, fit, present, place, SURE_GAIN)
+    }
+
+    /// Tries the body at a place; whether it explains the points there no worse than the present pose does, or by less than
+    /// `turning` worse where it faces the other way.
+    pub(super) fn at(
+        &mut self,
+        context: Context,
+        fit: &mut Fit,
+        present: &[Pose],
+        place: &[Pose],
+        turning: f64,
+    ) -> bool {
         fit.match_all(context, present, context.config.max_steps);
         let present_score = pose_score(context, fit, present);
         self.poses.clear();
         self.poses.extend_from_slice(place);
         self.refine(context, fit);
-        let stray = self.stray_share(context);
-        // Depth hardly tells a person's front from the back; the detector does.
+        let poses = std::mem::take(&mut self.poses);
+        let stray = self.stray_share(context, &poses);
+        self.poses = poses;
         let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
-        let allowed = present_score + if turned { SURE_GAIN } else { 0.0 };
+        let allowed = present_score + if turned { turning } else { 0.0 };
         pose_score(context, fit, &self.poses) < allowed && stray < CLUTTER
     }
 
-    /// Takes some of the points there.
-    fn take_sample(&mut self, context: Context) {
+    /// Share of some of the points there that lie far from a body.
+    pub(super) fn stray_share(&mut self, context: Context, poses: &[Pose]) -> f64 {
+        let Self { sample, nearest, distances, .. } = self;
         let candidates = context.seen.candidates;
-        self.sample.assign(&candidates.points, &candidates.weight);
-        self.sample.subsample(ROUGH_SAMPLE);
-    }
-
-    /// Share of the points there that cameras see past the body.
-    fn stray_share(&mut self, context: Context) -> f64 {
-        let Self { sample, nearest, distances, poses, .. } = self;
+        sample.assign(&candidates.points, &candidates.weight);
+        sample.subsample(ROUGH_SAMPLE);
         nearest.clear();
         nearest.resize(sample.len(), f32::INFINITY);
         for limb in 0..poses.len() {

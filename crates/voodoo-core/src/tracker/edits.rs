@@ -74,7 +74,7 @@ impl Tracker {
         }
         fit.clear();
         sizes.edited(model);
-        relocalizer.restart(model);
+        relocalizer.restart(model, &motion.poses);
         assessor.edited(estimate.status);
         self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);
     }

@@ -84,7 +84,7 @@ impl Tracker {
         self.observer.clear();
         self.fit.clear();
         self.hypotheses.restart(&self.model);
-        self.relocalizer.restart(&self.model);
+        self.relocalizer.restart(&self.model, &self.motion.poses);
         let start = if fit_sizes { Start::Positions } else { Start::SizesKnown };
         self.sizes.restart(&self.model, start, &self.config);
         self.assessor.trust_pose();
@@ -278,9 +278,21 @@ impl Tracker {
             }
         }
         if !among {
-            self.relocalizer.observe(self.sighting(frame));
+            self.relocalizer.observe(self.sighting(frame), &self.motion.poses);
+            self.look_everywhere(frame);
         }
         false
+    }
+
+    /// Moves a lost body that no detector can see to where it is found.
+    fn look_everywhere(&mut self, frame: &Frame) {
+        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        let seen = observer.seen(frame, motion.origin);
+        let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
+        if let Some(place) = relocalizer.search(setting.of(model), fit, &motion.poses) {
+            motion.predicted.clone_from_slice(place);
+            self.move_to_predicted(frame);
+        }
     }
 
     /// Moves the body to where a detector sees it; whether it is there now.

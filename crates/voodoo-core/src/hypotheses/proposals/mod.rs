@@ -22,7 +22,7 @@ use crate::math::Pose;
 
 /// Bends of an arm or leg about the line from its root to its end that are tried; twice as many where nothing seen has to agree
 /// with them.
-const SWIVELS: usize = 6;
+pub const SWIVELS: usize = 6;
 
 /// Looks for one kind of other configuration of an arm or leg.
 pub(super) trait Propose {

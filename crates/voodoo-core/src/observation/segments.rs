@@ -1,0 +1,250 @@
+//! The foreground of a frame cut into segments: what hangs together and is not background may be a lost body.
+
+use crate::config::Config;
+use crate::math::Vec3;
+use crate::observation::background::{Background, Backgrounds};
+use crate::observation::candidates::REFERENCE_PATCH;
+use crate::observation::frame::{DepthPixels, Frame};
+
+/// Samples taken of one source, about: a search runs while the body is lost, and must keep up with the frames.
+const SAMPLES_PER_SOURCE: usize = 5000;
+/// Edge of a cell of space, metres: samples in cells that touch hang together.
+const CELL: f64 = 0.12;
+/// A cell with fewer surface patches than this holds stray returns: a surface fills some hundred.
+const LEAST_PATCHES: f32 = 15.0;
+/// Half of the cells along an axis that a key holds.
+const HALF_KEY: f64 = (1_u64 << 20) as f64;
+
+/// What hangs together; working frame, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Mean of the samples.
+    pub centre: Vec3,
+    /// Corners of its box.
+    pub low: Vec3,
+    /// The other corner.
+    pub high: Vec3,
+    /// Surface seen, in patches.
+    pub patches: f64,
+    /// Mean direction in which the sensors look at it; zero for clouds.
+    pub view: Vec3,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    key: u64,
+    point: [f32; 3],
+    view: [f32; 3],
+    weight: f32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    key: u64,
+    samples: (u32, u32),
+    /// Another cell of its segment with a smaller index, or itself.
+    parent: u32,
+}
+
+/// Working memory, and the segments of the last frame, largest first.
+#[derive(Debug, Default)]
+pub struct Segments {
+    samples: Vec<Sample>,
+    cells: Vec<Cell>,
+    found: Vec<Segment>,
+    /// The segment of every first cell.
+    of_cell: Vec<u32>,
+}
+
+impl Segments {
+    /// The segments, largest first.
+    pub fn found(&self) -> &[Segment] {
+        &self.found
+    }
+
+    /// Looks through a whole frame. `origin` is the working frame's origin in the world.
+    pub fn find(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds, config: &Config) {
+        self.samples.clear();
+        self.sample_images(frame, origin, backgrounds);
+        for cloud in frame.clouds {
+            let step = cloud.points.len().div_ceil(SAMPLES_PER_SOURCE).max(1);
+            for index in (0..cloud.points.len()).step_by(step) {
+                let point = cloud.world_from_sensor * cloud.points.get(index) - origin;
+                self.push(point, Vec3::ZERO, cloud.weight * step as f64);
+            }
+        }
+        if !frame.excluded.is_empty() {
+            let inside = |sample: &Sample| {
+                let point = Vec3::from_array(sample.point.map(f64::from)) + origin;
+                frame.excluded.iter().any(|bounds| bounds.contains_local_point(point))
+            };
+            self.samples.retain(|sample| !inside(sample));
+        }
+        if let Some(ground) = frame.ground {
+            let floor = ground.about(origin);
+            let height = |point: [f32; 3]| floor.height(Vec3::from_array(point.map(f64::from)));
+            self.samples.retain(|sample| height(sample.point) >= config.ground_clearance);
+        }
+        // Sorting without memory of its own keeps no order of equals, but sums must be the same on every run.
+        self.samples.sort_unstable_by(|a, b| {
+            let [first, second] = [a, b].map(|sample| sample.point.map(f64::from));
+            a.key.cmp(&b.key).then_with(|| order(&first, &second))
+        });
+        self.fill_cells();
+        self.join_cells();
+        self.sum_up();
+    }
+
+    fn push(&mut self, point: Vec3, view: Vec3, weight: f64) {
+        let cell = (point / CELL).floor() + HALF_KEY;
+        if !(cell.cmpge(Vec3::ONE).all() && cell.cmplt(Vec3::splat(2.0 * HALF_KEY - 1.0)).all()) {
+            return;
+        }
+        let key = ((cell.x as u64) << 42) | ((cell.y as u64) << 21) | cell.z as u64;
+        let [point, view] = [point, view].map(|v| v.to_array().map(|value| value as f32));
+        self.samples.push(Sample { key, point, view, weight: weight as f32 });
+    }
+
+    fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
+        for image in frame.images {
+            let background = backgrounds.of(image).map_or(&[][..], Background::depth);
+            let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
+            let spread = (step * step) as f64 / (image.intrinsics[0] * image.intrinsics[1] * REFERENCE_PATCH);
+            let camera = image.world_from_sensor.translation - origin;
+            for row in (0..image.height).step_by(step) {
+                for pixel in (row * image.width..(row + 1) * image.width).step_by(step) {
+                    let z = match image.pixels {
+                        DepthPixels::U16(pixels) => f32::from(pixels[pixel]),
+                        DepthPixels::F32(pixels) => pixels[pixel],
+                    } * image.metres_per_unit as f32;
+                    let seen = z > 0.0 && z.is_finite();
+                    if !seen || background.get(pixel).is_some_and(|depth| Background::holds(*depth, z)) {
+                        continue;
+                    }
+                    let point = image.world_from_sensor * image.back_project(pixel, z) - origin;
+                    let weight = image.weight * spread * f64::from(z * z);
+                    self.push(point, (point - camera).normalize_or_zero(), weight);
+                }
+            }
+        }
+    }
+
+    fn fill_cells(&mut self) {
+        self.cells.clear();
+        let mut start = 0;
+        for end in 1..=self.samples.len() {
+            if end < self.samples.len() && self.samples[end].key == self.samples[start].key {
+                continue;
+            }
+            let weight: f32 = self.samples[start..end].iter().map(|sample| sample.weight).sum();
+            if weight >= LEAST_PATCHES {
+                let parent = self.cells.len() as u32;
+                let samples = (start as u32, end as u32);
+                self.cells.push(Cell { key: self.samples[start].key, samples, parent });
+            }
+            start = end;
+        }
+    }
+
+    /// Joins every cell with those that touch it; half of them are enough, the others find this one.
+    fn join_cells(&mut self) {
+        for index in 0..self.cells.len() {
+            let key = self.cells[index].key;
+            for neighbour in 14..27_i64 {
+                let offset = ((neighbour / 9 - 1) << 42) + ((neighbour / 3 % 3 - 1) << 21) + (neighbour % 3 - 1);
+                let wanted = key.wrapping_add_signed(offset);
+                if let Ok(other) = self.cells.binary_search_by_key(&wanted, |cell| cell.key) {
+                    let (a, b) = (self.first(index as u32), self.first(other as u32));
+                    self.cells[a.max(b) as usize].parent = a.min(b);
+                }
+            }
+        }
+    }
+
+    /// The first cell of a cell's segment; the way there becomes shorter.
+    fn first(&mut self, mut cell: u32) -> u32 {
+        loop {
+            let parent = self.cells[cell as usize].parent;
+            if parent == cell {
+                return cell;
+            }
+            let next = self.cells[parent as usize].parent;
+            self.cells[cell as usize].parent = next;
+            cell = next;
+        }
+    }
+
+    fn sum_up(&mut self) {
+        self.found.clear();
+        self.of_cell.clear();
+        self.of_cell.resize(self.cells.len(), 0);
+        for index in 0..self.cells.len() {
+            let first = self.first(index as u32) as usize;
+            if first == index {
+                self.of_cell[index] = self.found.len() as u32;
+                let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+                self.found.push(Segment { centre: Vec3::ZERO, low, high, patches: 0.0, view: Vec3::ZERO });
+            }
+            let segment = &mut self.found[self.of_cell[first] as usize];
+            let (start, end) = self.cells[index].samples;
+            for sample in &self.samples[start as usize..end as usize] {
+                let weight = f64::from(sample.weight);
+                let [point, view] = [sample.point, sample.view].map(|v| Vec3::from_array(v.map(f64::from)));
+                segment.centre += weight * point;
+                segment.view += weight * view;
+                segment.low = segment.low.min(point);
+                segment.high = segment.high.max(point);
+                segment.patches += weight;
+            }
+        }
+        for segment in &mut self.found {
+            segment.centre /= segment.patches;
+            segment.view = segment.view.normalize_or_zero();
+        }
+        // No two segments share a centre: the order is the same on every run.
+        let place = |segment: &Segment| segment.centre.to_array();
+        self.found.sort_unstable_by(|a, b| b.patches.total_cmp(&a.patches).then_with(|| order(&place(a), &place(b))));
+    }
+}
+
+fn order(a: &[f64; 3], b: &[f64; 3]) -> std::cmp::Ordering {
+    let axes = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
+    axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Pose;
+    use crate::observation::frame::{Cloud, PointSlice, Scope};
+
+    #[test]
+    fn points_apart_are_segments_largest_first_and_strays_are_none() {
+        let patch = |at: [f64; 3], count: usize| {
+            (0..count).map(move |i| [at[0] + 0.01 * (i % 30) as f64, at[1] + 0.01 * (i / 30) as f64, at[2]])
+        };
+        let mut points: Vec<[f64; 3]> = patch([1.0, 0.0, 0.0], 600).chain(patch([3.0, 0.0, 0.0], 900)).collect();
+        // Single returns, half a metre apart, make no bridge between the two.
+        points.extend((0..40).map(|i| [0.5 * f64::from(i), 0.5, 1.0]));
+        let mut found = Vec::new();
+        for _ in 0..2 {
+            let clouds = [Cloud {
+                points: PointSlice::F64(&points),
+                world_from_sensor: Pose::identity(),
+                weight: 1.0,
+                scope: Scope::Free,
+                source: 0,
+            }];
+            let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
+            let mut segments = Segments::default();
+            segments.find(&frame, Vec3::ZERO, &Backgrounds::default(), &Config::default());
+            found.push(segments.found().to_vec());
+            // Another order of the same points gives the same segments, bit by bit.
+            points.reverse();
+        }
+        assert_eq!(found[0], found[1]);
+        assert_eq!(found[0].len(), 2, "{found:?}");
+        assert!((found[0][0].patches - 900.0).abs() < 40.0 && (found[0][1].patches - 600.0).abs() < 40.0, "{found:?}");
+        assert!((found[0][0].centre - Vec3::new(3.145, 0.145, 0.0)).length() < 0.02, "{found:?}");
+    }
+}

@@ -1,0 +1,69 @@
+//! A lost body that no detector can see, since it is of another kind or there is no depth image: it is looked for at everything of
+//! its size that hangs together and is no background, as it was last tracked and turned about the vertical.
+
+use super::trials::Trials;
+use crate::body::Body;
+use crate::fit::{Context, Fit};
+use crate::hypotheses::SWIVELS;
+use crate::math::{Pose, Quat, Vec3};
+use crate::observation::candidates::body_box;
+use crate::observation::segments::{Segment, Segments};
+
+/// What a search remembers, and its working memory.
+#[derive(Debug, Default)]
+pub(super) struct Search {
+    pub(super) segments: Segments,
+    /// Poses as last tracked, or as they were set.
+    tracked: Vec<Pose>,
+    turned: Vec<Pose>,
+    best: Vec<Pose>,
+}
+
+impl Search {
+    /// Remembers a tracked body.
+    pub(super) fn remember(&mut self, poses: &[Pose]) {
+        self.tracked.clear();
+        self.tracked.extend_from_slice(poses);
+    }
+
+    /// Segments as long as the body, or half or twice that, the largest first.
+    pub(super) fn fitting(&self, body: &Body) -> impl Iterator<Item = Segment> {
+        let length = body_box(body, &self.tracked, 0.0).extents().max_element();
+        let found = self.segments.found().iter().copied();
+        found.filter(move |segment| {
+            let extent = (segment.high - segment.low).max_element();
+            extent > 0.5 * length && extent < 2.0 * length
+        })
+    }
+
+    /// Whether the body is at a segment, whose points are the candidates of `context`, rather than at `present`; `trials` has its
+    /// poses then.
+    pub(super) fn at(
+        &mut self,
+        segment: Segment,
+        context: Context,
+        fit: &mut Fit,
+        trials: &mut Trials,
+        present: &[Pose],
+    ) -> bool {
+        let Self { tracked, turned, best, .. } = self;
+        let stood = tracked.first().map_or(Vec3::Z, |root| root.rotation * Vec3::Z);
+        let up = context.seen.frame().ground.map_or(stood, |ground| ground.normal);
+        let middle = body_box(&context.model.body, tracked, 0.0).center();
+        let there = 0.5 * (segment.low + segment.high);
+        let mut least = f64::INFINITY;
+        for turn in 0..SWIVELS {
+            let turn = Quat::from_axis_angle(up, std::f64::consts::TAU * turn as f64 / SWIVELS as f64);
+            let moved = Pose::from_parts(there - turn * middle, turn);
+            turned.clear();
+            turned.extend(tracked.iter().map(|pose| moved * *pose));
+            let stray = trials.stray_share(context, turned);
+            // Of two that explain as much the one that turns less.
+            if stray < least {
+                least = stray;
+                std::mem::swap(best, turned);
+            }
+        }
+        trials.at(context, fit, present, best, 0.0)
+    }
+}
