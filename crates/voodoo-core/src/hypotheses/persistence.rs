@@ -192,6 +192,6 @@ mod tests {
             let now = (number as f64 + 0.5) * apart;
             persistence.observe(Some(1), false, Times { before: now - apart, now })
         };
-        assert!((0..10 * WEARY).map(tried).all(|tried| tried));
+        assert!((0..10 * WEARY).all(tried));
     }
 }
