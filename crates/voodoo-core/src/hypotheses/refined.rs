@@ -5,6 +5,7 @@ use super::proposals::Proposal;
 use super::score::{Cost, overall_cost};
 use super::suspicion::Suspicion;
 use crate::association::correspondence::Correspondences;
+use crate::body::unusual;
 use crate::fit::{Context, Fit, Matched};
 use crate::math::Pose;
 use crate::regions::{Backdrop, Posed};
@@ -21,6 +22,9 @@ const ROUGH_STEPS: usize = GIVE_UP_AFTER;
 /// quarter of all, of which nine in a hundred explained more in the end, all less than 3 cm away.
 pub(super) const BACK_AFTER: usize = 3;
 const BACK: f64 = 0.03;
+
+/// A pose that is nearer to the usual one by this, in squared standard deviations, is twenty times as likely before anything is seen.
+const MORE_USUAL: f64 = 6.0;
 
 /// How the look at a hypothesis ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,10 +76,11 @@ impl Refined {
         let hopeless = cost.is_some_and(|cost| cost.total > most);
         if steps == REFINE && !hopeless && cost.is_some_and(|cost| cost.is_better_than(&present.cost)) {
             let matched = fit.matched(&self.poses);
-            // What is as suspect as before is not worth a jump.
+            // What is as suspect as before is not worth a jump, unless people rather move that way.
             let mut sure =
                 |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-            if matches!(basis, Basis::Lean | Basis::Body) || sure(matched) {
+            let [tried, now] = [&self.poses, present.poses].map(|poses| unusual(&context.model.body, poses));
+            if matches!(basis, Basis::Lean | Basis::Body) || sure(matched) || tried < now - MORE_USUAL {
                 return (steps, Outcome::Better);
             }
         }
