@@ -6,12 +6,15 @@ mod human;
 mod joint;
 pub mod kinematics;
 mod model;
+mod pose_prior;
+mod pose_statistics;
 pub mod two_bone;
 
 pub use edit::Pair;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 pub use model::Model;
+pub use pose_prior::unusual;
 
 use crate::error::BodyError;
 use crate::math::{Pose, Vec3, is_place, is_rigid};

@@ -29,7 +29,7 @@ use history::History;
 use proposals::{
     CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean, UnexplainedCluster,
 };
-use refined::{Outcome, Refined};
+use refined::{Outcome, Present, Refined};
 use rough::{Extremity, RoughSearch};
 use score::CLEAR_GAIN;
 use second::Second;
@@ -214,10 +214,13 @@ impl Hypotheses {
         if pool.found().next().is_none() {
             return 0;
         }
-        let present = refined.cost(context, fit, poses);
+        let cost = refined.cost(context, fit, poses);
         let (mut steps, mut hopeless) = (0, true);
         for proposal in pool.found() {
-            let (taken, outcome) = refined.improves(context, present, index, fit, proposal, suspicion);
+            let (taken, outcome) = {
+                let present = Present { cost, poses };
+                refined.improves(context, present, index, fit, proposal, suspicion)
+            };
             steps += taken;
             hopeless &= outcome == Outcome::Hopeless;
             if outcome != Outcome::Better {
@@ -311,7 +314,7 @@ mod tests {
             let before = format!("{:?}", fit.correspondences());
             let (wrong, _) = raised(&model, &poses, 0.2);
             // The others are as good as the current one, and no better.
-            let present = refined.cost(context, &fit, &poses);
+            let present = Present { cost: refined.cost(context, &fit, &poses), poses: &poses };
             for (tried, basis, ended) in [
                 (&wrong, Basis::Rest, |steps, outcome| steps < REFINE && outcome == Outcome::Hopeless),
                 (&poses, Basis::Body, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),

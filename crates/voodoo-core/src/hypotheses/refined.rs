@@ -5,6 +5,7 @@ use super::proposals::Proposal;
 use super::score::{Cost, SEEN_GAIN, overall_cost};
 use super::suspicion::Suspicion;
 use crate::association::correspondence::Correspondences;
+use crate::body::unusual;
 use crate::fit::{Context, Fit, Matched};
 use crate::math::Pose;
 use crate::regions::{Backdrop, Posed};
@@ -16,6 +17,9 @@ pub const REFINE: usize = 8;
 const GIVE_UP_AFTER: usize = 6;
 /// Steps with few points: they need not be exact. The hypothesis is judged by all of them.
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
+/// A pose that is nearer to the usual one by this, in squared standard deviations, is twenty times as likely before anything is seen.
+const MORE_USUAL: f64 = 6.0;
+
 /// How the look at a hypothesis ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
@@ -25,6 +29,13 @@ pub(super) enum Outcome {
     Refused,
     /// It is so much worse that the next frame will hardly think otherwise.
     Hopeless,
+}
+
+/// The current poses, and what they cost.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Present<'a> {
+    pub(super) cost: Cost,
+    pub(super) poses: &'a [Pose],
 }
 
 /// A hypothesis after its ICP steps.
@@ -39,11 +50,11 @@ pub(super) struct Refined {
 
 impl Refined {
     /// Refines a hypothesis of one arm or leg, with the whole body. Returns the ICP steps that took, and whether
-    /// it explains the frame better as a whole than what costs `present`: then `fit` holds its matches, else it is as before.
+    /// it explains the frame better as a whole than `present`: then `fit` holds its matches, else it is as before.
     pub(super) fn improves(
         &mut self,
         context: Context,
-        present: Cost,
+        present: Present,
         index: usize,
         fit: &mut Fit,
         hypothesis: &Proposal,
@@ -52,15 +63,16 @@ impl Refined {
         let chain = &context.model.extremities[index];
         let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
         // What colours alone tell on the way says little.
-        let most = if pictures { f64::INFINITY } else { present.total + SEEN_GAIN };
+        let most = if pictures { f64::INFINITY } else { present.cost.total + SEEN_GAIN };
         let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most);
         let hopeless = cost.total > most;
-        if steps == REFINE && !hopeless && cost.is_better_than(&present) {
+        if steps == REFINE && !hopeless && cost.is_better_than(&present.cost) {
             let matched = fit.matched(&self.poses);
-            // What is as suspect as before is not worth a jump.
+            // What is as suspect as before is not worth a jump, unless people rather move that way.
             let mut sure =
                 |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-            if matches!(basis, Basis::Lean | Basis::Body) || sure(matched) {
+            let [tried, now] = [&self.poses, present.poses].map(|poses| unusual(&context.model.body, poses));
+            if matches!(basis, Basis::Lean | Basis::Body) || sure(matched) || tried < now - MORE_USUAL {
                 return (steps, Outcome::Better);
             }
         }

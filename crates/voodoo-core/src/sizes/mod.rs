@@ -263,6 +263,7 @@ pub struct Reliance<F> {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use crate::math::Quat;
     use crate::shape::TaperedEllipticCylinder;
     use crate::testing::{before_wall, stand, standing, with_setting};
 
@@ -278,8 +279,13 @@ mod tests {
 
     /// The body after the first frame, which shows `person`; it was set as `set`, the feet where the person's are.
     fn first_frame(person: &Body, set: &Body, config: &Config) -> Body {
+        first_frame_from(person, set, stand(set), config)
+    }
+
+    /// The same from another pose.
+    fn first_frame_from(person: &Body, set: &Body, mut poses: Vec<Pose>, config: &Config) -> Body {
         let pixels = before_wall(person, &stand(person));
-        let (mut model, mut poses) = (Model::new(set.clone()), stand(set));
+        let mut model = Model::new(set.clone());
         let (before, start) = (model.clone(), poses.clone());
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
         sizes.restart(&model, Start::Positions, config);
@@ -338,6 +344,16 @@ mod tests {
         // What differs by less may be a person's.
         let little = ratios(&first_frame(&body, &changed(&body, &left, 0.9, 1.0), &config));
         assert!(near(wrong, 1.0) && near(real, 0.85) && near(asked, 0.85) && near(little, 0.9));
+        // Joints that were set wrong turn it as well.
+        for turns in [[0.0, 0.5], [0.3, -0.3], [-0.2, 0.4]] {
+            let mut poses = stand(&short);
+            for (name, turn) in left.iter().zip(turns) {
+                let limb = short.limb_index(name).unwrap();
+                poses[limb].rotation = Quat::from_axis_angle(Vec3::Z, turn) * poses[limb].rotation;
+            }
+            short.close_joints(&mut poses);
+            assert!(near(ratios(&first_frame_from(&body, &short, poses, &config)), 1.0), "{turns:?}");
+        }
     }
 
     /// The body after some frames of a person, from the sizes and the place it was set in.

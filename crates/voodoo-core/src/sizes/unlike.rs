@@ -1,6 +1,7 @@
 //! Arms and legs of unlike lengths in the start: a person has two alike.
 
-use crate::body::Model;
+use crate::body::two_bone::TwoBone;
+use crate::body::{Body, Model};
 use crate::fit::{Fit, Setting};
 use crate::hypotheses::{GAIN, overall_cost};
 use crate::math::Pose;
@@ -15,33 +16,59 @@ const UNLIKE_REACH: f64 = 0.88;
 /// frame clearly better: a skeleton whose foot is under the floor, or ends at the shin.
 pub(super) fn equalise_limb_lengths(setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
     for pair in model.body.pairs() {
-        let bones = |limb: &usize| model.extremities.iter().find(|c| c.upper == *limb).map(|c| [c.upper, c.lower]);
-        let [one, other] = pair.iter().filter_map(bones).collect::<Vec<_>>()[..] else { continue };
-        let lengths = [one, other].map(|bones| bones.map(|limb| model.body.limbs()[limb].shape.length()));
-        let [first, second] = lengths.map(|lengths| lengths.iter().sum::<f64>());
+        let chain = |limb: &usize| model.extremities.iter().find(|chain| chain.upper == *limb).cloned();
+        let [one, other] = &pair.iter().filter_map(chain).collect::<Vec<_>>()[..] else { continue };
+        let [first, second] = [one, other].map(|chain| bones(&model.body, chain).iter().sum::<f64>());
         if first.min(second) > UNLIKE_REACH * first.max(second) {
             continue;
         }
-        let start = (model.body.clone(), poses.clone());
-        let (mut least, mut best) = (start_cost(setting, model, poses, fit) - GAIN, start.clone());
-        for (bones, own, wanted) in [(other, lengths[1], lengths[0]), (one, lengths[0], lengths[1])] {
-            (model.body, *poses) = start.clone();
-            for (limb, (own, wanted)) in bones.into_iter().zip(own.into_iter().zip(wanted)) {
-                model.body.change_length(limb, wanted / own);
-            }
-            model.body.close_joints(poses);
-            let cost = start_cost(setting, model, poses, fit);
-            if cost < least {
-                (least, best) = (cost, (model.body.clone(), poses.clone()));
-            }
+        let mut changed = |chain, like| with_lengths_of(like, setting, model, poses, fit, chain);
+        let (first, second) = (changed(other, one), changed(one, other));
+        let best = if second.cost < first.cost { second } else { first };
+        let set = changed(one, one).cost.min(changed(other, other).cost);
+        if best.cost < set - GAIN {
+            *poses = best.poses;
+            model.adopt(best.body);
         }
-        *poses = best.1;
-        model.adopt(best.0);
     }
 }
 
-/// What the first frame has against the pose that was set, in unexplained patches.
-fn start_cost(setting: Setting, model: &Model, poses: &[Pose], fit: &mut Fit) -> f64 {
-    fit.match_points(setting.of(model), poses, &START_GATE);
-    overall_cost(setting.of(model), fit.matched(poses)).evidence
+/// A body and its pose, and what the first frame has against them, in unexplained patches.
+struct Changed {
+    cost: f64,
+    body: Body,
+    poses: Vec<Pose>,
+}
+
+/// Gives an arm or leg the lengths of the other one, and turns it to where it then fits: it was set by its wrong end.
+fn with_lengths_of(
+    like: &TwoBone,
+    setting: Setting,
+    model: &Model,
+    poses: &[Pose],
+    fit: &mut Fit,
+    chain: &TwoBone,
+) -> Changed {
+    let mut body = model.body.clone();
+    let factors = bones(&body, like).into_iter().zip(bones(&body, chain)).map(|(wanted, own)| wanted / own);
+    for (limb, factor) in [chain.upper, chain.lower].into_iter().zip(factors) {
+        body.change_length(limb, factor);
+    }
+    let mut set = poses.to_vec();
+    body.close_joints(&mut set);
+    let mut tried = model.clone();
+    tried.adopt(body);
+    let mut found = set.clone();
+    fit.run(setting.of(&tried), &set, &mut found);
+    for limb in chain.limbs() {
+        set[limb].rotation = found[limb].rotation;
+    }
+    tried.body.close_joints(&mut set);
+    fit.match_points(setting.of(&tried), &set, &START_GATE);
+    Changed { cost: overall_cost(setting.of(&tried), fit.matched(&set)).evidence, body: tried.body, poses: set }
+}
+
+/// Lengths of the two bones, metres.
+fn bones(body: &Body, chain: &TwoBone) -> [f64; 2] {
+    [chain.upper, chain.lower].map(|limb| body.limbs()[limb].shape.length())
 }

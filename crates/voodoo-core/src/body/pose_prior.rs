@@ -1,0 +1,122 @@
+//! How people move: how usual the turns of their joints are together.
+//!
+//! A normal distribution of the turns of the human's arms, legs and waist, learnt from motion capture (`training/pose_prior.py`).
+//! Of other bodies nothing is known.
+
+use super::pose_statistics::{MEAN, PRECISION};
+use super::{Body, Joint, JointKind};
+use crate::body::kinematics::joint_turn;
+use crate::math::{Pose, ShortestAxis};
+
+/// The body whose joints the statistics are of.
+const WHOSE: &str = "human";
+/// The joints, with the first of their components and how many these are: hinges have one.
+const JOINTS: [(&str, usize, usize); 9] = [
+    ("vl3", 0, 3),
+    ("l_shoulder", 3, 3),
+    ("l_elbow", 6, 1),
+    ("r_shoulder", 7, 3),
+    ("r_elbow", 10, 1),
+    ("l_hip", 11, 3),
+    ("l_knee", 14, 1),
+    ("r_hip", 15, 3),
+    ("r_knee", 18, 1),
+];
+/// Number of components of all joints.
+const SIZE: usize = MEAN.len();
+/// How unusual a pose is: the squared Mahalanobis distance from the mean; 0 for bodies of which nothing is known.
+pub fn unusual(body: &Body, poses: &[Pose]) -> f64 {
+    let mut off = [0.0; SIZE];
+    each_turn(body, poses, |component, value| off[component] = value);
+    let mut rest = PRECISION.as_slice();
+    let mut sum = 0.0;
+    for (i, own) in off.iter().enumerate() {
+        let (entries, others) = rest.split_at(i + 1);
+        let row: f64 = entries.iter().zip(&off).map(|(entry, other)| entry * other).sum();
+        sum += own * (2.0 * row - entries[i] * own);
+        rest = others;
+    }
+    sum
+}
+
+/// Calls `take` with the number and the difference from its mean of every component.
+fn each_turn(body: &Body, poses: &[Pose], mut take: impl FnMut(usize, f64)) {
+    if body.name() != WHOSE {
+        return;
+    }
+    for (limb, part) in body.limbs().iter().enumerate() {
+        let Some((parent, joint)) = &part.parent else { continue };
+        let Some(index) = number(joint) else { continue };
+        let (_, first, count) = JOINTS[index];
+        let turn = joint_turn(joint, &poses[*parent], &poses[limb]).to_scaled_axis_shortest();
+        (0..count).for_each(|k| take(first + k, turn[k] - MEAN[first + k]));
+    }
+}
+
+/// The number of a joint among those that the statistics are of.
+fn number(joint: &Joint) -> Option<usize> {
+    let hinge = joint.kind() == JointKind::Hinge;
+    JOINTS.iter().position(|(name, _, count)| *name == joint.name && hinge == (*count == 1))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::body::kinematics::{hinge_axis, place};
+    use crate::math::{Quat, Vec3};
+
+    fn human() -> (Body, Vec<Pose>) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = body.rest_pose(Pose::identity());
+        (body, poses)
+    }
+
+    fn joint<'a>(body: &'a Body, name: &str) -> (usize, usize, &'a Joint) {
+        let limbs = body.limbs().iter().enumerate();
+        let mut all =
+            limbs.filter_map(|(limb, part)| part.parent.as_ref().map(|(parent, joint)| (limb, *parent, joint)));
+        all.find(|(.., joint)| joint.name == name).unwrap()
+    }
+
+    #[test]
+    fn left_and_right_are_alike_and_the_mean_costs_nothing() {
+        let (body, mut mean) = human();
+        for (name, first, count) in JOINTS {
+            let (limb, parent, joint) = joint(&body, name);
+            let mut turn = Vec3::ZERO;
+            (0..count).for_each(|k| turn[k] = MEAN[first + k]);
+            mean[limb] = place(joint, &mean[parent], Quat::from_scaled_axis(turn));
+        }
+        assert!(unusual(&body, &mean) < 1e-12, "{}", unusual(&body, &mean));
+        let bent = |name: &str| {
+            let (_, mut poses) = human();
+            let (limb, parent, joint) = joint(&body, name);
+            poses[limb] = place(joint, &poses[parent], Quat::from_axis_angle(Vec3::X, 1.2));
+            unusual(&body, &poses)
+        };
+        for name in ["shoulder", "elbow", "hip", "knee"] {
+            let [left, right] = ["l", "r"].map(|side| bent(&format!("{side}_{name}")));
+            assert!((left - right).abs() < 0.01 * left, "{name}: {left} {right}");
+        }
+    }
+
+    #[test]
+    fn an_arm_in_the_chest_is_less_usual_than_one_that_hangs() {
+        let (body, mut poses) = human();
+        let hanging = unusual(&body, &poses);
+        let (limb, parent, shoulder) = joint(&body, "l_shoulder");
+        poses[limb] = place(shoulder, &poses[parent], Quat::from_scaled_axis(Vec3::new(-0.3, 1.2, 0.5)));
+        let (fore, _, elbow) = joint(&body, "l_elbow");
+        poses[fore] = place(elbow, &poses[limb], Quat::from_axis_angle(hinge_axis(elbow), 2.0));
+        assert!(unusual(&body, &poses) > hanging + 6.0, "{} {hanging}", unusual(&body, &poses));
+    }
+
+    #[test]
+    fn of_another_body_nothing_is_known() {
+        let (body, poses) = human();
+        let other = Body::new("robot", body.limbs().to_vec(), Vec::new()).unwrap();
+        assert_eq!(unusual(&other, &poses), 0.0);
+    }
+}

@@ -1,0 +1,18 @@
+"""What tests of the command line share."""
+
+from typer.testing import CliRunner
+
+from voodoo.cli import app
+
+
+def run(*arguments):
+    """Runs a command in this process."""
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "200"})
+
+
+def refused(done, *words):
+    """Checks that a command ended with one line of an error, which names `words`."""
+    assert done.exit_code == 1, done.output
+    assert done.stderr.startswith("voodoo: ") and done.stderr.count("\n") == 1 and len(done.stderr) < 1000, done.stderr
+    for word in words:
+        assert word in done.stderr, done.stderr
