@@ -1,6 +1,7 @@
 //! Trying other configurations of arms and legs where the frame speaks against the current ones, and keeping the best by one
 //! score.
 
+mod exchange;
 mod history;
 mod landmark_cost;
 mod persistence;
@@ -25,9 +26,11 @@ use crate::detect::Detection;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
 use crate::visibility::LITTLE;
+use exchange::Exchange;
 use history::History;
 use proposals::{
-    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean, UnexplainedCluster,
+    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
+    UnexplainedCluster,
 };
 use refined::{Outcome, Present, Refined};
 use rough::{Extremity, RoughSearch};
@@ -45,6 +48,8 @@ pub struct Hypotheses {
     rough: RoughSearch,
     clusters: UnexplainedCluster,
     lean: TrunkLean,
+    shown: ShownByColors,
+    exchange: Exchange,
     pool: Pool,
     refined: Refined,
     second: Second,
@@ -62,6 +67,7 @@ impl Hypotheses {
         // Room at once, not when the first hard frame comes.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
+        self.exchange.prepare(limbs);
         self.lean.prepare(model);
         self.second.prepare(limbs);
         self.refined.poses.clear();
@@ -111,6 +117,10 @@ impl Hypotheses {
             steps += taken;
         }
         if pictures {
+            let doubtful = |index: usize| !self.history[index].persistence.is_clear();
+            steps += self.exchange.attempt(context, doubtful, &mut self.refined, fit, poses, predicted);
+        }
+        if pictures {
             steps += self.second.compare(context, &mut self.refined, fit, poses, predicted);
         }
         if pictures && steps > 0 {
@@ -150,6 +160,7 @@ impl Hypotheses {
             for backdrop in [&mut self.rough.score.backdrop, &mut self.refined.backdrop] {
                 backdrop.make_room(frame, limbs);
             }
+            self.shown.make_room(limbs);
         }
         self.refined.matched.reserve_as(fit.correspondences());
     }
@@ -179,17 +190,18 @@ impl Hypotheses {
 
     /// Fills the pool with other configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<&Detection>, detected: &[Pose]) {
-        let Self { history, suspicion, rough, clusters, lean, pool, .. } = self;
+        let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current - GAIN);
         // The kinds of proposals: one more is a file and a line here.
-        let kinds: [&mut dyn Propose; 7] = [
+        let kinds: [&mut dyn Propose; 8] = [
             clusters,
             &mut LastGoodEnd,
             &mut CarriedByParent,
             &mut LastProposal,
             lean,
+            shown,
             &mut DetectedEnd(detection),
             &mut DetectedBody(detected),
         ];

@@ -5,6 +5,7 @@ mod detected_body;
 mod detected_end;
 mod last_good_end;
 mod last_proposal;
+mod shown_by_colors;
 mod trunk_lean;
 mod unexplained_cluster;
 
@@ -13,6 +14,7 @@ pub(super) use detected_body::DetectedBody;
 pub(super) use detected_end::DetectedEnd;
 pub(super) use last_good_end::LastGoodEnd;
 pub(super) use last_proposal::LastProposal;
+pub(super) use shown_by_colors::ShownByColors;
 pub(super) use trunk_lean::TrunkLean;
 pub(super) use unexplained_cluster::UnexplainedCluster;
 

@@ -1,0 +1,185 @@
+//! The two legs exchanged: clothed alike, each lies on the colours of the other, and only both together can come right.
+//!
+//! By then sizes have followed the wrong ones: exchanged legs that explain as much are followed beside the body for some frames.
+
+use super::refined::{REFINE, Refined};
+use super::score::{Cost, SURE_GAIN};
+use crate::body::Body;
+use crate::body::two_bone::TwoBone;
+use crate::fit::{Context, Fit};
+use crate::math::{Pose, Vec3, shifted};
+
+/// What explains a smaller share of what is explained now is not refined: legs that stand right lose more when they are exchanged.
+const WORTH_A_LOOK: f64 = 0.88;
+/// What is followed explains this share at least.
+const WORTH_FOLLOWING: f64 = 0.96;
+/// A pelvis that turns by more than this, radians, is another body's: the legs alone were exchanged.
+const MOST_TURNED: f64 = 0.5;
+
+/// Exchanged legs are looked at in every so manyth frame, and followed for so many.
+const REST: usize = 4;
+const WEARY: usize = 8;
+
+/// When one looks, and where the legs would be.
+#[derive(Debug, Default)]
+pub(super) struct Exchange {
+    /// The body with exchanged legs, working frame.
+    poses: Vec<Pose>,
+    /// The same as it was found in the frame before, world, and for how many frames; empty if it is not followed.
+    followed: Vec<Pose>,
+    age: usize,
+    /// What it has gained since it was looked at first, patches.
+    gained: f64,
+    frames: usize,
+}
+
+impl Exchange {
+    /// Forgets what was, and makes room for a body of so many limbs.
+    pub(super) fn prepare(&mut self, limbs: usize) {
+        (self.frames, self.age, self.gained) = (0, 0, 0.0);
+        for poses in [&mut self.poses, &mut self.followed] {
+            poses.clear();
+            poses.reserve(limbs);
+        }
+    }
+
+    /// Tries the legs where the other one is, if a leg is `doubtful` or it is time to look. Returns the number of ICP steps.
+    pub(super) fn attempt(
+        &mut self,
+        context: Context,
+        doubtful: impl Fn(usize) -> bool,
+        refined: &mut Refined,
+        fit: &mut Fit,
+        poses: &mut Vec<Pose>,
+        predicted: &mut Vec<Pose>,
+    ) -> usize {
+        let chains = &context.model.extremities;
+        let mut legs = (0..chains.len()).filter(|index| chains[*index].leg);
+        let (Some(one), Some(other), None) = (legs.next(), legs.next(), legs.next()) else { return 0 };
+        if !self.is_due(doubtful(one) || doubtful(other)) {
+            return 0;
+        }
+        let (origin, now) = (context.seen.origin(), refined.cost(context, fit, poses));
+        self.put(&context.model.body, [&chains[one], &chains[other]], poses, origin);
+        if !self.goes_on() && !is_worth_a_look(now, refined.cost(context, fit, &self.poses)) {
+            return 0;
+        }
+        let cost = refined.refine(context, fit, &self.poses);
+        let turned = refined.poses[0].rotation.angle_between(poses[0].rotation);
+        if self.gains(now, cost, turned) {
+            poses.clone_from(&refined.poses);
+            predicted.clone_from(&self.poses);
+        } else {
+            fit.exchange(&mut refined.matched);
+        }
+        self.keep(&refined.poses, origin);
+        REFINE
+    }
+
+    /// Whether to look in this frame; to be called in every one.
+    fn is_due(&mut self, doubtful: bool) -> bool {
+        self.frames = (self.frames + 1) % REST;
+        self.frames == 0 || doubtful || self.goes_on()
+    }
+
+    /// It is followed from the frame before.
+    fn goes_on(&self) -> bool {
+        !self.followed.is_empty()
+    }
+
+    /// Puts each of two legs where the other one is, or where it was found to be in the frame before.
+    fn put(&mut self, body: &Body, legs: [&TwoBone; 2], poses: &[Pose], origin: Vec3) {
+        self.poses.clear();
+        if self.goes_on() {
+            self.poses.extend(self.followed.iter().map(|pose| shifted(pose, origin)));
+            return;
+        }
+        self.poses.extend_from_slice(poses);
+        for (own, other) in [(legs[0], legs[1]), (legs[1], legs[0])] {
+            own.put(body, &mut self.poses, poses[other.lower].translation, other.end(poses));
+        }
+    }
+
+    /// Takes note of what a frame says of it, and of how far its pelvis is turned, radians; true when it is to be taken.
+    fn gains(&mut self, now: Cost, exchanged: Cost, turned: f64) -> bool {
+        // No frame counts for more than half: it may be disturbed.
+        self.gained = (self.gained + (now.total - exchanged.total).min(0.5 * SURE_GAIN)).max(0.0);
+        self.age += 1;
+        let close = exchanged.evidence < WORTH_FOLLOWING * now.evidence && turned < MOST_TURNED;
+        let taken = close && self.gained > SURE_GAIN;
+        if taken || !close || self.age > WEARY {
+            (self.age, self.gained) = (0, 0.0);
+        }
+        taken
+    }
+
+    /// Keeps what was found of it, if it is followed.
+    fn keep(&mut self, poses: &[Pose], origin: Vec3) {
+        self.followed.clear();
+        if self.age > 0 {
+            self.followed.extend(poses.iter().map(|pose| shifted(pose, -origin)));
+        }
+    }
+}
+
+/// Whether exchanged legs explain nearly as much as those of now, as they are.
+fn is_worth_a_look(now: Cost, exchanged: Cost) -> bool {
+    exchanged.evidence < WORTH_A_LOOK * now.evidence
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::testing::standing;
+
+    fn cost(explained: f64) -> Cost {
+        Cost { evidence: -explained, total: -explained }
+    }
+
+    #[test]
+    fn each_leg_ends_where_the_other_one_did_and_nothing_else_moves() {
+        let (model, poses) = standing();
+        let legs: Vec<&TwoBone> = model.extremities.iter().filter(|chain| chain.leg).collect();
+        let mut exchange = Exchange::default();
+        exchange.put(&model.body, [legs[0], legs[1]], &poses, Vec3::ZERO);
+        for (own, other) in [(legs[0], legs[1]), (legs[1], legs[0])] {
+            let way = own.end(&exchange.poses).distance(other.end(&poses));
+            assert!(way < 0.08, "{way} m");
+            assert!(own.root(&model.body, &exchange.poses).distance(own.root(&model.body, &poses)) < 1e-9);
+        }
+        for limb in (0..poses.len()).filter(|limb| !legs.iter().any(|leg| leg.limbs().any(|own| own == *limb))) {
+            assert_eq!(exchange.poses[limb], poses[limb]);
+        }
+    }
+
+    #[test]
+    fn it_is_taken_when_several_frames_say_so_and_dropped_when_they_do_not() {
+        let (now, better, far) = (cost(2000.0), cost(2090.0), cost(1500.0));
+        let mut exchange = Exchange::default();
+        let said: Vec<bool> = (0..4).map(|_| exchange.gains(now, better, 0.1)).collect();
+        assert_eq!(said, [false, false, true, false], "no frame counts for more than half");
+        let mut exchange = Exchange::default();
+        assert!([better, better, far, better, better].iter().all(|cost| !exchange.gains(now, *cost, 0.1)));
+        let mut exchange = Exchange::default();
+        assert!((0..9).all(|_| !exchange.gains(now, better, 1.0)), "another body");
+        // What is as good is followed for some frames.
+        let (_, poses) = standing();
+        let followed: Vec<bool> = (0..10)
+            .map(|_| {
+                exchange.gains(now, now, 0.0);
+                exchange.keep(&poses, Vec3::ZERO);
+                exchange.goes_on()
+            })
+            .collect();
+        assert_eq!(followed.iter().filter(|goes_on| !**goes_on).count(), 1, "{followed:?}");
+    }
+
+    #[test]
+    fn one_looks_every_so_often_and_at_once_where_a_leg_is_in_doubt() {
+        let mut exchange = Exchange::default();
+        let due: Vec<bool> = (0..8).map(|_| exchange.is_due(false)).collect();
+        assert_eq!(due.iter().filter(|due| **due).count(), 8 / REST);
+        assert!(exchange.is_due(true));
+    }
+}
