@@ -13,6 +13,7 @@ use voodoo_core::observation::depth_view::{DepthViews, find_segmented};
 use voodoo_core::observation::frame::{DepthImage, DepthPixels, Frame};
 use voodoo_core::visibility::limb_support::{LimbSupport, measure_support};
 use voodoo_core::visibility::render::{Rendering, Viewpoint};
+use voodoo_core::visibility::roundness::roundness;
 
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
@@ -129,4 +130,27 @@ fn what_one_camera_cannot_prove_another_can() {
     assert!(both.own[1] > 0.5 && both.free_space[1] < 0.05, "{both:?}");
     // No image, no word.
     assert_eq!(proofs(&body, &poses, &[])[arm.lower], LimbSupport::default());
+}
+
+#[test]
+fn a_body_is_round_and_a_door_is_not() {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let [front, back] = cameras();
+    let poses = scene::standing(&body);
+    for camera in [front, back] {
+        let round = with_views(&[(shoot(&body, &poses, camera), camera)], |views| roundness(views, &body, &poses));
+        assert!((round.unwrap() - 1.0).abs() < 0.15, "{round:?}");
+        // Upright, and one that stands aslant.
+        for slope in [0.0, 0.4] {
+            let door = |index: usize| {
+                let x = ((index % WIDTH) as f64 - INTRINSICS[2]) / INTRINSICS[0];
+                (1000.0 * 2.33 / (1.0 - slope * x)).round() as u16
+            };
+            let pixels = (0..WIDTH * HEIGHT).map(door).collect();
+            let flat = with_views(&[(pixels, camera)], |views| roundness(views, &body, &poses));
+            assert!(flat.unwrap().abs() < 0.1, "slope {slope}: {flat:?}");
+        }
+        let empty = with_views(&[(vec![0; WIDTH * HEIGHT], camera)], |views| roundness(views, &body, &poses));
+        assert_eq!(empty, None);
+    }
 }

@@ -29,10 +29,14 @@ use crate::visibility::FEW;
 use crate::visibility::evidence::{EXPLAINED, limb_visibility};
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
+use crate::visibility::roundness::roundness;
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
 use two_state::{EVEN, all, either, said_by};
 
+/// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
+const FLAT: f64 = 0.2;
+const ROUNDNESS_MEMORY: f64 = 0.9;
 /// Of a tracked body no larger share of the limbs is not measured. One of which no larger share is measured is lost, and so is one of
 /// which less than twice that is where the root is not.
 const SOME: f64 = 0.25;
@@ -41,6 +45,8 @@ const SOME: f64 = 0.25;
 #[derive(Debug, Default)]
 pub(super) struct Assessor {
     limbs: Vec<LimbHistory>,
+    /// Roundness of what is seen where the body is thought to be.
+    round: Option<f64>,
     /// The status of body and limbs that the tracker goes by; none of a limb before the first frame.
     status: Status,
     internal: Vec<LimbStatus>,
@@ -54,10 +60,11 @@ pub(super) struct Assessor {
 }
 
 impl Assessor {
-    /// A pose that somebody vouches for is taken to be on a body until a frame says otherwise.
+    /// A pose that somebody vouches for is taken to be on a body until many frames say otherwise.
     pub(super) fn trust_pose(&mut self) {
         self.forget_limbs();
         self.status = Status::Tracking;
+        self.round = Some(1.0);
     }
 
     /// Limbs were changed while the body had the reported `status`.
@@ -69,16 +76,24 @@ impl Assessor {
     /// The body is somewhere else: nothing speaks for the new place but what is seen now.
     pub(super) fn moved(&mut self) {
         self.limbs.clear();
+        self.round = None;
     }
 
     /// A pose that nobody vouches for: what is seen of it now decides.
     pub(super) fn doubt_pose(&mut self) {
         self.forget_limbs();
+        self.round = None;
     }
 
     /// Whether the body, or one of its limbs, was not where it should have been.
     pub(super) fn doubts(&self) -> bool {
         self.status != Status::Tracking || self.internal.contains(&LimbStatus::Lost)
+    }
+
+    /// The body is given up.
+    fn give_up(&mut self) {
+        self.status = Status::Lost;
+        self.internal.fill(LimbStatus::Lost);
     }
 
     /// The status of the body that the tracker goes by.
@@ -114,6 +129,13 @@ impl Assessor {
             internal[limb] = limbs[limb].status(internal[limb]);
         }
         inherit_status(extremities, internal);
+        if let Some(now) = roundness(context.seen.views, &context.model.body, matched.poses) {
+            let mixed = |before: f64| ROUNDNESS_MEMORY * before + (1.0 - ROUNDNESS_MEMORY) * now;
+            self.round = Some(self.round.map_or(now, mixed));
+        }
+        if self.round.is_some_and(|round| round < FLAT) {
+            self.give_up();
+        }
     }
 
     /// Reports the status of the body and its limbs: the one place that writes them into an estimate. No body is tracked of which
@@ -251,7 +273,7 @@ mod tests {
     use crate::fit::Fit;
     use crate::observation::candidates::Candidates;
     use crate::observation::frame::Frame;
-    use crate::testing::{before_wall, first_arm, moved, standing, with_context, without_background};
+    use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};
 
     /// Lets an assessor look at poses in an image, in so many frames.
     fn look(assessor: &mut Assessor, pixels: &[u16], poses: &[Pose], frames: usize) {
@@ -348,6 +370,41 @@ mod tests {
         for limb in [arm.lower, arm.ends[0]] {
             assert_eq!((estimate.limb_status[limb], assessor.relied_on(limb)), (LimbStatus::Inferred, false));
         }
+    }
+
+    #[test]
+    fn what_is_flat_is_lost_in_time_and_at_once_where_nobody_vouches_for_it() {
+        let (model, poses) = standing();
+        let mut pixels = vec![0; depth(&model.body, &poses).len()];
+        put_board(&mut pixels, Vec3::new(0.0, 0.0, 2.5), [0.35, 0.9]);
+        let mut assessor = trusting();
+        look(&mut assessor, &pixels, &poses, 10);
+        assert_ne!(assessor.status(), Status::Lost, "a blurred frame is flat, too");
+        look(&mut assessor, &pixels, &poses, 10);
+        assert_eq!(reported(&assessor).status, Status::Lost);
+        // A body that comes back does so in time.
+        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+        assert_eq!(assessor.status(), Status::Lost);
+        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 4);
+        assert_eq!(assessor.status(), Status::Tracking);
+        assessor.moved();
+        look(&mut assessor, &pixels, &poses, 1);
+        assert_eq!(assessor.status(), Status::Lost);
+    }
+
+    #[test]
+    fn a_body_given_up_has_no_limb_and_one_that_moved_is_judged_anew() {
+        let (model, poses) = standing();
+        let pixels = before_wall(&model.body, &poses);
+        let mut assessor = trusting();
+        look(&mut assessor, &pixels, &poses, 1);
+        assessor.give_up();
+        assert_eq!(reported(&assessor).status, Status::Lost);
+        assert!((0..poses.len()).all(|limb| !assessor.relied_on(limb)));
+        assert_eq!(reported(&assessor).limb_status, vec![LimbStatus::Lost; poses.len()]);
+        assessor.moved();
+        look(&mut assessor, &pixels, &poses, 1);
+        assert_eq!(reported(&assessor).status, Status::Tracking);
     }
 
     #[test]
