@@ -27,6 +27,7 @@ use crate::observation::segments::{Segment, Segments};
 use crate::observation::share::Share;
 use belief::Belief;
 pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
+pub use doubt::Seen;
 use doubt::{Doubt, SIGMAS};
 use facing::Known;
 use people::People;
@@ -112,9 +113,9 @@ impl Relocalizer {
         self.doubt.itself()
     }
 
-    /// Whether the track was started less than a second ago.
-    pub fn young(&self, stamp: f64) -> bool {
-        self.doubt.young(stamp)
+    /// Whether a detector looks in this frame because the track is young.
+    pub fn looks_after(&self) -> bool {
+        self.doubt.looks_after()
     }
 
     /// The pose of a body that fits best what a detector saw in this frame, world frame; the body is that of a start, or has the
@@ -133,11 +134,11 @@ impl Relocalizer {
     }
 
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
-    /// was not where it should be in the frame before, or the body `lost`.
-    pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {
+    /// was not where it should be in the frame before, or it is `unsure` whether one was, or the body `lost`.
+    pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, unsure: bool, lost: bool) {
         // A body that was found a moment ago may face the other way.
         let often = lost || self.watch.open();
-        if self.doubt.due(frame.stamp, doubtful, often) && self.known {
+        if self.doubt.due(frame.stamp, doubtful, unsure, often) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
             // What stands before a hidden body is somebody else.
             self.people.leave_out(|place| self.watch.hidden.by(frame, place));
@@ -148,7 +149,7 @@ impl Relocalizer {
 
     /// The same for one of several persons: good tracks are looked at, too, and who is lost is not looked for here.
     pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
-        if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
+        if self.doubt.due(frame.stamp, true, false, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
             self.people.leave_out(|place| place.distance(root) > SAME_PERSON);
         } else {
@@ -176,21 +177,23 @@ impl Relocalizer {
         self.watch.hidden.observe(views, joints, tracked, !lost);
     }
 
-    /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; of a `young` track
-    /// and of one `among` several persons also that its arms and legs are.
-    pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool, young: bool, among: bool) -> bool {
-        let Some(detection) = self.people.seen() else { return false };
+    /// What a detector that looked at this frame says of a body at these poses, world frame; of a `young` track and of one `among`
+    /// several persons also of its arms and legs.
+    pub fn weigh(
+        &mut self,
+        body: &Body,
+        world_from_limb: &[Pose],
+        lost: bool,
+        young: bool,
+        among: bool,
+    ) -> Option<Seen> {
+        let detection = self.people.seen()?;
         // A lost body is where a person is seen for sure.
-        if lost {
-            self.belief.observe(Some(detection))
-        } else {
-            self.doubt.weigh(detection, body, world_from_limb, young, among)
-        }
-    }
-
-    /// Whether what a detector saw last is where the body is tracked.
-    pub fn agrees(&self) -> bool {
-        self.doubt.agrees()
+        Some(match lost {
+            true if self.belief.observe(Some(detection)) => Seen::Elsewhere,
+            true => Seen::NotThere,
+            false => self.doubt.weigh(detection, body, world_from_limb, young, among),
+        })
     }
 
     /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.

@@ -36,10 +36,11 @@ impl LimbHistory {
         self.frames += 1;
     }
 
-    /// Takes what a frame's images say of the limb and of its far end, log odds, after it moved by so many metres.
-    pub(super) fn show(&mut self, evidence: [f64; 2], moved: f64) {
+    /// Takes what a frame's images say of the limb and of its far end, and what a detector says of that, log odds, after it moved by
+    /// so many metres.
+    pub(super) fn show(&mut self, evidence: [f64; 2], detected: f64, moved: f64) {
         let mut states = self.shows.unwrap_or_default();
-        states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, moved));
+        states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, detected, moved));
         self.shows = Some(states);
     }
 
@@ -70,6 +71,11 @@ impl LimbHistory {
         }
     }
 
+    /// Whether the limb is right or wrong may as well be the other way round.
+    pub(super) fn is_in_doubt(&self) -> bool {
+        self.shows.is_some_and(|[whole, _]| whole.is_in_doubt())
+    }
+
     /// The far end of the limb shows: what hangs on it is where it is.
     pub(super) fn end_shows(&self) -> bool {
         self.shows.is_none_or(|[_, end]| end.holds())
@@ -85,7 +91,7 @@ mod tests {
         for now in frames {
             limb.update(*now);
             match evidence {
-                Some(evidence) => limb.show(evidence, 0.0),
+                Some(evidence) => limb.show(evidence, 0.0, 0.0),
                 None => limb.hide(),
             }
         }

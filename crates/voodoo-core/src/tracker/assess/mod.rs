@@ -21,6 +21,7 @@ use super::estimate::{Estimate, LimbStatus, Status};
 use crate::association::correspondence::SitePair;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
+use crate::detect::Detection;
 use crate::fit::{Context, Matched};
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
@@ -31,7 +32,7 @@ use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
-use two_state::{EVEN, all, either, said_by};
+use two_state::{EVEN, all, either, said_by, said_by_detector};
 
 /// Shares are of this many visible patches at least.
 const LEAST_VISIBLE: f64 = 8.0;
@@ -106,18 +107,24 @@ impl Assessor {
         self.status
     }
 
+    /// Whether it is in doubt if one of the arms and legs is right.
+    pub(super) fn is_unsure(&self) -> bool {
+        self.limbs.iter().any(LimbHistory::is_in_doubt)
+    }
+
     /// Whether the tracker relies on a limb.
     pub(super) fn relied_on(&self, limb: usize) -> bool {
         self.internal.get(limb) == Some(&LimbStatus::Measured)
     }
 
-    /// The status that the tracker goes by, of the body and its limbs.
-    pub(super) fn assess(&mut self, context: Context, matched: Matched) {
+    /// The status that the tracker goes by, of the body and its limbs; `detection` is what a detector says of this frame, if it looked
+    /// and the pose is not taken from it.
+    pub(super) fn assess(&mut self, context: Context, matched: Matched, detection: Option<&Detection>) {
         if context.seen.candidates.is_empty() && matched.correspondences.sites.is_empty() {
             // Nothing was measured: what was known before does not speak for this frame.
             self.limbs.clear();
         }
-        self.update_limbs(context, matched);
+        self.update_limbs(context, matched, detection);
         let extremities = &context.model.extremities;
         let Self { limbs, internal, .. } = self;
         internal.clear();
@@ -175,7 +182,7 @@ impl Assessor {
     }
 
     /// What this frame says about every limb.
-    fn update_limbs(&mut self, context: Context, matched: Matched) {
+    fn update_limbs(&mut self, context: Context, matched: Matched, detection: Option<&Detection>) {
         let (body, views, poses) = (&context.model.body, context.seen.views, matched.poses);
         self.limbs.resize(poses.len(), LimbHistory::default());
         self.exclusive.count(body, poses, context.seen.candidates);
@@ -208,15 +215,27 @@ impl Assessor {
             support.known &= self.exclusive.clouds[limb] < FEW;
             history.update(now.map(|value| value.min(1.0)));
         }
-        self.weigh_images(context, poses);
+        self.weigh_images(context, poses, detection);
     }
 
-    /// What this frame's images say about arms and legs.
-    fn weigh_images(&mut self, context: Context, poses: &[Pose]) {
+    /// What this frame's images, and a detector that looked at them, say about arms and legs.
+    fn weigh_images(&mut self, context: Context, poses: &[Pose], detection: Option<&Detection>) {
         let Self { limbs, supports, .. } = self;
         let (model, previous) = (context.model, context.previous);
         let far_end =
             |poses: &[Pose], limb: usize| poses[limb] * Vec3::new(0.0, 0.0, model.body.limbs()[limb].shape.length());
+        let known = previous.len() == poses.len();
+        let origin = context.seen.origin();
+        let detected = |limb: usize, next: Option<usize>| -> f64 {
+            // Both ends of the limb: where a detector sees all of it aside, it is wrong however sure one joint may be.
+            let joints = detection.into_iter().flat_map(|seen| {
+                [Some(limb), next]
+                    .into_iter()
+                    .flatten()
+                    .filter_map(|limb| joint_apart(&model.body, poses, limb, seen, origin))
+            });
+            joints.map(|[apart, sigma]| said_by_detector(apart, sigma)).sum()
+        };
         for chain in &model.extremities {
             let said = |limb: usize, part: usize| {
                 let support = &supports[limb];
@@ -226,17 +245,34 @@ impl Assessor {
             let [upper_end, lower_end] = [chain.upper, chain.lower].map(|limb| said(limb, 1));
             let of_upper = all(&[upper, either(upper_end, lower)]);
             let of_lower = [all(&[upper, lower]), all(&[upper, lower, lower_end])];
-            for (limb, evidence) in [(chain.upper, [of_upper; 2]), (chain.lower, of_lower)] {
-                if !supports[limb].known {
+            // What moves fast carries what hangs on it.
+            let moved = |limb: usize| far_end(poses, limb).distance(far_end(previous, limb));
+            let root = |poses: &[Pose]| chain.root(&model.body, poses);
+            let moved = if known {
+                moved(chain.upper).max(moved(chain.lower)).max(root(poses).distance(root(previous)))
+            } else {
+                0.0
+            };
+            let ends =
+                [(chain.upper, [of_upper; 2], Some(chain.lower)), (chain.lower, of_lower, chain.ends.first().copied())];
+            for (limb, evidence, next) in ends {
+                if supports[limb].known {
+                    limbs[limb].show(evidence, detected(limb, next), moved);
+                } else {
                     limbs[limb].hide();
-                    continue;
                 }
-                let known = previous.len() == poses.len();
-                let moved = if known { far_end(poses, limb).distance(far_end(previous, limb)) } else { 0.0 };
-                limbs[limb].show(evidence, moved);
             }
         }
     }
+}
+
+/// How far the joint by which a limb hangs on its parent lies from where a detector sees it, and the detector's standard deviation,
+/// metres; none of a joint that it does not tell.
+fn joint_apart(body: &Body, poses: &[Pose], limb: usize, detection: &Detection, origin: Vec3) -> Option<[f64; 2]> {
+    let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
+    let seen = detection.joint(&joint.name)?;
+    let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
+    Some([tracked.distance(seen.position), seen.sigma])
 }
 
 /// The limb that a site at a joint tells of besides its own: the one that its own hangs on.
@@ -285,7 +321,7 @@ mod tests {
         with_context(pixels, &config, &model, poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, poses);
-            (0..frames).for_each(|_| assessor.assess(context, fit.matched(poses)));
+            (0..frames).for_each(|_| assessor.assess(context, fit.matched(poses), None));
         });
     }
 
@@ -355,7 +391,7 @@ mod tests {
             let mut seen = context.seen.with(&candidates);
             (seen.views.frame, seen.views.segmented) = (&frame, &[]);
             let matched = Matched { correspondences: &Correspondences::default(), poses: &poses };
-            assessor.assess(Context { seen, ..context }, matched);
+            assessor.assess(Context { seen, ..context }, matched, None);
         });
         assert_eq!(reported(&assessor).status, Status::Lost);
     }

@@ -12,7 +12,10 @@ pub(super) const EVEN: f64 = 0.075;
 const CHANGES: f64 = 0.05;
 /// A limb whose far end moved by so much between two frames, metres, is wrong before it is seen there, and with the square of
 /// a shorter way the likelier: what was predicted is off by a share of it.
-const FAR: f64 = 0.33;
+const FAR: f64 = 0.3;
+/// How far a right joint lies from where a detector is told to see it, metres along each axis, beside the detector's own standard
+/// deviation: skeletons differ.
+const SKELETONS_DIFFER: f64 = 0.03;
 
 /// Log odds that something is right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,18 +24,29 @@ pub(super) struct TwoState {
 }
 
 impl TwoState {
-    /// Takes a frame's `evidence`, log odds, after a motion of so many metres.
-    pub(super) fn observe(&mut self, evidence: f64, moved: f64) {
+    /// Takes what a frame's images and a detector say, log odds, after a motion of so many metres.
+    pub(super) fn observe(&mut self, images: f64, detector: f64, moved: f64) {
         let before = probability(self.log_odds);
         let goes_wrong = (CHANGES + (moved / FAR).powi(2)).min(1.0);
         let now = before * (1.0 - goes_wrong) + (1.0 - before) * CHANGES;
-        self.log_odds = (now / (1.0 - now)).ln() + evidence.clamp(-most_said(), most_said());
+        self.log_odds = (now / (1.0 - now)).ln() + images.clamp(-most_said(), most_said()) + detector;
     }
 
     /// It is likelier right than wrong.
     pub(super) fn holds(&self) -> bool {
         self.log_odds >= 0.0
     }
+
+    /// It may as well be the other way round: a frame that shows nothing would say more.
+    pub(super) fn is_in_doubt(&self) -> bool {
+        self.log_odds.abs() < -said_by(0.0)
+    }
+}
+
+/// Log odds that a joint is right that a detector, with this standard deviation, sees so many metres away: of a right one the mean
+/// square is that of three axes.
+pub(super) fn said_by_detector(apart: f64, sigma: f64) -> f64 {
+    0.5 * (3.0 - apart * apart / (sigma * sigma + SKELETONS_DIFFER * SKELETONS_DIFFER))
 }
 
 /// Log odds that what shows so much, as a share less what contradicts it, is right.
@@ -67,7 +81,7 @@ mod tests {
 
     fn after(frames: &[(f64, f64)]) -> TwoState {
         let mut state = TwoState::default();
-        frames.iter().for_each(|(evidence, moved)| state.observe(*evidence, *moved));
+        frames.iter().for_each(|(evidence, moved)| state.observe(*evidence, 0.0, *moved));
         state
     }
 
@@ -85,6 +99,20 @@ mod tests {
         assert!(weak(0.05) && !weak(0.3));
         // And so it comes back.
         assert!(after(&[(-most_said(), 0.0), (most_said(), 0.0), (1.0, 0.0)]).holds());
+    }
+
+    #[test]
+    fn a_detector_speaks_for_what_it_sees_there_and_against_what_it_sees_elsewhere_as_it_is_sure() {
+        let (there, aside) = (said_by_detector(0.0, 0.03), said_by_detector(0.15, 0.03));
+        assert!(there == 1.5 && aside < -most_said(), "{aside}");
+        assert!(said_by_detector(0.15, 0.15) > 0.0, "a detector that knows little says little");
+        // One look turns what images have long been sure of, and they turn it back.
+        let mut state = after(&[(most_said(), 0.0); 5]);
+        assert!(state.holds() && !state.is_in_doubt());
+        state.observe(most_said(), said_by_detector(0.2, 0.03), 0.0);
+        assert!(!state.holds());
+        (0..3).for_each(|_| state.observe(most_said(), 0.0, 0.0));
+        assert!(state.holds() && TwoState::default().is_in_doubt());
     }
 
     #[test]
