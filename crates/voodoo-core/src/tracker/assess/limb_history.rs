@@ -1,6 +1,7 @@
 //! What is known about one limb, over a few frames: evidence flickers.
 
 use super::two_state::{EVEN, TwoState};
+use crate::math::Vec3;
 use crate::tracker::estimate::LimbStatus;
 
 /// Share of the patches facing a camera that it may see past.
@@ -23,6 +24,9 @@ pub(super) struct LimbHistory {
     /// something.
     shows: Option<[TwoState; 2]>,
     frames: usize,
+    /// How its far end moved in the last frame, and by how much otherwise than in the one before, metres.
+    motion: Vec3,
+    unexpected: f64,
 }
 
 impl LimbHistory {
@@ -36,11 +40,22 @@ impl LimbHistory {
         self.frames += 1;
     }
 
-    /// Takes what a frame's images say of the limb and of its far end, and what a detector says of that, log odds, after it moved by
-    /// so many metres.
-    pub(super) fn show(&mut self, evidence: [f64; 2], detected: f64, moved: f64) {
+    /// Takes how its far end moved since the frame before, metres.
+    pub(super) fn moved(&mut self, motion: Vec3) {
+        self.unexpected = motion.distance(self.motion);
+        self.motion = motion;
+    }
+
+    /// By how many metres its far end moved otherwise than from the last frame but one to the last.
+    pub(super) fn unexpected(&self) -> f64 {
+        self.unexpected
+    }
+
+    /// Takes what a frame's images say of the limb and of its far end, and what a detector says of it, log odds, after a motion that
+    /// was unexpected by so many metres.
+    pub(super) fn show(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
         let mut states = self.shows.unwrap_or_default();
-        states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, detected, moved));
+        states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, detected, unexpected));
         self.shows = Some(states);
     }
 

@@ -11,6 +11,7 @@
 //! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
 //! body is called tracked of which more than a quarter of the limbs is not measured.
 
+mod detected;
 mod edges;
 mod exclusive;
 mod limb_history;
@@ -30,9 +31,10 @@ use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
+use detected::said_by_detection;
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
-use two_state::{EVEN, all, either, said_by, said_by_detector};
+use two_state::{EVEN, all, either, said_by};
 
 /// Shares are of this many visible patches at least.
 const LEAST_VISIBLE: f64 = 8.0;
@@ -214,6 +216,10 @@ impl Assessor {
             // What other sensors than depth cameras see of a limb no depth image disproves.
             support.known &= self.exclusive.clouds[limb] < FEW;
             history.update(now.map(|value| value.min(1.0)));
+            let far_end =
+                |poses: &[Pose]| poses.get(limb).map(|pose| *pose * (body.limbs()[limb].shape.length() * Vec3::Z));
+            history
+                .moved(far_end(poses).zip(far_end(context.previous)).map_or(Vec3::ZERO, |(now, before)| now - before));
         }
         self.weigh_images(context, poses, detection);
     }
@@ -221,21 +227,7 @@ impl Assessor {
     /// What this frame's images, and a detector that looked at them, say about arms and legs.
     fn weigh_images(&mut self, context: Context, poses: &[Pose], detection: Option<&Detection>) {
         let Self { limbs, supports, .. } = self;
-        let (model, previous) = (context.model, context.previous);
-        let far_end =
-            |poses: &[Pose], limb: usize| poses[limb] * Vec3::new(0.0, 0.0, model.body.limbs()[limb].shape.length());
-        let known = previous.len() == poses.len();
-        let origin = context.seen.origin();
-        let detected = |limb: usize, next: Option<usize>| -> f64 {
-            // Both ends of the limb: where a detector sees all of it aside, it is wrong however sure one joint may be.
-            let joints = detection.into_iter().flat_map(|seen| {
-                [Some(limb), next]
-                    .into_iter()
-                    .flatten()
-                    .filter_map(|limb| joint_apart(&model.body, poses, limb, seen, origin))
-            });
-            joints.map(|[apart, sigma]| said_by_detector(apart, sigma)).sum()
-        };
+        let (model, origin) = (context.model, context.seen.origin());
         for chain in &model.extremities {
             let said = |limb: usize, part: usize| {
                 let support = &supports[limb];
@@ -245,34 +237,21 @@ impl Assessor {
             let [upper_end, lower_end] = [chain.upper, chain.lower].map(|limb| said(limb, 1));
             let of_upper = all(&[upper, either(upper_end, lower)]);
             let of_lower = [all(&[upper, lower]), all(&[upper, lower, lower_end])];
-            // What moves fast carries what hangs on it.
-            let moved = |limb: usize| far_end(poses, limb).distance(far_end(previous, limb));
-            let root = |poses: &[Pose]| chain.root(&model.body, poses);
-            let moved = if known {
-                moved(chain.upper).max(moved(chain.lower)).max(root(poses).distance(root(previous)))
-            } else {
-                0.0
-            };
-            let ends =
-                [(chain.upper, [of_upper; 2], Some(chain.lower)), (chain.lower, of_lower, chain.ends.first().copied())];
-            for (limb, evidence, next) in ends {
-                if supports[limb].known {
-                    limbs[limb].show(evidence, detected(limb, next), moved);
-                } else {
+            let unexpected = limbs[chain.upper].unexpected().max(limbs[chain.lower].unexpected());
+            let next = [Some(chain.lower), chain.ends.first().copied()];
+            for ((limb, evidence), next) in
+                [(chain.upper, [of_upper; 2]), (chain.lower, of_lower)].into_iter().zip(next)
+            {
+                if !supports[limb].known {
                     limbs[limb].hide();
+                    continue;
                 }
+                let detected =
+                    detection.map(|seen| said_by_detection(seen, &model.body, poses, origin, [Some(limb), next]));
+                limbs[limb].show(evidence, detected.unwrap_or_default(), unexpected);
             }
         }
     }
-}
-
-/// How far the joint by which a limb hangs on its parent lies from where a detector sees it, and the detector's standard deviation,
-/// metres; none of a joint that it does not tell.
-fn joint_apart(body: &Body, poses: &[Pose], limb: usize, detection: &Detection, origin: Vec3) -> Option<[f64; 2]> {
-    let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
-    let seen = detection.joint(&joint.name)?;
-    let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
-    Some([tracked.distance(seen.position), seen.sigma])
 }
 
 /// The limb that a site at a joint tells of besides its own: the one that its own hangs on.
