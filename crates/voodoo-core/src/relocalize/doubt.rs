@@ -59,10 +59,8 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    /// When a detector looked last, and when it did to look after a young track, seconds; whether it does so in this frame.
+    /// When a detector looked last, seconds.
     looked: Option<f64>,
-    looked_after: Option<f64>,
-    looks_after: bool,
     /// Whether the last look saw the person where somebody said it is.
     agreed: bool,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
@@ -88,25 +86,24 @@ impl Doubt {
         self.found_itself
     }
 
-    /// Whether a detector looks in this frame because the track was started less than a second ago: how the body stands is in doubt
-    /// at other times, too, and no reason to start anew.
-    pub(super) fn looks_after(&self) -> bool {
-        self.looks_after
+    /// Whether the track was started less than a second ago.
+    pub(super) fn young(&self, stamp: f64) -> bool {
+        self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
     /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be; `unsure`: it is in doubt if
     /// one is; `lost`: the body is.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, unsure: bool, lost: bool) -> bool {
-        let young = stamp - *self.since.get_or_insert(stamp) < YOUNG;
-        let waited = |looked: Option<f64>, every: f64| looked.is_none_or(|looked| stamp - looked >= every);
-        // A given start that was seen right is looked after half as often.
-        let after = if self.agreed && !lost { 2.0 * EVERY[0] } else { EVERY[0] };
-        self.looks_after = young && waited(self.looked_after, after);
-        let every = if unsure || lost { EVERY[0] } else { EVERY[1] };
-        let due = self.looks_after || (doubtful || unsure || lost) && waited(self.looked, every);
-        if self.looks_after {
-            self.looked_after = Some(stamp);
-        }
+        let young = self.young(stamp);
+        self.since = self.since.or(Some(stamp));
+        let [often, seldom] = EVERY;
+        let every = match (lost, young) {
+            // A given start that was seen right is looked after half as often.
+            (false, true) if self.agreed => 2.0 * often,
+            (false, false) if !unsure => seldom,
+            _ => often,
+        };
+        let due = (young || doubtful || unsure || lost) && self.looked.is_none_or(|looked| stamp - looked >= every);
         if due {
             self.looked = Some(stamp);
         }

@@ -113,9 +113,9 @@ impl Relocalizer {
         self.doubt.itself()
     }
 
-    /// Whether a detector looks in this frame because the track is young.
-    pub fn looks_after(&self) -> bool {
-        self.doubt.looks_after()
+    /// Whether the track was started less than a second ago.
+    pub fn young(&self, stamp: f64) -> bool {
+        self.doubt.young(stamp)
     }
 
     /// The pose of a body that fits best what a detector saw in this frame, world frame; the body is that of a start, or has the

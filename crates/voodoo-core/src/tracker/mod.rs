@@ -273,7 +273,7 @@ impl Tracker {
         }
         if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
-            let young = self.relocalizer.looks_after();
+            let young = self.relocalizer.young(frame.stamp);
             match self.relocalizer.weigh(&self.model.body, &world_from_limb, lost, young, among) {
                 Some(Seen::Elsewhere) if self.move_to_detection(frame) => {
                     // What was learnt of sizes and scene was learnt in the wrong place.
