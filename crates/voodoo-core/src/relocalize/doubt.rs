@@ -59,8 +59,10 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    /// When a detector looked last, seconds.
+    /// When a detector looked last, and when it did for more than a limb in doubt, seconds; whether it does so in this frame.
     looked: Option<f64>,
+    looked_after: Option<f64>,
+    weighs: bool,
     /// Whether the last look saw the person where somebody said it is.
     agreed: bool,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
@@ -91,19 +93,27 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
+    /// Whether what a detector sees in this frame is weighed against the pose. Of a young track only some looks are, since it may
+    /// start anew by them and forget how it moved; the others are for limbs in doubt.
+    pub(super) fn weighs(&self) -> bool {
+        self.weighs
+    }
+
     /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be; `unsure`: it is in doubt if
     /// one is; `lost`: the body is.
     pub(super) fn due(&mut self, stamp: f64, doubtful: bool, unsure: bool, lost: bool) -> bool {
         let young = self.young(stamp);
         self.since = self.since.or(Some(stamp));
-        let [often, seldom] = EVERY;
-        let every = match (lost, young) {
-            // A given start that was seen right is looked after half as often.
-            (false, true) if self.agreed => 2.0 * often,
-            (false, false) if !unsure => seldom,
-            _ => often,
-        };
-        let due = (young || doubtful || unsure || lost) && self.looked.is_none_or(|looked| stamp - looked >= every);
+        let waited = |looked: Option<f64>, every: f64| looked.is_none_or(|looked| stamp - looked >= every);
+        // A given start that was seen right is looked after half as often.
+        let after = if self.agreed && !lost { 2.0 * EVERY[0] } else { EVERY[0] };
+        let looks_after = young && waited(self.looked_after, after);
+        let every = if unsure || lost { EVERY[0] } else { EVERY[1] };
+        let due = looks_after || (doubtful || unsure || lost) && waited(self.looked, every);
+        self.weighs = looks_after || !young;
+        if looks_after {
+            self.looked_after = Some(stamp);
+        }
         if due {
             self.looked = Some(stamp);
         }

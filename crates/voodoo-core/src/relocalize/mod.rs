@@ -187,7 +187,7 @@ impl Relocalizer {
         young: bool,
         among: bool,
     ) -> Option<Seen> {
-        let detection = self.people.seen()?;
+        let detection = self.people.seen().filter(|_| lost || self.doubt.weighs())?;
         // A lost body is where a person is seen for sure.
         Some(match lost {
             true if self.belief.observe(Some(detection)) => Seen::Elsewhere,
