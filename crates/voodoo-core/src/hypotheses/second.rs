@@ -141,6 +141,34 @@ mod tests {
         });
     }
 
+    /// What becomes of two bodies that stand so before an image of the standing body: the first one's arm and the second one's, as
+    /// distances of their ends from where the arm is seen, and the ICP steps.
+    fn compared(first: &[Pose], other: &[Pose]) -> ([f64; 2], usize) {
+        let (model, seen) = standing();
+        let (pixels, config) = (before_wall(&model.body, &seen), without_background());
+        with_context(&pixels, &config, &model, first, |context| {
+            let (mut second, mut fit) = (Second::default(), Fit::new(&config).unwrap());
+            second.motion.restart(other.to_vec());
+            fit.match_last(context, first);
+            let (mut poses, mut predicted) = (first.to_vec(), first.to_vec());
+            let steps = second.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
+            let arm = &model.extremities[first_arm(&model)];
+            assert_eq!(poses == first, predicted == first, "what is taken is what is expected");
+            ([&poses, &second.motion.poses].map(|poses| arm.end(poses).distance(arm.end(&seen))), steps)
+        })
+    }
+
+    #[test]
+    fn the_arm_that_explains_clearly_more_is_that_of_both_bodies() {
+        let (model, right) = standing();
+        let (wrong, _) = raised(&model, &right, 0.2);
+        let (taken, steps) = compared(&wrong, &right);
+        assert!(taken[0] < 0.02 && taken[1] < 0.02 && steps == REFINE, "{taken:?} after {steps}");
+        let (kept, steps) = compared(&right, &wrong);
+        assert!(kept[0] < 1e-9 && kept[1] < 0.02 && steps == REFINE, "{kept:?} after {steps}");
+        assert_eq!(compared(&right, &moved(&right, 0.02 * Vec3::X)).1, 0, "they are in one place");
+    }
+
     #[test]
     fn a_limb_differs_by_how_far_apart_its_ends_are() {
         let (model, poses) = standing();

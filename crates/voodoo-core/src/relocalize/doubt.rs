@@ -8,8 +8,9 @@ use crate::math::{Pose, Vec3};
 
 /// A track is looked after for so long from its start on, seconds.
 pub(super) const YOUNG: f64 = 1.0;
-/// Frames from one look at a young or lost track to the next, and at one with a limb in doubt: a look costs as much as five frames.
-const EVERY: [usize; 2] = [3, 15];
+/// Seconds from one look at a young, lost or unsure track to the next, and at one with a limb elsewhere: a look costs as much as
+/// a frame or two.
+const EVERY: [f64; 2] = [0.09, 0.45];
 /// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips
 /// and ankles 10 cm from where a detector tells them.
 const ELSEWHERE: f64 = 0.15;
@@ -19,6 +20,18 @@ pub(super) const SIGMAS: f64 = 3.5;
 const NOBODY: f64 = 12.0;
 /// A body that has been lost for so long is gone, seconds; and who was hidden is waited for so long.
 pub(super) const GONE: f64 = 2.0;
+
+/// What a detection says of where the body is tracked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    /// It is there.
+    There,
+    /// It is not, and it is too early to try the detection's place.
+    NotThere,
+    /// It is elsewhere: the detection's place is to be tried.
+    Elsewhere,
+}
+
 /// Joints that tell where the trunk is and which way round.
 const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
 
@@ -46,8 +59,10 @@ pub(super) struct Doubt {
     found_itself: bool,
     /// When it was started, seconds.
     since: Option<f64>,
-    /// Frames since the last look.
-    waited: Option<usize>,
+    /// When a detector looked last, and when it did for more than a limb in doubt, seconds; whether it does so in this frame.
+    looked: Option<f64>,
+    looked_after: Option<f64>,
+    weighs: bool,
     /// Whether the last look saw the person where somebody said it is.
     agreed: bool,
     /// Log odds that the person is elsewhere, and that what is tracked is none.
@@ -78,23 +93,35 @@ impl Doubt {
         self.since.is_none_or(|since| stamp - since < YOUNG)
     }
 
-    /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be, or the body is `lost`.
-    pub(super) fn due(&mut self, stamp: f64, doubtful: bool, lost: bool) -> bool {
-        let young = self.young(stamp) || lost;
+    /// Whether what a detector sees in this frame is weighed against the pose. Of a young track only some looks are, since it may
+    /// start anew by them and forget how it moved; the others are for limbs in doubt.
+    pub(super) fn weighs(&self) -> bool {
+        self.weighs
+    }
+
+    /// Counts a frame; whether a detector shall look at it. `doubtful`: a limb is not where it should be; `unsure`: it is in doubt if
+    /// one is; `lost`: the body is.
+    pub(super) fn due(&mut self, stamp: f64, doubtful: bool, unsure: bool, lost: bool) -> bool {
+        let young = self.young(stamp);
         self.since = self.since.or(Some(stamp));
-        self.waited = self.waited.map(|frames| frames + 1);
+        let waited = |looked: Option<f64>, every: f64| looked.is_none_or(|looked| stamp - looked >= every);
         // A given start that was seen right is looked after half as often.
-        let often = if self.agreed && !lost { 2 * EVERY[0] } else { EVERY[0] };
-        let every = if young { often } else { EVERY[1] };
-        let due = (young || doubtful) && self.waited.is_none_or(|frames| frames >= every);
+        let after = if self.agreed && !lost { 2.0 * EVERY[0] } else { EVERY[0] };
+        let looks_after = young && waited(self.looked_after, after);
+        let every = if unsure || lost { EVERY[0] } else { EVERY[1] };
+        let due = looks_after || (doubtful || unsure || lost) && waited(self.looked, every);
+        self.weighs = looks_after || !young;
+        if looks_after {
+            self.looked_after = Some(stamp);
+        }
         if due {
-            self.waited = Some(0);
+            self.looked = Some(stamp);
         }
         due
     }
 
     /// Weighs a detection against the pose, world frame: by the trunk, and by legs and arms of a `young` track or one
-    /// `among` several; whether the detection's is to be tried.
+    /// `among` several; what it says.
     pub(super) fn weigh(
         &mut self,
         detection: &Detection,
@@ -102,7 +129,7 @@ impl Doubt {
         world_from_limb: &[Pose],
         young: bool,
         among: bool,
-    ) -> bool {
+    ) -> Seen {
         let sigmas = if among { 0.0 } else { SIGMAS };
         let elsewhere = |names: &[&str], least: f64| {
             let [apart, spread] = apart(detection, body, world_from_limb, names);
@@ -113,16 +140,11 @@ impl Doubt {
         if elsewhere(&TRUNK, ELSEWHERE) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
             self.agreed = false;
-        } else {
-            self.elsewhere = 0.0;
-            self.agreed = !self.found_itself && !among;
+            return if self.elsewhere >= ENOUGH_ODDS { Seen::Elsewhere } else { Seen::NotThere };
         }
-        self.elsewhere >= ENOUGH_ODDS
-    }
-
-    /// Whether the detection that was weighed last was where the body is tracked.
-    pub(super) fn agrees(&self) -> bool {
-        self.elsewhere == 0.0
+        self.elsewhere = 0.0;
+        self.agreed = !self.found_itself && !among;
+        Seen::There
     }
 
     /// Notes what a frame said: whether the body was lost, and what a detector says of what stands where it is tracked. Whether
@@ -150,13 +172,14 @@ mod tests {
 
     #[test]
     fn young_and_lost_tracks_are_looked_at_often_and_good_ones_never() {
-        let count = |from: f64, doubtful, lost| {
+        let count = |from: f64, [doubtful, unsure, lost]: [bool; 3]| {
             let mut doubt = Doubt::default();
-            doubt.due(0.0, false, false);
-            (1..=30).filter(|frame| doubt.due(from + f64::from(*frame) / 60.0, doubtful, lost)).count()
+            doubt.due(0.0, false, false, false);
+            (1..=27).filter(|frame| doubt.due(from + f64::from(*frame) / 30.0, doubtful, unsure, lost)).count()
         };
-        assert_eq!([count(0.0, false, false), count(2.0, false, true), count(2.0, true, false)], [10, 10, 2]);
-        assert_eq!(count(2.0, false, false), 0);
+        let none = [false; 3];
+        assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [9; 3]);
+        assert_eq!([count(2.0, [true, false, false]), count(2.0, none)], [2, 0]);
     }
 
     #[test]
@@ -167,7 +190,8 @@ mod tests {
             let mut doubt = Doubt::default();
             doubt.found_itself(itself);
             let agree = |doubt: &mut Doubt| doubt.weigh(&Detection::default(), &body, &poses, true, false);
-            (0..30).filter(|frame| doubt.due(f64::from(*frame) / 30.0, false, false) && !agree(&mut doubt)).count()
+            let due = |doubt: &mut Doubt, frame: i32| doubt.due(f64::from(frame) / 30.0, false, false, false);
+            (0..30).filter(|frame| due(&mut doubt, *frame) && agree(&mut doubt) == Seen::There).count()
         };
         assert_eq!([false, true].map(looks), [5, 10]);
     }
@@ -188,7 +212,7 @@ mod tests {
         let tried = |root, sigma| {
             let mut seen = seen_at(root);
             seen.joints.iter_mut().for_each(|joint| joint.sigma = sigma);
-            [false, true].map(|among| Doubt::default().weigh(&seen, &body, &tracked, false, among))
+            [false, true].map(|among| Doubt::default().weigh(&seen, &body, &tracked, false, among) == Seen::Elsewhere)
         };
         assert_eq!([about, aside, near].map(|root| tried(root, 0.05)), [[true; 2], [true; 2], [false; 2]]);
         assert_eq!(tried(aside, 0.2), [false, true], "unsure of it");

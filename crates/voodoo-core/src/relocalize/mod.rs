@@ -24,6 +24,7 @@ use crate::observation::observer::Own;
 use crate::observation::share::Share;
 use belief::Belief;
 pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
+pub use doubt::Seen;
 use doubt::{Doubt, SIGMAS};
 use people::People;
 pub(crate) use people::sized;
@@ -117,11 +118,11 @@ impl Relocalizer {
     }
 
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
-    /// was not where it should be in the frame before, or the body `lost`.
-    pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, lost: bool) {
+    /// was not where it should be in the frame before, or it is `unsure` whether one was, or the body `lost`.
+    pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, unsure: bool, lost: bool) {
         // A body that was found a moment ago may face the other way.
         let often = lost || self.watch.open();
-        if self.doubt.due(frame.stamp, doubtful, often) && self.known {
+        if self.doubt.due(frame.stamp, doubtful, unsure, often) && self.known {
             self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
             // What stands before a hidden body is somebody else.
             self.people.leave_out(|place| self.watch.hidden.by(frame, place));
@@ -132,7 +133,7 @@ impl Relocalizer {
 
     /// The same for one of several persons: good tracks are looked at, too, and who is lost is not looked for here.
     pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
-        if self.doubt.due(frame.stamp, true, false) && !lost && self.known {
+        if self.doubt.due(frame.stamp, true, false, false) && !lost && self.known {
             self.people.look(frame, Some(share), Wanted::Near(root));
             self.people.leave_out(|place| place.distance(root) > SAME_PERSON);
         } else {
@@ -160,21 +161,23 @@ impl Relocalizer {
         self.watch.hidden.observe(views, joints, tracked, !lost);
     }
 
-    /// Whether detections have said for long enough that the body is elsewhere than at these poses, world frame; of a `young` track
-    /// and of one `among` several persons also that its arms and legs are.
-    pub fn elsewhere(&mut self, body: &Body, world_from_limb: &[Pose], lost: bool, young: bool, among: bool) -> bool {
-        let Some(detection) = self.people.seen() else { return false };
+    /// What a detector that looked at this frame says of a body at these poses, world frame; of a `young` track and of one `among`
+    /// several persons also of its arms and legs.
+    pub fn weigh(
+        &mut self,
+        body: &Body,
+        world_from_limb: &[Pose],
+        lost: bool,
+        young: bool,
+        among: bool,
+    ) -> Option<Seen> {
+        let detection = self.people.seen().filter(|_| lost || self.doubt.weighs())?;
         // A lost body is where a person is seen for sure.
-        if lost {
-            self.belief.observe(Some(detection))
-        } else {
-            self.doubt.weigh(detection, body, world_from_limb, young, among)
-        }
-    }
-
-    /// Whether what a detector saw last is where the body is tracked.
-    pub fn agrees(&self) -> bool {
-        self.doubt.agrees()
+        Some(match lost {
+            true if self.belief.observe(Some(detection)) => Seen::Elsewhere,
+            true => Seen::NotThere,
+            false => self.doubt.weigh(detection, body, world_from_limb, young, among),
+        })
     }
 
     /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.

@@ -17,7 +17,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
 use crate::observation::share::Share;
-use crate::relocalize::{Relocalizer, Sighting};
+use crate::relocalize::{Relocalizer, Seen, Sighting};
 use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::Found;
 use assess::Assessor;
@@ -112,8 +112,8 @@ impl Tracker {
         if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
             return;
         }
-        relocalizer.look(frame, motion.poses[0].translation, false, false);
-        if relocalizer.elsewhere(&model.body, &motion.poses, false, false, false) {
+        relocalizer.look(frame, motion.poses[0].translation, false, false, false);
+        if relocalizer.weigh(&model.body, &motion.poses, false, false, false) == Some(Seen::Elsewhere) {
             observer.face(frame);
             let seen = observer.seen(frame, motion.origin);
             let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
@@ -136,9 +136,16 @@ impl Tracker {
         self.relocalizer.take_note_of_start(itself);
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
+            self.hear_sizes();
         }
         true
+    }
+
+    /// Takes in what the detector that looked at this frame says of the sizes.
+    fn hear_sizes(&mut self) {
+        if let Some(seen) = self.relocalizer.detection() {
+            self.sizes.hear(seen);
+        }
     }
 
     /// Looks for a person, and follows the one that is found.
@@ -148,7 +155,7 @@ impl Tracker {
             self.assessor.doubt_pose();
             self.relocalizer.take_note_of_start(true);
             self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
+            self.hear_sizes();
             self.follow(frame, None);
             if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
                 return;
@@ -210,7 +217,7 @@ impl Tracker {
             let lost = assessor.status() == Status::Lost;
             let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts() || sizes.unsure());
             match share {
-                None => relocalizer.look(frame, root, doubtful, lost),
+                None => relocalizer.look(frame, root, doubtful, assessor.is_unsure(), lost),
                 Some(share) => relocalizer.look_at_share(frame, share, root, lost),
             }
         }
@@ -223,7 +230,7 @@ impl Tracker {
         let reliance = Reliance { lost, girths: schedule.whole_body, limb: |limb| assessor.relied_on(limb) };
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // What all that is worth.
-        assessor.assess(setting.of(model), fit.matched(poses));
+        assessor.assess(setting.of(model), fit.matched(poses), relocalizer.detection());
         fit.learn_regions(setting.of(model));
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
@@ -267,14 +274,13 @@ impl Tracker {
         if known && self.relocalizer.detection().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             let young = self.relocalizer.young(frame.stamp);
-            if self.relocalizer.elsewhere(&self.model.body, &world_from_limb, lost, young, among)
-                && self.move_to_detection(frame)
-            {
-                // What was learnt of sizes and scene was learnt in the wrong place.
-                return !among && young && self.restart_at_detection();
-            }
-            if !among && !lost && self.relocalizer.agrees() {
-                self.relocalizer.detection().into_iter().for_each(|seen| self.sizes.hear(seen));
+            match self.relocalizer.weigh(&self.model.body, &world_from_limb, lost, young, among) {
+                Some(Seen::Elsewhere) if self.move_to_detection(frame) => {
+                    // What was learnt of sizes and scene was learnt in the wrong place.
+                    return !among && young && self.restart_at_detection();
+                }
+                Some(Seen::There) if !among => self.hear_sizes(),
+                _ => {}
             }
         }
         if !among {
@@ -334,7 +340,7 @@ impl Tracker {
         let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale: 1.0 };
         fit.match_all(setting.of(model), poses, config.max_steps);
         assessor.moved();
-        assessor.assess(setting.of(model), fit.matched(poses));
+        assessor.assess(setting.of(model), fit.matched(poses), None);
     }
 
     /// What this frame said of the body.

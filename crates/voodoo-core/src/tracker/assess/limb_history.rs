@@ -1,6 +1,7 @@
 //! What is known about one limb, over a few frames: evidence flickers.
 
 use super::two_state::{EVEN, TwoState};
+use crate::math::Vec3;
 use crate::tracker::estimate::LimbStatus;
 
 /// Share of the patches facing a camera that it may see past.
@@ -23,6 +24,9 @@ pub(super) struct LimbHistory {
     /// something.
     shows: Option<[TwoState; 2]>,
     frames: usize,
+    /// How its far end moved in the last frame, and by how much otherwise than in the one before, metres.
+    motion: Vec3,
+    unexpected: f64,
 }
 
 impl LimbHistory {
@@ -36,10 +40,22 @@ impl LimbHistory {
         self.frames += 1;
     }
 
-    /// Takes what a frame's images say of the limb and of its far end, log odds, after it moved by so many metres.
-    pub(super) fn show(&mut self, evidence: [f64; 2], moved: f64) {
+    /// Takes how its far end moved since the frame before, metres.
+    pub(super) fn moved(&mut self, motion: Vec3) {
+        self.unexpected = motion.distance(self.motion);
+        self.motion = motion;
+    }
+
+    /// By how many metres its far end moved otherwise than from the last frame but one to the last.
+    pub(super) fn unexpected(&self) -> f64 {
+        self.unexpected
+    }
+
+    /// Takes what a frame's images say of the limb and of its far end, and what a detector says of it, log odds, after a motion that
+    /// was unexpected by so many metres.
+    pub(super) fn show(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
         let mut states = self.shows.unwrap_or_default();
-        states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, moved));
+        states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, detected, unexpected));
         self.shows = Some(states);
     }
 
@@ -70,6 +86,11 @@ impl LimbHistory {
         }
     }
 
+    /// Whether the limb is right or wrong may as well be the other way round.
+    pub(super) fn is_in_doubt(&self) -> bool {
+        self.shows.is_some_and(|[whole, _]| whole.is_in_doubt())
+    }
+
     /// The far end of the limb shows: what hangs on it is where it is.
     pub(super) fn end_shows(&self) -> bool {
         self.shows.is_none_or(|[_, end]| end.holds())
@@ -85,7 +106,7 @@ mod tests {
         for now in frames {
             limb.update(*now);
             match evidence {
-                Some(evidence) => limb.show(evidence, 0.0),
+                Some(evidence) => limb.show(evidence, 0.0, 0.0),
                 None => limb.hide(),
             }
         }

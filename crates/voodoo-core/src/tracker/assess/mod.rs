@@ -11,6 +11,7 @@
 //! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
 //! body is called tracked of which more than a quarter of the limbs is not measured.
 
+mod detected;
 mod edges;
 mod exclusive;
 mod limb_history;
@@ -21,6 +22,7 @@ use super::estimate::{Estimate, LimbStatus, Status};
 use crate::association::correspondence::SitePair;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
+use crate::detect::Detection;
 use crate::fit::{Context, Matched};
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
@@ -30,6 +32,7 @@ use crate::visibility::evidence::{EXPLAINED, limb_visibility};
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
+use detected::said_by_detection;
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
 use two_state::{EVEN, all, either, said_by};
@@ -101,18 +104,24 @@ impl Assessor {
         self.status
     }
 
+    /// Whether it is in doubt if one of the arms and legs is right.
+    pub(super) fn is_unsure(&self) -> bool {
+        self.limbs.iter().any(LimbHistory::is_in_doubt)
+    }
+
     /// Whether the tracker relies on a limb.
     pub(super) fn relied_on(&self, limb: usize) -> bool {
         self.internal.get(limb) == Some(&LimbStatus::Measured)
     }
 
-    /// The status that the tracker goes by, of the body and its limbs.
-    pub(super) fn assess(&mut self, context: Context, matched: Matched) {
+    /// The status that the tracker goes by, of the body and its limbs; `detection` is what a detector says of this frame, if it looked
+    /// and the pose is not taken from it.
+    pub(super) fn assess(&mut self, context: Context, matched: Matched, detection: Option<&Detection>) {
         if context.seen.candidates.is_empty() && matched.correspondences.sites.is_empty() {
             // Nothing was measured: what was known before does not speak for this frame.
             self.limbs.clear();
         }
-        self.update_limbs(context, matched);
+        self.update_limbs(context, matched, detection);
         let extremities = &context.model.extremities;
         let Self { limbs, internal, .. } = self;
         internal.clear();
@@ -170,7 +179,7 @@ impl Assessor {
     }
 
     /// What this frame says about every limb.
-    fn update_limbs(&mut self, context: Context, matched: Matched) {
+    fn update_limbs(&mut self, context: Context, matched: Matched, detection: Option<&Detection>) {
         let (body, views, poses) = (&context.model.body, context.seen.views, matched.poses);
         self.limbs.resize(poses.len(), LimbHistory::default());
         self.exclusive.count(body, poses, context.seen.candidates);
@@ -202,16 +211,18 @@ impl Assessor {
             // What other sensors than depth cameras see of a limb no depth image disproves.
             support.known &= self.exclusive.clouds[limb] < FEW;
             history.update(now.map(|value| value.min(1.0)));
+            let far_end =
+                |poses: &[Pose]| poses.get(limb).map(|pose| *pose * (body.limbs()[limb].shape.length() * Vec3::Z));
+            history
+                .moved(far_end(poses).zip(far_end(context.previous)).map_or(Vec3::ZERO, |(now, before)| now - before));
         }
-        self.weigh_images(context, poses);
+        self.weigh_images(context, poses, detection);
     }
 
-    /// What this frame's images say about arms and legs.
-    fn weigh_images(&mut self, context: Context, poses: &[Pose]) {
+    /// What this frame's images, and a detector that looked at them, say about arms and legs.
+    fn weigh_images(&mut self, context: Context, poses: &[Pose], detection: Option<&Detection>) {
         let Self { limbs, supports, .. } = self;
-        let (model, previous) = (context.model, context.previous);
-        let far_end =
-            |poses: &[Pose], limb: usize| poses[limb] * Vec3::new(0.0, 0.0, model.body.limbs()[limb].shape.length());
+        let (model, origin) = (context.model, context.seen.origin());
         for chain in &model.extremities {
             let said = |limb: usize, part: usize| {
                 let support = &supports[limb];
@@ -221,14 +232,18 @@ impl Assessor {
             let [upper_end, lower_end] = [chain.upper, chain.lower].map(|limb| said(limb, 1));
             let of_upper = all(&[upper, either(upper_end, lower)]);
             let of_lower = [all(&[upper, lower]), all(&[upper, lower, lower_end])];
-            for (limb, evidence) in [(chain.upper, [of_upper; 2]), (chain.lower, of_lower)] {
+            let unexpected = limbs[chain.upper].unexpected().max(limbs[chain.lower].unexpected());
+            let next = [Some(chain.lower), chain.ends.first().copied()];
+            for ((limb, evidence), next) in
+                [(chain.upper, [of_upper; 2]), (chain.lower, of_lower)].into_iter().zip(next)
+            {
                 if !supports[limb].known {
                     limbs[limb].hide();
                     continue;
                 }
-                let known = previous.len() == poses.len();
-                let moved = if known { far_end(poses, limb).distance(far_end(previous, limb)) } else { 0.0 };
-                limbs[limb].show(evidence, moved);
+                let detected =
+                    detection.map(|seen| said_by_detection(seen, &model.body, poses, origin, [Some(limb), next]));
+                limbs[limb].show(evidence, detected.unwrap_or_default(), unexpected);
             }
         }
     }
@@ -281,7 +296,7 @@ mod tests {
         with_context(pixels, &config, &model, poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, poses);
-            (0..frames).for_each(|_| assessor.assess(context, fit.matched(poses)));
+            (0..frames).for_each(|_| assessor.assess(context, fit.matched(poses), None));
         });
     }
 
@@ -351,7 +366,7 @@ mod tests {
             let mut seen = context.seen.with(&candidates);
             (seen.views.frame, seen.views.segmented) = (&frame, &[]);
             let matched = Matched { correspondences: &Correspondences::default(), poses: &poses };
-            assessor.assess(Context { seen, ..context }, matched);
+            assessor.assess(Context { seen, ..context }, matched, None);
         });
         assert_eq!(reported(&assessor).status, Status::Lost);
     }

@@ -6,13 +6,13 @@
 
 /// What speaks for a limb less what speaks against it, as a share, is weighed by this: here the odds are even, and every time as
 /// much again makes them e times greater.
-pub(super) const EVEN: f64 = 0.075;
+pub(super) const EVEN: f64 = 0.08;
 /// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
 /// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
 const CHANGES: f64 = 0.05;
-/// A limb whose far end moved by so much between two frames, metres, is wrong before it is seen there, and with the square of
-/// a shorter way the likelier: what was predicted is off by a share of it.
-const FAR: f64 = 0.33;
+/// An arm or leg of which an end is so far, metres, from where its last motion would have brought it is wrong before it is seen
+/// there, and with the square of a shorter way the likelier: what was predicted is off by a share of it.
+const FAR: f64 = 0.15;
 
 /// Log odds that something is right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,17 +21,23 @@ pub(super) struct TwoState {
 }
 
 impl TwoState {
-    /// Takes a frame's `evidence`, log odds, after a motion of so many metres.
-    pub(super) fn observe(&mut self, evidence: f64, moved: f64) {
+    /// Takes what a frame's images and a detector say, log odds, after a motion that was unexpected by so many metres.
+    pub(super) fn observe(&mut self, images: f64, detector: f64, unexpected: f64) {
         let before = probability(self.log_odds);
-        let goes_wrong = (CHANGES + (moved / FAR).powi(2)).min(1.0);
+        let goes_wrong = (CHANGES + (unexpected / FAR).powi(2)).min(1.0);
         let now = before * (1.0 - goes_wrong) + (1.0 - before) * CHANGES;
-        self.log_odds = (now / (1.0 - now)).ln() + evidence.clamp(-most_said(), most_said());
+        let said = [images, detector].map(|said| said.clamp(-most_said(), most_said()));
+        self.log_odds = (now / (1.0 - now)).ln() + said[0] + said[1];
     }
 
     /// It is likelier right than wrong.
     pub(super) fn holds(&self) -> bool {
         self.log_odds >= 0.0
+    }
+
+    /// It may as well be the other way round: a frame that shows nothing would say more.
+    pub(super) fn is_in_doubt(&self) -> bool {
+        self.log_odds.abs() < -said_by(0.0)
     }
 }
 
@@ -67,7 +73,7 @@ mod tests {
 
     fn after(frames: &[(f64, f64)]) -> TwoState {
         let mut state = TwoState::default();
-        frames.iter().for_each(|(evidence, moved)| state.observe(*evidence, *moved));
+        frames.iter().for_each(|(evidence, moved)| state.observe(*evidence, 0.0, *moved));
         state
     }
 
@@ -82,9 +88,20 @@ mod tests {
     #[test]
     fn what_moved_far_needs_evidence_anew() {
         let weak = |moved| after(&[(most_said(), 0.0), (-1.0, moved)]).holds();
-        assert!(weak(0.05) && !weak(0.3));
+        assert!(weak(0.02) && !weak(0.15));
         // And so it comes back.
         assert!(after(&[(-most_said(), 0.0), (most_said(), 0.0), (1.0, 0.0)]).holds());
+    }
+
+    #[test]
+    fn one_look_of_a_detector_turns_no_limb_that_images_have_long_been_sure_of_and_two_turn_what_they_leave_open() {
+        let look = -20.0;
+        let mut state = after(&[(most_said(), 0.0); 5]);
+        state.observe(most_said(), look, 0.0);
+        assert!(state.holds() && !state.is_in_doubt());
+        state.observe(0.0, look, 0.0);
+        state.observe(0.0, look, 0.0);
+        assert!(!state.holds() && TwoState::default().is_in_doubt());
     }
 
     #[test]

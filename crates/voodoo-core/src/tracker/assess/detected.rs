@@ -1,0 +1,57 @@
+//! What a detector that looked at a frame says of a limb.
+
+use crate::body::Body;
+use crate::detect::Detection;
+use crate::math::{Pose, Vec3};
+use crate::visibility::evidence::EXPLAINED;
+
+/// Log odds that a limb is right, by where a detector sees its near end and that of the `next` one: where it sees all of a limb
+/// aside, the limb is wrong however sure one joint may be. Poses are in a frame with this `origin` in the world.
+pub(super) fn said_by_detection(
+    detection: &Detection,
+    body: &Body,
+    poses: &[Pose],
+    origin: Vec3,
+    limbs: [Option<usize>; 2],
+) -> f64 {
+    let apart = |limb: usize| {
+        let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
+        let seen = detection.joint(&joint.name)?;
+        let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
+        Some(said_by_joint(tracked.distance(seen.position), seen.sigma))
+    };
+    limbs.into_iter().flatten().filter_map(apart).sum()
+}
+
+/// The same of a joint that a detector, with this standard deviation, sees so many metres away: of a right one the mean square is
+/// that of three axes. What is tracked is as near to the truth as points to the limb that explains them.
+fn said_by_joint(apart: f64, sigma: f64) -> f64 {
+    0.5 * (3.0 - apart * apart / (sigma * sigma + EXPLAINED * EXPLAINED))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::{DetectedJoint, JOINTS};
+    use crate::testing::standing;
+
+    /// What a detector with this standard deviation says of the first arm's limbs that sees everything so far aside.
+    fn said(aside: Vec3, sigma: f64) -> [f64; 2] {
+        let (model, poses) = standing();
+        let body = &model.body;
+        let place = |name: &&str| body.site_index(name).map_or(Vec3::ZERO, |site| body.site_position(&poses, site));
+        let joint = |name| DetectedJoint { position: place(name) + aside + Vec3::X, sigma, visible: 1.0 };
+        let seen = Detection { joints: JOINTS.iter().map(joint).collect(), ..Detection::default() };
+        let arm = &model.extremities[0];
+        [(arm.upper, Some(arm.lower)), (arm.lower, arm.ends.first().copied())]
+            .map(|(limb, next)| said_by_detection(&seen, body, &poses, Vec3::X, [Some(limb), next]))
+    }
+
+    #[test]
+    fn a_detector_speaks_for_what_it_sees_there_and_against_what_it_sees_elsewhere_as_it_is_sure() {
+        for (there, aside) in said(Vec3::ZERO, 0.03).into_iter().zip(said(0.2 * Vec3::X, 0.03)) {
+            assert!((there - 3.0).abs() < 1e-9 && aside < -10.0, "{there} {aside}");
+        }
+        assert!(said(0.2 * Vec3::X, 0.2).iter().all(|said| *said > 0.0), "a detector that knows little says little");
+    }
+}
