@@ -5,7 +5,7 @@ mod edges;
 mod motion;
 
 pub use context::{Context, Matched, Setting};
-pub use motion::{Motion, UNKNOWN_MOTION};
+pub use motion::{Motion, REFERENCE_RATE, UNKNOWN_MOTION};
 
 use rayon::ThreadPool;
 use rayon::prelude::*;

@@ -11,7 +11,7 @@ const LONGEST_PREDICTION: f64 = 2.0;
 /// is unexpected.
 pub const UNKNOWN_MOTION: f64 = 4.0;
 /// Motion priors are standard deviations for one frame of this rate, 1/s.
-const REFERENCE_RATE: f64 = 30.0;
+pub const REFERENCE_RATE: f64 = 30.0;
 /// Shortest and longest interval that they are scaled to, in frames of that rate.
 const TIME_SCALES: [f64; 2] = [0.1, 10.0];
 

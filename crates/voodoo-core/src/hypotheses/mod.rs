@@ -28,6 +28,7 @@ use crate::math::{Pose, shifted};
 use crate::visibility::LITTLE;
 use exchange::Exchange;
 use history::History;
+use persistence::Times;
 use proposals::{
     CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
     UnexplainedCluster,
@@ -53,6 +54,8 @@ pub struct Hypotheses {
     pool: Pool,
     refined: Refined,
     second: Second,
+    /// Time of the last frame, seconds; none after a restart.
+    stamp: Option<f64>,
 }
 
 impl Hypotheses {
@@ -64,6 +67,7 @@ impl Hypotheses {
             last_proposal: Vec::with_capacity(limbs),
             ..History::default()
         });
+        self.stamp = None;
         // Room at once, not when the first hard frame comes.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
@@ -97,6 +101,8 @@ impl Hypotheses {
         detected: &[Pose],
     ) -> usize {
         self.make_room(context, fit);
+        let now = context.seen.frame().stamp;
+        let times = Times { before: self.stamp.replace(now).unwrap_or(f64::NEG_INFINITY), now };
         self.unexplained.collect(context, fit.matched(poses));
         let mut steps = 0;
         let pictures = context.pictures_alone();
@@ -106,7 +112,7 @@ impl Hypotheses {
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
-            if !self.doubts(at, detection.is_some()) {
+            if !self.doubts(at, detection.is_some(), times) {
                 continue;
             }
             self.propose(at, detection, detected);
@@ -167,7 +173,7 @@ impl Hypotheses {
 
     /// Whether the frame, and those before it, speak against an arm or leg for long enough to try others; where a detector
     /// `looked`, there are new ones.
-    fn doubts(&mut self, at: Extremity, looked: bool) -> bool {
+    fn doubts(&mut self, at: Extremity, looked: bool, times: Times) -> bool {
         let chain = at.chain();
         if at.regions.is_some() {
             let supports = &at.matched.correspondences.region_support;
@@ -175,7 +181,7 @@ impl Hypotheses {
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
             let suspect = gained < LITTLE * area;
-            return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE), false);
+            return self.history[at.index].persistence.observe(suspect.then_some(PATIENCE), false, times);
         }
         let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), chain.stretched_length(), near);
@@ -185,7 +191,7 @@ impl Hypotheses {
         let suspect = unexplained >= GAIN && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
         // Of a leg that was refused for long a detector may tell something new.
-        self.history[at.index].persistence.observe(patience, looked && chain.leg)
+        self.history[at.index].persistence.observe(patience, looked && chain.leg, times)
     }
 
     /// Fills the pool with other configurations of one arm or leg.
@@ -355,10 +361,11 @@ mod tests {
             |hypotheses: &Hypotheses| hypotheses.history.iter().filter(|own| own.last_good_end.is_some()).count();
         assert_eq!(legs, 2);
         // One arm is not measured, and something spoke against one that is.
-        hypotheses.history[arm + 1].persistence.observe(Some(PATIENCE), false);
+        let times = Times { before: 0.0, now: 0.1 };
+        hypotheses.history[arm + 1].persistence.observe(Some(PATIENCE), false, times);
         hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
         assert_eq!(known(&hypotheses), 2, "the legs");
-        hypotheses.history[arm + 1].persistence.observe(None, false);
+        hypotheses.history[arm + 1].persistence.observe(None, false, times);
         hypotheses.remember(&model, &motion, false, |_| true);
         for (own, chain) in hypotheses.history.iter().zip(&model.extremities) {
             assert_eq!(own.last_good_end, Some(chain.end(&motion.poses) + origin));

@@ -28,6 +28,7 @@ mod tests {
     use super::*;
     use crate::fit::{Context, Fit};
     use crate::hypotheses::history::Basis;
+    use crate::hypotheses::persistence::Times;
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, moved, raised, standing, with_context, without_background};
 
@@ -46,11 +47,11 @@ mod tests {
             let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
             history[index].last_proposal = wanted.clone();
             history[index].last_basis = Basis::Lean;
-            history[index].persistence.observe(Some(1), false);
+            history[index].persistence.observe(Some(1), false, Times { before: 0.0, now: 0.1 });
             LastProposal.propose(at, &history, &mut rough, &mut pool);
             assert_eq!(pool.found().count(), 0, "nobody asked for it");
             history[index].persistence.vote();
-            history[index].persistence.observe(Some(1), false);
+            history[index].persistence.observe(Some(1), false, Times { before: 0.0, now: 0.1 });
             LastProposal.propose(at, &history, &mut rough, &mut pool);
             let found: Vec<_> = pool.found().collect();
             assert_eq!((found.len(), found[0].basis), (1, Basis::Lean));
