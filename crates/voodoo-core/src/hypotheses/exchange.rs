@@ -2,6 +2,7 @@
 //!
 //! By then sizes have followed the wrong ones: exchanged legs that explain as much are followed beside the body for some frames.
 
+use super::persistence::{REST, WEARY};
 use super::refined::{REFINE, Refined};
 use super::score::{Cost, SURE_GAIN};
 use crate::body::Body;
@@ -15,10 +16,6 @@ const WORTH_A_LOOK: f64 = 0.88;
 const WORTH_FOLLOWING: f64 = 0.96;
 /// A pelvis that turns by more than this, radians, is another body's: the legs alone were exchanged.
 const MOST_TURNED: f64 = 0.5;
-
-/// Exchanged legs are looked at in every so manyth frame, and followed for so many.
-const REST: usize = 4;
-const WEARY: usize = 8;
 
 /// When one looks, and where the legs would be.
 #[derive(Debug, Default)]

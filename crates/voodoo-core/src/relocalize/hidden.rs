@@ -1,19 +1,24 @@
 //! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
 
-use super::doubt::{GONE, YOUNG};
+use super::doubt::GONE;
 use crate::math::Vec3;
 use crate::observation::depth_view::{DepthViews, Pixel};
 use crate::observation::frame::Frame;
-use crate::visibility::LITTLE;
 
-/// What is measured so much nearer than a joint hides it, metres, more than half of a body is thick, and who is so much nearer to a
-/// camera stands before it.
+/// What is measured so much nearer than a joint hides it, metres: more than half of a body is thick.
 const COVERS: f64 = 0.3;
+/// A body is hidden when this share of its joints is: its own arms hide less of it, and who stands before it may be slimmer.
+const HIDDEN_SHARE: f64 = 0.33;
+/// What stands before a hidden body is at least so much nearer to a camera, metres.
+const IN_FRONT: f64 = 0.4;
+/// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
+const SEEN_FRAMES: usize = 10;
+
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
 pub(super) struct Hidden {
-    /// Since when it is seen where it is thought to be, seconds: a start that was given wrongly may lie behind the body.
-    since: Option<f64>,
+    /// Frames in which it was seen where it was thought to be.
+    seen: usize,
     /// When it was hidden the last time, seconds, and where it stood before or was tracked since, world frame.
     last: Option<(f64, Vec3)>,
     /// Where it is thought to be now: hidden, it may go on.
@@ -36,14 +41,12 @@ impl Hidden {
         let stamp = views.frame.stamp;
         let Some(root) = root else { return };
         self.now = root;
-        // Its own arms hide less of it, and who stands before it may be slimmer.
-        if f64::from(hidden) >= LITTLE * f64::from(all) {
+        if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
-            let known = self.since.is_some_and(|since| stamp - since >= YOUNG);
-            self.last = known.then_some((stamp, place));
+            self.last = (self.seen >= SEEN_FRAMES).then_some((stamp, place));
             return;
         }
-        self.since = self.since.or(Some(stamp)).filter(|_| seen);
+        self.seen += usize::from(seen);
         let last = self.last.filter(|(last, _)| stamp - last < GONE);
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
@@ -53,7 +56,7 @@ impl Hidden {
         let Some((_, own)) = self.last else { return false };
         frame.images.iter().any(|image| {
             let depth = |place: Vec3| (image.world_from_sensor.inverse() * place).z;
-            depth(place) < depth(own).max(depth(self.now)) - COVERS
+            depth(place) < depth(own).max(depth(self.now)) - IN_FRONT
         })
     }
 }
@@ -85,8 +88,8 @@ mod tests {
             })
         };
         assert_eq!(after(&covered, -2.0, false), [false; 3], "it was never seen");
-        for frame in 0..10 {
-            assert_eq!(after(&open, 0.1 * f64::from(frame) - 1.0, true), [false; 3], "nothing stands before it");
+        for frame in 0..SEEN_FRAMES {
+            assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing stands before it");
         }
         assert_eq!(after(&covered, 0.2, true), [false, false, true]);
         for tracked in [false, true] {
@@ -104,7 +107,7 @@ mod tests {
             for (backgrounds, poses, by) in
                 [(&nothing, &poses, false), (&nothing, &beyond, true), (&scene, &beyond, false)]
             {
-                let mut hidden = Hidden { since: Some(1.0), ..Hidden::default() };
+                let mut hidden = Hidden { seen: SEEN_FRAMES, ..Hidden::default() };
                 hidden.observe(views(frame, backgrounds), poses.iter().map(|pose| pose.translation), true, true);
                 assert_eq!(hidden.by(frame, root - 0.2 * Vec3::Z), by);
             }

@@ -51,6 +51,7 @@ impl Search {
         let up = context.seen.frame().ground.map_or(stood, |ground| ground.normal);
         let middle = body_box(&context.model.body, tracked, 0.0).center();
         let there = 0.5 * (segment.low + segment.high);
+        best.clear();
         let mut least = f64::INFINITY;
         for turn in 0..SWIVELS {
             let turn = Quat::from_axis_angle(up, std::f64::consts::TAU * turn as f64 / SWIVELS as f64);
@@ -64,6 +65,6 @@ impl Search {
                 std::mem::swap(best, turned);
             }
         }
-        trials.at(context, fit, present, best, 0.0)
+        !best.is_empty() && trials.at(context, fit, present, best, 0.0)
     }
 }
