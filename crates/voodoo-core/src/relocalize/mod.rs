@@ -233,15 +233,20 @@ impl Relocalizer {
         let backgrounds = context.seen.views.backgrounds;
         self.search.segments.find(frame, origin, backgrounds, context.config);
         fit.exchange(&mut self.matched);
-        let fitting: Vec<_> = self.search.fitting(&context.model.body).collect();
-        let found = fitting.into_iter().any(|segment| {
+        let mut found = false;
+        let mut index = 0;
+        while let Some(segment) = self.search.segment(index).filter(|_| !found) {
+            index += 1;
+            if !self.search.fits(&context.model.body, segment) {
+                continue;
+            }
             let margin = Vec3::splat(context.config.body_box_margin);
             let bounds = Aabb::new(segment.low - margin, segment.high + margin);
             self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);
             let seen = context.seen.with(&self.candidates);
             let at = Context { seen, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
-            self.search.at(segment, at, fit, &mut self.trials, present)
-        });
+            found = self.search.at(segment, at, fit, &mut self.trials, present);
+        }
         fit.exchange(&mut self.matched);
         found.then(|| self.trials.tried())
     }

@@ -26,14 +26,16 @@ impl Search {
         self.tracked.extend_from_slice(poses);
     }
 
-    /// Segments as long as the body, or half or twice that, the largest first.
-    pub(super) fn fitting(&self, body: &Body) -> impl Iterator<Item = Segment> {
+    /// One of the segments, the largest first.
+    pub(super) fn segment(&self, index: usize) -> Option<Segment> {
+        self.segments.found().get(index).copied()
+    }
+
+    /// Whether a segment is as long as the body, or half or twice that.
+    pub(super) fn fits(&self, body: &Body, segment: Segment) -> bool {
         let length = body_box(body, &self.tracked, 0.0).extents().max_element();
-        let found = self.segments.found().iter().copied();
-        found.filter(move |segment| {
-            let extent = (segment.high - segment.low).max_element();
-            extent > 0.5 * length && extent < 2.0 * length
-        })
+        let extent = (segment.high - segment.low).max_element();
+        extent > 0.5 * length && extent < 2.0 * length
     }
 
     /// Whether the body is at a segment, whose points are the candidates of `context`, rather than at `present`; `trials` has its
