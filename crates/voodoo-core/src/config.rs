@@ -268,7 +268,8 @@ config! {
     still_prior_gain: f64 = 30.0, "", 0.0 ..= 10000.0;
     /// Try other configurations of arms and legs where the frame speaks against the current ones (whole-body solvers).
     hypotheses: bool = true, "";
-    /// Look for a body that is lost, or elsewhere than it is tracked, where a detector sees a person (whole-body solvers).
+    /// Look for a body that is lost, or elsewhere than it is tracked, where a detector sees a person; for a lost one that no detector
+    /// knows or sees in everything of its size that is no background (whole-body solvers).
     relocalization: bool = true, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body solvers).
     outline: bool = true, "";

@@ -235,10 +235,8 @@ impl Hypotheses {
         let cost = refined.cost(context, fit, poses);
         let (mut steps, mut hopeless) = (0, true);
         for proposal in pool.found() {
-            let (taken, outcome) = {
-                let present = Present { cost, poses };
-                refined.improves(context, present, index, fit, proposal, suspicion)
-            };
+            let present = Present { cost, poses };
+            let (taken, outcome) = refined.improves(context, present, index, fit, proposal, suspicion);
             steps += taken;
             hopeless &= outcome == Outcome::Hopeless;
             if outcome != Outcome::Better {

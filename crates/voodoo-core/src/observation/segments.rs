@@ -26,15 +26,12 @@ pub struct Segment {
     pub high: Vec3,
     /// Surface seen, in patches.
     pub patches: f64,
-    /// Mean direction in which the sensors look at it; zero for clouds.
-    pub view: Vec3,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     key: u64,
     point: [f32; 3],
-    view: [f32; 3],
     weight: f32,
 }
 
@@ -70,7 +67,7 @@ impl Segments {
             let step = cloud.points.len().div_ceil(SAMPLES_PER_SOURCE).max(1);
             for index in (0..cloud.points.len()).step_by(step) {
                 let point = cloud.world_from_sensor * cloud.points.get(index) - origin;
-                self.push(point, Vec3::ZERO, cloud.weight * step as f64);
+                self.push(point, cloud.weight * step as f64);
             }
         }
         if !frame.excluded.is_empty() {
@@ -95,14 +92,14 @@ impl Segments {
         self.sum_up();
     }
 
-    fn push(&mut self, point: Vec3, view: Vec3, weight: f64) {
+    fn push(&mut self, point: Vec3, weight: f64) {
         let cell = (point / CELL).floor() + HALF_KEY;
         if !(cell.cmpge(Vec3::ONE).all() && cell.cmplt(Vec3::splat(2.0 * HALF_KEY - 1.0)).all()) {
             return;
         }
         let key = ((cell.x as u64) << 42) | ((cell.y as u64) << 21) | cell.z as u64;
-        let [point, view] = [point, view].map(|v| v.to_array().map(|value| value as f32));
-        self.samples.push(Sample { key, point, view, weight: weight as f32 });
+        let point = point.to_array().map(|value| value as f32);
+        self.samples.push(Sample { key, point, weight: weight as f32 });
     }
 
     fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
@@ -110,7 +107,6 @@ impl Segments {
             let background = backgrounds.of(image).map_or(&[][..], Background::depth);
             let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
             let spread = (step * step) as f64 / (image.intrinsics[0] * image.intrinsics[1] * REFERENCE_PATCH);
-            let camera = image.world_from_sensor.translation - origin;
             for row in (0..image.height).step_by(step) {
                 for pixel in (row * image.width..(row + 1) * image.width).step_by(step) {
                     let z = match image.pixels {
@@ -122,8 +118,7 @@ impl Segments {
                         continue;
                     }
                     let point = image.world_from_sensor * image.back_project(pixel, z) - origin;
-                    let weight = image.weight * spread * f64::from(z * z);
-                    self.push(point, (point - camera).normalize_or_zero(), weight);
+                    self.push(point, image.weight * spread * f64::from(z * z));
                 }
             }
         }
@@ -183,15 +178,14 @@ impl Segments {
             if first == index {
                 self.of_cell[index] = self.found.len() as u32;
                 let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-                self.found.push(Segment { centre: Vec3::ZERO, low, high, patches: 0.0, view: Vec3::ZERO });
+                self.found.push(Segment { centre: Vec3::ZERO, low, high, patches: 0.0 });
             }
             let segment = &mut self.found[self.of_cell[first] as usize];
             let (start, end) = self.cells[index].samples;
             for sample in &self.samples[start as usize..end as usize] {
                 let weight = f64::from(sample.weight);
-                let [point, view] = [sample.point, sample.view].map(|v| Vec3::from_array(v.map(f64::from)));
+                let point = Vec3::from_array(sample.point.map(f64::from));
                 segment.centre += weight * point;
-                segment.view += weight * view;
                 segment.low = segment.low.min(point);
                 segment.high = segment.high.max(point);
                 segment.patches += weight;
@@ -199,7 +193,6 @@ impl Segments {
         }
         for segment in &mut self.found {
             segment.centre /= segment.patches;
-            segment.view = segment.view.normalize_or_zero();
         }
         // No two segments share a centre: the order is the same on every run.
         let place = |segment: &Segment| segment.centre.to_array();

@@ -237,7 +237,9 @@ impl Relocalizer {
         let mut index = 0;
         while let Some(segment) = self.search.segment(index).filter(|_| !found) {
             index += 1;
-            if !self.search.fits(&context.model.body, segment) {
+            // What stands before a hidden body is another one.
+            let other = self.watch.hidden.by(frame, segment.centre + origin);
+            if other || !self.search.fits(&context.model.body, segment) {
                 continue;
             }
             let margin = Vec3::splat(context.config.body_box_margin);

@@ -19,8 +19,7 @@ pub(crate) const ACROSS_LIMB: [f64; SECTIONS] = evenly();
 /// A camera sees past the model's surface when what may be the body lies this much behind it, metres; half as much of what is
 /// known to be the background, since that is not the body.
 pub(crate) const SEEN_PAST: f64 = 0.08;
-/// A smaller share of what a limb should show is little: it is idle that alone explains no more, hidden that shows no more, and
-/// refuted that cameras see past more of.
+/// A smaller share of what a limb should show is little: it is idle that alone explains no more.
 pub(crate) const LITTLE: f64 = 0.3;
 /// Fewer patches flicker: shares are of so many at least. As many points make a limb measured where there is no depth image.
 pub(crate) const FEW: f64 = 5.0;
