@@ -99,8 +99,8 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     solvers).
     """
     relocalization: bool = True
-    """Look for a body that is lost, or elsewhere than it is tracked, where a detector sees a person (whole-body
-    solvers).
+    """Look for a body that is lost, or elsewhere than it is tracked, where a detector sees a person; for a lost
+    one that no detector knows or sees in everything of its size that is no background (whole-body solvers).
     """
     outline: bool = True
     """Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body
