@@ -15,7 +15,6 @@ pub const REFINE: usize = 8;
 /// After so many of them a hypothesis is given up that costs clearly more than the current pose: of 63 that were taken in the
 /// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
 const GIVE_UP_AFTER: usize = 6;
-const HALF_WAY: usize = REFINE / 2;
 /// Steps with few points: they need not be exact. The hypothesis is judged by all of them.
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
 /// A pose that is nearer to the usual one by this, in squared standard deviations, is twenty times as likely before anything is seen.
@@ -104,7 +103,7 @@ impl Refined {
             // Half way, only what is far behind: of 178 that explained the frame better in the end one was.
             let worst = match step {
                 GIVE_UP_AFTER => most,
-                HALF_WAY => most + SURE_GAIN,
+                _ if 2 * step == REFINE => most + SURE_GAIN,
                 _ => f64::INFINITY,
             };
             if worst.is_finite() {
