@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
 use voodoo_core::Body;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
@@ -19,15 +20,21 @@ pub struct Names {
     pub sites: Vec<String>,
     /// Name of the joint of each limb; `None` for the root.
     pub joints: Vec<Option<String>>,
+    /// The sites as Python has them: every frame asks for them.
+    site_tuple: PyOnceLock<Py<PyTuple>>,
 }
 
 impl Names {
     pub fn of(body: &Body) -> Self {
-        Self {
-            limbs: body.limbs().iter().map(|limb| limb.name.clone()).collect(),
-            sites: body.sites().iter().map(|site| site.name.clone()).collect(),
-            joints: body.limbs().iter().map(|limb| limb.parent.as_ref().map(|(_, joint)| joint.name.clone())).collect(),
-        }
+        Self::new(
+            body.limbs().iter().map(|limb| limb.name.clone()).collect(),
+            body.sites().iter().map(|site| site.name.clone()).collect(),
+            body.limbs().iter().map(|limb| limb.parent.as_ref().map(|(_, joint)| joint.name.clone())).collect(),
+        )
+    }
+
+    fn new(limbs: Vec<String>, sites: Vec<String>, joints: Vec<Option<String>>) -> Self {
+        Self { limbs, sites, joints, site_tuple: PyOnceLock::new() }
     }
 }
 
@@ -160,7 +167,7 @@ pub fn _estimate(
             .collect(),
         covariances: spread.map(covariances).unwrap_or_default(),
     };
-    Ok(PyEstimate { estimate, names: Arc::new(Names { limbs, sites, joints }), sources })
+    Ok(PyEstimate { estimate, names: Arc::new(Names::new(limbs, sites, joints)), sources })
 }
 
 #[pymethods]
@@ -207,7 +214,8 @@ impl PyEstimate {
     /// Names of the rows of joint_positions.
     #[getter]
     fn joint_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, &self.names.sites)
+        let made = || PyTuple::new(py, &self.names.sites).map(Bound::unbind);
+        self.names.site_tuple.get_or_try_init(py, made).map(|names| names.bind(py).clone())
     }
 
     /// Names of the rows of limb_poses.

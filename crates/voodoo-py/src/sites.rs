@@ -50,7 +50,10 @@ impl PySiteMotion {
 
     /// Takes up an estimate's named positions.
     fn update(&mut self, stamp: f64, names: Bound<'_, PyTuple>, positions: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
-        let (known, places): (Vec<String>, _) = (names.extract()?, rows("positions", &positions)?);
+        // Estimates of one body have the same tuple.
+        let same = self.names.as_ref().is_some_and(|before| before.is(&names));
+        let known = if same { self.motion.names().clone() } else { names.extract::<Vec<String>>()?.into() };
+        let places = rows("positions", &positions)?;
         if known.len() != places.len() {
             let text = format!("positions: expected one of each of {} names, found {}", known.len(), places.len());
             return Err(exception(names.py(), "MeasurementError", text));

@@ -62,7 +62,8 @@ impl Part {
     fn add(&mut self, point: Vec3) {
         self.low = self.low.min(point);
         self.high = self.high.max(point);
-        if self.seen.is_multiple_of(self.every) {
+        // A power of two: no division for every pixel.
+        if self.seen & (self.every - 1) == 0 {
             if self.sampled == PART_SAMPLES {
                 // Half of those that are kept make room.
                 for number in 0..PART_SAMPLES / 2 {
@@ -116,7 +117,9 @@ pub(super) struct Components {
     /// The label of every pixel: the index of another of its part, or of itself.
     pub(super) labels: Vec<u32>,
     parts: Vec<Part>,
-    /// Surface of the part with a label, at the label's place.
+    /// Every label once, ascending.
+    distinct: Vec<u32>,
+    /// Surface of the part with a label, at the label's place; what stands elsewhere says nothing.
     areas: Vec<f32>,
     /// 1 for every pixel that is to be joined to its neighbours.
     again: Vec<u8>,
@@ -135,7 +138,8 @@ impl Components {
         self.join(view, finer);
         self.measure(view);
         for _ in 0..CUTS {
-            if !self.areas.iter().any(|area| f64::from(*area) > AREA[1]) {
+            let too_large = |label: &u32| f64::from(self.areas[*label as usize]) > AREA[1];
+            if !self.distinct.iter().any(too_large) {
                 break;
             }
             finer *= CUT_FINER;
@@ -165,14 +169,12 @@ impl Components {
     fn join(&mut self, view: &View, finer: f32) {
         self.link(view, finer);
         let width = view.width;
+        let mut before = NONE;
         for index in 0..self.labels.len() {
             let linked = self.linked[index];
-            if linked == 0 {
-                continue;
-            }
-            // No pixel that came before hangs on this one.
-            let mut root = index as u32;
-            for (bit, back) in [1, width, 2, 2 * width].into_iter().enumerate() {
+            // No pixel that came before hangs on this one; the one to the left has just been followed to its root.
+            let mut root = if linked & 1 != 0 { before } else { index as u32 };
+            for (bit, back) in [(1, width), (2, 2), (3, 2 * width)] {
                 if linked & (1 << bit) == 0 || self.labels[index - back] == root {
                     continue;
                 }
@@ -180,10 +182,20 @@ impl Components {
                 self.labels[root.max(other) as usize] = root.min(other);
                 root = root.min(other);
             }
+            if linked != 0 {
+                self.labels[index] = root;
+            }
+            before = root;
         }
+        self.distinct.clear();
         for index in 0..self.labels.len() {
-            if self.labels[index] != NONE {
-                self.labels[index] = self.root(index as u32);
+            let label = self.labels[index];
+            if label != NONE {
+                // It hangs on one that came before it and has its label.
+                self.labels[index] = self.labels[label as usize];
+                if label == index as u32 {
+                    self.distinct.push(label);
+                }
             }
         }
     }
@@ -234,25 +246,44 @@ impl Components {
 
     /// Surface of everything that hangs together.
     fn measure(&mut self, view: &View) {
-        let Self { labels, areas, .. } = self;
-        areas.clear();
+        let Self { labels, areas, distinct, .. } = self;
         areas.resize(labels.len(), 0.0);
+        for label in distinct {
+            areas[*label as usize] = 0.0;
+        }
         let area = view.pixel_area() as f32;
+        // Neighbours mostly share their label: their sum need not be written for each.
+        let (mut last, mut sum) = (NONE, 0.0);
         for (label, z) in labels.iter().zip(&view.depth).filter(|(label, _)| **label != NONE) {
-            areas[*label as usize] += area * z * z;
+            if *label != last {
+                if last != NONE {
+                    areas[last as usize] = sum;
+                }
+                (last, sum) = (*label, areas[*label as usize]);
+            }
+            sum += area * z * z;
+        }
+        if last != NONE {
+            areas[last as usize] = sum;
         }
     }
 
     /// Sizes of the parts, the largest first.
     fn sum_up(&mut self, view: &View) {
-        let Self { labels, parts, areas, .. } = self;
+        let Self { labels, parts, areas, distinct, .. } = self;
         parts.clear();
-        let large = areas.iter().enumerate().filter(|(_, area)| f64::from(**area) > LEAST_PART);
-        parts.extend(large.map(|(label, area)| Part::new(label as u32, f64::from(*area))));
+        for label in distinct.iter() {
+            let area = f64::from(areas[*label as usize]);
+            if area > LEAST_PART {
+                parts.push(Part::new(*label, area));
+            }
+        }
         parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
         parts.truncate(MOST_PARTS);
         // From here on what stands at a label's place is one more than its part's number.
-        areas.fill(0.0);
+        for label in distinct {
+            areas[*label as usize] = 0.0;
+        }
         for (number, part) in parts.iter().enumerate() {
             areas[part.label as usize] = number as f32 + 1.0;
         }

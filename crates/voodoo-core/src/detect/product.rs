@@ -4,11 +4,12 @@
 
 use crate::math::widest;
 
-/// Rows that are worked on together: the network's maps have multiples of nine pixels, and the sums of nine rows and `TOGETHER`
-/// columns fit the registers of AVX-512, those of `NARROW` columns the registers of AVX2.
-const ROWS: usize = 9;
+/// Columns that are worked on together.
 const TOGETHER: usize = 16;
-const NARROW: usize = TOGETHER / 2;
+/// Rows that are: the network's maps have multiples of nine pixels, and the sums of nine rows fit the registers of AVX-512, those of
+/// six the registers of AVX2. What is left is worked on by threes.
+const ROWS: [usize; 2] = [9, 6];
+const FEW_ROWS: usize = 3;
 
 /// Trained weights and biases, columns in groups of `TOGETHER`; missing columns are zeros.
 #[derive(Debug)]
@@ -49,42 +50,49 @@ impl Panels {
             || {
                 for group in 0..self.bias.len() {
                     if whole {
-                        self.columns::<TOGETHER>(group, 0, seen, out);
+                        self.columns::<{ ROWS[0] }>(group, seen, out);
                     } else {
-                        for first in (0..TOGETHER).step_by(NARROW) {
-                            self.columns::<NARROW>(group, first, seen, out);
-                        }
+                        self.columns::<{ ROWS[1] }>(group, seen, out);
                     }
                 }
             },
         );
     }
 
-    /// The products with `WIDTH` columns of a group, from its `first` on.
+    /// The products with the columns of a group, `MOST` rows together.
     #[inline(always)]
-    fn columns<const WIDTH: usize>(&self, group: usize, first: usize, seen: &[f32], out: &mut [f32]) {
-        let column = group * TOGETHER + first;
-        let width = WIDTH.min(self.outputs.saturating_sub(column));
-        let Some(bias) = self.bias[group][first..].first_chunk::<WIDTH>().filter(|_| width > 0) else { return };
+    fn columns<const MOST: usize>(&self, group: usize, seen: &[f32], out: &mut [f32]) {
+        let (seen, out) = self.rows::<MOST>(group, seen, out);
+        let (seen, out) = self.rows::<FEW_ROWS>(group, seen, out);
+        self.rows::<1>(group, seen, out);
+    }
+
+    /// The same of so many rows together, as far as there are so many; what is left.
+    #[inline(always)]
+    fn rows<'a, 'b, const COUNT: usize>(
+        &self,
+        group: usize,
+        seen: &'a [f32],
+        out: &'b mut [f32],
+    ) -> (&'a [f32], &'b mut [f32]) {
+        let column = group * TOGETHER;
+        let width = TOGETHER.min(self.outputs - column);
         let panel = &self.weights[group * self.inputs..][..self.inputs];
-        let whole = seen.len() / (ROWS * self.inputs);
-        let (seen, seen_last) = seen.split_at(whole * ROWS * self.inputs);
-        let (out, out_last) = out.split_at_mut(whole * ROWS * self.outputs);
-        for (rows, here) in seen.chunks_exact(ROWS * self.inputs).zip(out.chunks_exact_mut(ROWS * self.outputs)) {
-            let sums = product::<WIDTH, ROWS>(rows, panel, first, bias);
+        let whole = seen.len() / (COUNT * self.inputs);
+        let (seen, seen_last) = seen.split_at(whole * COUNT * self.inputs);
+        let (out, out_last) = out.split_at_mut(whole * COUNT * self.outputs);
+        for (rows, here) in seen.chunks_exact(COUNT * self.inputs).zip(out.chunks_exact_mut(COUNT * self.outputs)) {
+            let sums = product::<COUNT>(rows, panel, &self.bias[group]);
             let here = here.chunks_exact_mut(self.outputs);
             here.zip(&sums).for_each(|(row, sums)| store(&mut row[column..][..width], sums));
         }
-        for (row, here) in seen_last.chunks_exact(self.inputs).zip(out_last.chunks_exact_mut(self.outputs)) {
-            let [sums] = product::<WIDTH, 1>(row, panel, first, bias);
-            store(&mut here[column..][..width], &sums);
-        }
+        (seen_last, out_last)
     }
 }
 
 /// Copies the sums of the columns that there are, mostly all: their number is then known to the compiler.
 #[inline(always)]
-fn store<const WIDTH: usize>(to: &mut [f32], from: &[f32; WIDTH]) {
+fn store(to: &mut [f32], from: &[f32; TOGETHER]) {
     match to.first_chunk_mut() {
         Some(to) => *to = *from,
         None => to.copy_from_slice(&from[..to.len()]),
@@ -99,14 +107,13 @@ fn wide_registers() -> bool {
     return false;
 }
 
-/// So many rows times some columns of a group, from `first` on.
+/// So many rows times the columns of a group.
 #[inline(always)]
-fn product<const WIDTH: usize, const COUNT: usize>(
+fn product<const COUNT: usize>(
     rows: &[f32],
     panel: &[[f32; TOGETHER]],
-    first: usize,
-    bias: &[f32; WIDTH],
-) -> [[f32; WIDTH]; COUNT] {
+    bias: &[f32; TOGETHER],
+) -> [[f32; TOGETHER]; COUNT] {
     let inputs = panel.len();
     // Sliced one by one, their length is known to the compiler.
     let (mut own, mut rest): ([&[f32]; COUNT], _) = ([&[]; COUNT], rows);
@@ -115,7 +122,6 @@ fn product<const WIDTH: usize, const COUNT: usize>(
     }
     let mut sums = [*bias; COUNT];
     for (input, weights) in panel.iter().enumerate() {
-        let weights = &weights[first..][..WIDTH];
         for (row, sums) in own.iter().zip(&mut sums) {
             let value = row[input];
             for (sum, weight) in sums.iter_mut().zip(weights) {

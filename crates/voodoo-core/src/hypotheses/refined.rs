@@ -2,7 +2,7 @@
 
 use super::history::Basis;
 use super::proposals::Proposal;
-use super::score::{Cost, SEEN_GAIN, overall_cost};
+use super::score::{Cost, SEEN_GAIN, SURE_GAIN, overall_cost};
 use super::suspicion::Suspicion;
 use crate::association::correspondence::Correspondences;
 use crate::body::unusual;
@@ -100,9 +100,15 @@ impl Refined {
             } else {
                 fit.match_again(here, &self.poses, at);
             }
-            if step == GIVE_UP_AFTER && most.is_finite() {
+            // Half way, only what is far behind: of 178 that explained the frame better in the end one was.
+            let worst = match step {
+                GIVE_UP_AFTER => most,
+                _ if 2 * step == REFINE => most + SURE_GAIN,
+                _ => f64::INFINITY,
+            };
+            if worst.is_finite() {
                 let cost = self.own_cost(context, fit);
-                if cost.total > most {
+                if cost.total > worst {
                     return (step, cost);
                 }
             }

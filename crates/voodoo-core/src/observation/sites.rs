@@ -1,6 +1,7 @@
 //! Named sites from frame to frame: where they will be, which measurements of them are believed, and rays on which they were seen.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::math::Vec3;
 
@@ -11,7 +12,8 @@ pub struct SiteMotion {
     pub share: f64,
     /// A faster estimate is a jump and predicts rest, metres a second.
     pub max_speed: f64,
-    names: Vec<String>,
+    /// Shared by all frames of a body.
+    names: Arc<[String]>,
     stamp: f64,
     positions: Vec<[f64; 3]>,
     velocity: Vec<[f64; 3]>,
@@ -20,17 +22,17 @@ pub struct SiteMotion {
 impl SiteMotion {
     /// No estimate yet.
     pub fn new(share: f64, max_speed: f64) -> Self {
-        let (names, positions, velocity) = Default::default();
-        Self { share, max_speed, names, stamp: f64::NAN, positions, velocity }
+        let (positions, velocity) = Default::default();
+        Self { share, max_speed, names: Arc::new([]), stamp: f64::NAN, positions, velocity }
     }
 
     /// Names of the sites of the last estimate.
-    pub fn names(&self) -> &[String] {
+    pub fn names(&self) -> &Arc<[String]> {
         &self.names
     }
 
     /// Takes up an estimate's positions, metres; a stamp that is NaN forgets the velocity.
-    pub fn update(&mut self, stamp: f64, names: Vec<String>, positions: Vec<[f64; 3]>) {
+    pub fn update(&mut self, stamp: f64, names: Arc<[String]>, positions: Vec<[f64; 3]>) {
         let interval = stamp - self.stamp;
         let before = |index: usize, name: &String| {
             let same = self.names.get(index) == Some(name);
@@ -154,7 +156,7 @@ mod tests {
 
     #[test]
     fn sites_move_on_by_name_and_jumps_are_forgotten() {
-        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Arc<[_]>>();
         let mut motion = SiteMotion::new(0.5, 8.0);
         motion.update(f64::NAN, names(&["hand"]), vec![[0.0; 3]]);
         assert_eq!(motion.at(5.0), [[0.0; 3]]);

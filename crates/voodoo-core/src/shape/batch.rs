@@ -94,7 +94,9 @@ impl TaperedEllipticCylinder {
             return;
         }
         let constants = Constants::new(self, world_from_limb);
-        let whole = xs.len() - xs.len() % BLOCK;
+        // More than half a block takes less time as a whole one than as short ones.
+        let rest = xs.len() % BLOCK;
+        let whole = if 2 * rest > BLOCK { xs.len() } else { xs.len() - rest };
         let queries = [xs, ys, zs];
         let mut batch = Batch { shape: self, world_from_limb, constants, out, doubtful: Few::new(), open: Few::new() };
         batch.closest_blocks(kernel::<BLOCK, FEW>(), queries, 0..whole);
@@ -200,7 +202,8 @@ impl Batch<'_> {
         }
         let queries = &queries[..open.count];
         let mut decide = |at: usize, found: SurfacePoint| out.set(open.indices[at], &found, world_from_limb);
-        if shape.aspect_change() > ONE_BASIN {
+        // All lanes take as long for one as for all of them: a few take less one by one.
+        if 2 * open.count <= SHORT || shape.aspect_change() > ONE_BASIN {
             queries.iter().enumerate().for_each(|(at, query)| decide(at, shape.closest_point(*query)));
         } else {
             shape.closest_points_in_one_basin(queries, decide);

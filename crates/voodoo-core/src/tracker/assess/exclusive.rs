@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::hypotheses::ROUGH_SAMPLE;
-use crate::math::{Points, Pose};
+use crate::math::{Points, Pose, widest};
 use crate::observation::candidates::Candidates;
 use crate::visibility::evidence::EXPLAINED;
 
@@ -17,12 +17,49 @@ pub(super) struct Exclusive {
     distances: Vec<f32>,
     /// Distances of the whole sample, limb after limb.
     all: Vec<f32>,
+    nearest: Nearest,
+}
+
+/// Of each point of the sample the nearest limb, how far it is, and how many are near enough to explain it.
+#[derive(Debug, Default)]
+struct Nearest {
+    limb: Vec<u32>,
+    distance: Vec<f32>,
+    near: Vec<u32>,
+}
+
+impl Nearest {
+    /// Of so many points, before any limb is known.
+    fn begin(&mut self, count: usize) {
+        self.distance.clear();
+        self.distance.resize(count, f32::INFINITY);
+        for numbers in [&mut self.limb, &mut self.near] {
+            numbers.clear();
+            numbers.resize(count, 0);
+        }
+    }
+
+    /// Takes in how far all points are from a limb.
+    fn offer(&mut self, limb: u32, distances: &[f32]) {
+        let own = self.limb.iter_mut().zip(&mut self.distance).zip(&mut self.near);
+        widest(
+            #[inline(always)]
+            || {
+                for (((nearest, least), near), distance) in own.zip(distances) {
+                    let nearer = *distance < *least;
+                    *nearest = if nearer { limb } else { *nearest };
+                    *least = if nearer { *distance } else { *least };
+                    *near += u32::from(*distance <= EXPLAINED as f32);
+                }
+            },
+        );
+    }
 }
 
 impl Exclusive {
     /// Counts anew.
     pub(super) fn count(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates) {
-        let Self { weight, clouds, sample, distances, all } = self;
+        let Self { weight, clouds, sample, distances, all, nearest } = self;
         let count = poses.len();
         let pixels = candidates.cameras.last().map_or(0, |(end, _)| *end as usize);
         for counts in [&mut *weight, &mut *clouds] {
@@ -36,20 +73,23 @@ impl Exclusive {
             sample.push([points.x[index], points.y[index], points.z[index]]);
         }
         all.clear();
-        for (limb, pose) in body.limbs().iter().zip(poses) {
+        nearest.begin(sample.len());
+        for (index, (limb, pose)) in (0..).zip(body.limbs().iter().zip(poses)) {
             limb.shape.approximate_distances(pose, sample, distances);
-            all.extend(distances.iter().map(|distance| distance.abs()));
+            distances.iter_mut().for_each(|distance| *distance = distance.abs());
+            nearest.offer(index, distances);
+            all.extend_from_slice(distances);
         }
         for place in 0..sample.len() {
-            let distance = |limb: usize| all[limb * sample.len() + place];
-            let closest = (1..count).fold(0, |best, limb| if distance(limb) < distance(best) { limb } else { best });
-            if distance(closest) >= EXPLAINED as f32 {
+            if nearest.distance[place] >= EXPLAINED as f32 {
                 continue;
             }
+            let closest = nearest.limb[place] as usize;
+            let distance = |limb: usize| all[limb * sample.len() + place];
             let rival = |other: &usize| {
                 *other != closest && distance(*other) <= EXPLAINED as f32 && !body.adjacent(*other, closest)
             };
-            if (0..count).find(rival).is_none() {
+            if nearest.near[place] == 1 || (0..count).find(rival).is_none() {
                 let candidate = f64::from(candidates.weight[place * step]) * step as f64;
                 weight[closest] += candidate;
                 clouds[closest] += if place * step < pixels { 0.0 } else { candidate };
