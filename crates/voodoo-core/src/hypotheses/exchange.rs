@@ -2,20 +2,14 @@
 //!
 //! By then sizes have followed the wrong ones: exchanged legs that explain as much are followed beside the body for some frames.
 
-use super::persistence::{REST, WEARY};
+use super::persistence::REST;
 use super::refined::{REFINE, Refined};
 use super::score::{Cost, SURE_GAIN};
+use super::unexplained::CLUTTER;
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3, shifted};
-
-/// What explains a smaller share of what is explained now is not refined: legs that stand right lose more when they are exchanged.
-const WORTH_A_LOOK: f64 = 0.88;
-/// What is followed explains this share at least.
-const WORTH_FOLLOWING: f64 = 0.96;
-/// A pelvis that turns by more than this, radians, is another body's: the legs alone were exchanged.
-const MOST_TURNED: f64 = 0.5;
 
 /// When one looks, and where the legs would be.
 #[derive(Debug, Default)]
@@ -58,12 +52,12 @@ impl Exchange {
         }
         let (origin, now) = (context.seen.origin(), refined.cost(context, fit, poses));
         self.put(&context.model.body, [&chains[one], &chains[other]], poses, origin);
-        if !self.goes_on() && !is_worth_a_look(now, refined.cost(context, fit, &self.poses)) {
+        // Legs that stand right lose more when they are exchanged, before they are refined.
+        if !self.goes_on() && refined.cost(context, fit, &self.poses).evidence > (1.0 - CLUTTER) * now.evidence {
             return 0;
         }
         let cost = refined.refine(context, fit, &self.poses);
-        let turned = refined.poses[0].rotation.angle_between(poses[0].rotation);
-        if self.gains(now, cost, turned) {
+        if self.gains(now, cost) {
             poses.clone_from(&refined.poses);
             predicted.clone_from(&self.poses);
         } else {
@@ -97,14 +91,14 @@ impl Exchange {
         }
     }
 
-    /// Takes note of what a frame says of it, and of how far its pelvis is turned, radians; true when it is to be taken.
-    fn gains(&mut self, now: Cost, exchanged: Cost, turned: f64) -> bool {
+    /// Takes note of what a frame says of it; true when it is to be taken.
+    fn gains(&mut self, now: Cost, exchanged: Cost) -> bool {
         // No frame counts for more than half: it may be disturbed.
         self.gained = (self.gained + (now.total - exchanged.total).min(0.5 * SURE_GAIN)).max(0.0);
         self.age += 1;
-        let close = exchanged.evidence < WORTH_FOLLOWING * now.evidence && turned < MOST_TURNED;
+        let close = exchanged.evidence < now.evidence + SURE_GAIN;
         let taken = close && self.gained > SURE_GAIN;
-        if taken || !close || self.age > WEARY {
+        if taken || !close || self.age > REST {
             (self.age, self.gained) = (0, 0.0);
         }
         taken
@@ -117,11 +111,6 @@ impl Exchange {
             self.followed.extend(poses.iter().map(|pose| shifted(pose, -origin)));
         }
     }
-}
-
-/// Whether exchanged legs explain nearly as much as those of now, as they are.
-fn is_worth_a_look(now: Cost, exchanged: Cost) -> bool {
-    exchanged.evidence < WORTH_A_LOOK * now.evidence
 }
 
 #[cfg(test)]
@@ -154,22 +143,20 @@ mod tests {
     fn it_is_taken_when_several_frames_say_so_and_dropped_when_they_do_not() {
         let (now, better, far) = (cost(2000.0), cost(2090.0), cost(1500.0));
         let mut exchange = Exchange::default();
-        let said: Vec<bool> = (0..4).map(|_| exchange.gains(now, better, 0.1)).collect();
+        let said: Vec<bool> = (0..4).map(|_| exchange.gains(now, better)).collect();
         assert_eq!(said, [false, false, true, false], "no frame counts for more than half");
         let mut exchange = Exchange::default();
-        assert!([better, better, far, better, better].iter().all(|cost| !exchange.gains(now, *cost, 0.1)));
-        let mut exchange = Exchange::default();
-        assert!((0..9).all(|_| !exchange.gains(now, better, 1.0)), "another body");
+        assert!([better, better, far, better, better].iter().all(|cost| !exchange.gains(now, *cost)));
         // What is as good is followed for some frames.
         let (_, poses) = standing();
         let followed: Vec<bool> = (0..10)
             .map(|_| {
-                exchange.gains(now, now, 0.0);
+                exchange.gains(now, now);
                 exchange.keep(&poses, Vec3::ZERO);
                 exchange.goes_on()
             })
             .collect();
-        assert_eq!(followed.iter().filter(|goes_on| !**goes_on).count(), 1, "{followed:?}");
+        assert_eq!(followed.iter().filter(|goes_on| !**goes_on).count(), 10 / (REST + 1), "{followed:?}");
     }
 
     #[test]

@@ -5,10 +5,9 @@ use crate::fit::REFERENCE_RATE;
 /// Frames in a row that have to speak against an arm or leg, or against the whole body, and twice as many against an arm by nothing but
 /// unexplained points: a single frame may be disturbed.
 pub const PATIENCE: usize = 2;
-/// A chain is tried in every second 1/30 s only after so many refusals in a row, in every third after twice as many, and so on:
-/// a hidden arm is refused for seconds.
-pub(super) const WEARY: usize = 8;
-/// But at least in every `REST`th, which is as well the next one where nothing came near to what the frame shows.
+/// A chain is tried in every second 1/30 s only after so many refusals in a row, in every third after twice as many, and so on, but at
+/// least in every `REST`th: a hidden arm is refused for seconds. That is as well the next one where nothing came near to what the frame
+/// shows.
 pub(super) const REST: usize = 4;
 
 /// Times of the frame before and of this one, seconds.
@@ -55,7 +54,7 @@ impl Persistence {
         self.voted_before = voted_before;
         self.frames += 1;
         self.refused += 1;
-        let every = if self.rests { REST } else { self.refused.div_ceil(WEARY).min(REST) };
+        let every = if self.rests { REST } else { self.refused.div_ceil(REST).min(REST) };
         let due = every == 1 || times.begin(every);
         self.rests &= !due;
         self.frames >= patience && (due || new)
@@ -146,8 +145,8 @@ mod tests {
             assert!(persistence.observe(Some(1), false, frame(first)));
             persistence.rest();
             let tried = |number: usize| persistence.observe(Some(1), false, frame(number));
-            let found: Vec<bool> = (first + 1..=REST + 1).map(tried).collect();
-            assert_eq!(found, (first + 1..=REST + 1).map(|number| number >= REST).collect::<Vec<_>>());
+            let found: Vec<bool> = (first + 1..=REST).map(tried).collect();
+            assert_eq!(found, (first + 1..=REST).map(|number| number >= REST).collect::<Vec<_>>());
             persistence.rest();
             assert!(!persistence.observe(None, false, frame(1)) && persistence.observe(Some(1), false, frame(2)));
         }
@@ -156,11 +155,11 @@ mod tests {
     #[test]
     fn a_chain_is_tried_less_the_longer_it_is_refused_until_it_asks() {
         let mut persistence = Persistence::default();
-        let all = REST * WEARY + 10 * REST;
+        let all = REST * REST + 10 * REST;
         let tried: Vec<bool> = (0..all).map(|number| persistence.observe(Some(1), false, frame(number))).collect();
         let due = |tried: &[bool]| tried.iter().filter(|due| **due).count();
-        let eights = [0, 1, 3].map(|eight| due(&tried[eight * WEARY..][..WEARY]));
-        assert_eq!((eights, due(&tried[REST * WEARY..])), ([8, 4, 2], 10));
+        let fours = [0, 1, 3].map(|four| due(&tried[four * REST..][..REST]));
+        assert_eq!((fours, due(&tried[REST * REST..])), ([4, 2, 1], 10));
         let mut tired = persistence;
         assert!((1..REST).all(|number| tired.observe(Some(1), true, frame(all + number))), "there is something new");
         assert!(persistence.observe(Some(1), false, frame(all)));
@@ -171,7 +170,7 @@ mod tests {
     #[test]
     fn a_missing_frame_moves_none_of_those_that_come_after_it() {
         let mut persistence = [Persistence::default(); 2];
-        let (missing, long) = (5, REST * WEARY);
+        let (missing, long) = (5, REST * REST);
         let tried = |own: &mut Persistence, number: usize, before: usize| {
             let times = Times { before: frame(before).now, now: frame(number).now };
             own.observe(Some(1), false, times)
@@ -195,6 +194,6 @@ mod tests {
             let now = (number as f64 + 0.5) * apart;
             persistence.observe(Some(1), false, Times { before: now - apart, now })
         };
-        assert!((0..10 * WEARY).all(tried));
+        assert!((0..20 * REST).all(tried));
     }
 }

@@ -9,8 +9,8 @@ use crate::math::{Points, Pose, ShortestAxis, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Ground;
 use crate::shape::TaperedEllipticCylinder;
-use crate::visibility::evidence::{Visibility, limb_visibility, unexplained};
-use crate::visibility::{ALONG_LIMB, OVERLAP, SEEN_PAST};
+use crate::visibility::evidence::{EXPLAINED, Visibility, limb_visibility, unexplained};
+use crate::visibility::{ALONG_LIMB, OVERLAP};
 
 /// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
 /// are soft; a joint may turn by a third of a right angle between two frames.
@@ -136,13 +136,13 @@ pub fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, [low, high]: [V
     let gap = (middle - middle.max(low).min(high)).length() - radius;
     // The approximate distance falls below the true one where a slice is flat.
     let flatness = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
-    gap * flatness(shape.a0(), shape.b0()).min(flatness(shape.a1(), shape.b1())) <= SEEN_PAST
+    gap * flatness(shape.a0(), shape.b0()).min(flatness(shape.a1(), shape.b1())) <= 2.0 * EXPLAINED
 }
 
 /// Cost of points at these distances from the nearest limb of a rough pose, which explains what the camera does not see past: it is
 /// drawn in when the pose is refined.
 pub fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
-    distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / SEEN_PAST).powi(2).min(1.0)).sum()
+    distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / (2.0 * EXPLAINED)).powi(2).min(1.0)).sum()
 }
 
 #[cfg(test)]

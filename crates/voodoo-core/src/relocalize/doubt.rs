@@ -6,20 +6,18 @@ use crate::detect::Detection;
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
-/// A track is looked after for so long from its start on, seconds.
+/// A track is looked after for so long from its start on, seconds. A body that has been lost for so long is gone, and who was hidden
+/// is waited for so long; a limb that is elsewhere is looked at as seldom.
 pub(super) const YOUNG: f64 = 1.0;
-/// Seconds from one look at a young, lost or unsure track to the next, and at one with a limb elsewhere: a look costs as much as
-/// a frame or two.
-const EVERY: [f64; 2] = [0.09, 0.45];
+/// Seconds from one look at a young, lost or unsure track to the next: a look costs as much as a frame or two.
+const EVERY: f64 = 0.09;
 /// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, metres: other skeletons have hips
-/// and ankles 10 cm from where a detector tells them.
-const ELSEWHERE: f64 = 0.15;
+/// and ankles 10 cm from where a detector tells them. Its ankles are as near to the floor on which somebody stands.
+pub(super) const ELSEWHERE: f64 = 0.15;
 /// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
 pub(super) const SIGMAS: f64 = 3.5;
 /// From this sum of log odds on what is tracked is no person.
 const NOBODY: f64 = 12.0;
-/// A body that has been lost for so long is gone, seconds; and who was hidden is waited for so long.
-pub(super) const GONE: f64 = 2.0;
 
 /// What a detection says of where the body is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,9 +104,9 @@ impl Doubt {
         self.since = self.since.or(Some(stamp));
         let waited = |looked: Option<f64>, every: f64| looked.is_none_or(|looked| stamp - looked >= every);
         // A given start that was seen right is looked after half as often.
-        let after = if self.agreed && !lost { 2.0 * EVERY[0] } else { EVERY[0] };
+        let after = if self.agreed && !lost { 2.0 * EVERY } else { EVERY };
         let looks_after = young && waited(self.looked_after, after);
-        let every = if unsure || lost { EVERY[0] } else { EVERY[1] };
+        let every = if unsure || lost { EVERY } else { YOUNG };
         let due = looks_after || (doubtful || unsure || lost) && waited(self.looked, every);
         self.weighs = looks_after || !young;
         if looks_after {
@@ -154,7 +152,7 @@ impl Doubt {
         if let Some(person) = verdict {
             self.nobody = (self.nobody - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
-        self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= GONE)
+        self.nobody >= NOBODY || self.found_itself && self.lost_since.is_some_and(|since| stamp - since >= YOUNG)
     }
 
     /// What was seen elsewhere was tried.
@@ -179,7 +177,7 @@ mod tests {
         };
         let none = [false; 3];
         assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [9; 3]);
-        assert_eq!([count(2.0, [true, false, false]), count(2.0, none)], [2, 0]);
+        assert_eq!([count(2.0, [true, false, false]), count(2.0, none)], [1, 0]);
     }
 
     #[test]

@@ -1,18 +1,15 @@
 //! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
 
-use super::doubt::GONE;
+use super::doubt::YOUNG;
+use crate::hypotheses::PATIENCE;
 use crate::math::Vec3;
 use crate::observation::depth_view::{DepthViews, Pixel};
 use crate::observation::frame::Frame;
+use crate::visibility::LITTLE;
 
-/// What is measured so much nearer than a joint hides it, metres: more than half of a body is thick.
-const COVERS: f64 = 0.3;
-/// A body is hidden when this share of its joints is: its own arms hide less of it, and who stands before it may be slimmer.
-const HIDDEN_SHARE: f64 = 0.33;
-/// What stands before a hidden body is at least so much nearer to a camera, metres.
+/// What is so much nearer to a camera than a joint hides it, and than a body stands before it, metres: more than half of a body is
+/// thick.
 const IN_FRONT: f64 = 0.4;
-/// Only what was seen in so many frames can be hidden: a start that was given wrongly may lie behind the body.
-const SEEN_FRAMES: usize = 10;
 
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
@@ -33,7 +30,7 @@ impl Hidden {
         for joint in joints {
             hidden += i32::from(views.iter().any(|view| {
                 let place = view.working_from_camera.inverse_transform_point(joint - views.origin);
-                matches!(view.about(place), Pixel::Foreground(z) if z < place.z - COVERS)
+                matches!(view.about(place), Pixel::Foreground(z) if z < place.z - IN_FRONT)
             }));
             all += 1;
             root = root.or(Some(joint));
@@ -41,13 +38,15 @@ impl Hidden {
         let stamp = views.frame.stamp;
         let Some(root) = root else { return };
         self.now = root;
-        if f64::from(hidden) >= HIDDEN_SHARE * f64::from(all) {
+        // Its own arms hide little of it.
+        if f64::from(hidden) >= LITTLE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
-            self.last = (self.seen >= SEEN_FRAMES).then_some((stamp, place));
+            // Only what was seen can be hidden: a start that was given wrongly may lie behind the body.
+            self.last = (self.seen >= PATIENCE).then_some((stamp, place));
             return;
         }
         self.seen += usize::from(seen);
-        let last = self.last.filter(|(last, _)| stamp - last < GONE);
+        let last = self.last.filter(|(last, _)| stamp - last < YOUNG);
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
 
@@ -88,7 +87,7 @@ mod tests {
             })
         };
         assert_eq!(after(&covered, -2.0, false), [false; 3], "it was never seen");
-        for frame in 0..SEEN_FRAMES {
+        for frame in 0..PATIENCE {
             assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing stands before it");
         }
         assert_eq!(after(&covered, 0.2, true), [false, false, true]);
@@ -99,7 +98,7 @@ mod tests {
                 "it may come back"
             );
         }
-        assert_eq!(after(&open, 0.3 + GONE, true), [false; 3], "long ago");
+        assert_eq!(after(&open, 0.3 + YOUNG, true), [false; 3], "long ago");
         // Where it goes on to while it is hidden counts as well, and furniture does not.
         let beyond = moved(&poses, 0.3 * Vec3::Z);
         with_frame(&covered, 2.6, |frame| {
@@ -107,7 +106,7 @@ mod tests {
             for (backgrounds, poses, by) in
                 [(&nothing, &poses, false), (&nothing, &beyond, true), (&scene, &beyond, false)]
             {
-                let mut hidden = Hidden { seen: SEEN_FRAMES, ..Hidden::default() };
+                let mut hidden = Hidden { seen: PATIENCE, ..Hidden::default() };
                 hidden.observe(views(frame, backgrounds), poses.iter().map(|pose| pose.translation), true, true);
                 assert_eq!(hidden.by(frame, root - 0.2 * Vec3::Z), by);
             }

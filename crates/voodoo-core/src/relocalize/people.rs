@@ -1,15 +1,13 @@
 //! What a detector says of the person who is tracked, or of anybody where nobody is: where to start, where a lost body is, and
 //! whether a track is what it is taken for.
 
+use super::doubt::ELSEWHERE;
 use crate::body::{Body, Model};
 use crate::detect::{Detection, Detector, JOINTS, Surroundings, Wanted, lengths, take_lengths};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::share::Share;
-
-/// The lower ankle of a person who stands on a floor is no farther from it, metres.
-const ON_FLOOR: f64 = 0.2;
 
 /// Looks for people, from the first time on that it is asked to; keeps what it last saw.
 #[derive(Debug, Default)]
@@ -48,7 +46,7 @@ impl People {
         seen.floor.filter(|floor| {
             let ankles = [above(floor, "l_ankle"), above(floor, "r_ankle")].into_iter().flatten();
             let lowest = ankles.fold(f64::INFINITY, f64::min);
-            lowest.abs() < ON_FLOOR
+            lowest.abs() < ELSEWHERE
         })
     }
 

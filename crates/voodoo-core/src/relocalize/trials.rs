@@ -6,7 +6,7 @@ use crate::hypotheses::{
     CLUTTER, REFINE, ROUGH_SAMPLE, SURE_GAIN, body_landmark_cost, explain, limit_strain, overall_cost,
 };
 use crate::math::{Pose, Vec3, WeightedPoints};
-use crate::visibility::SEEN_PAST;
+use crate::visibility::evidence::EXPLAINED;
 
 /// Working memory.
 #[derive(Debug, Default)]
@@ -67,7 +67,7 @@ impl Trials {
         for limb in 0..poses.len() {
             explain(&context.model.body, limb, poses, &sample.points, nearest, distances);
         }
-        let stray = nearest.iter().zip(&sample.weights).filter(|(distance, _)| f64::from(**distance) > SEEN_PAST);
+        let stray = nearest.iter().zip(&sample.weights).filter(|(distance, _)| f64::from(**distance) > 2.0 * EXPLAINED);
         stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
     }
 

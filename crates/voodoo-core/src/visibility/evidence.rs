@@ -8,9 +8,10 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
-use crate::visibility::{ALONG_LIMB, LIMB_RIM, SEEN_PAST};
+use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 
-/// A point this far from the model's surface is not explained by it, metres.
+/// A point this far from the model's surface is not explained by it, metres; and a camera sees past the surface where the background
+/// lies so much behind it, or twice as much behind it what may be the body.
 pub const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
@@ -102,11 +103,21 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
 fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
     Some(match view.at(point) {
         Pixel::Unknown => return None,
-        Pixel::Background(z) if z > point.z + 0.5 * SEEN_PAST => Sight::FreeSpaceViolation,
-        Pixel::Foreground(z) | Pixel::Other(z) if z > point.z + SEEN_PAST => Sight::FreeSpaceViolation,
-        Pixel::Background(z) | Pixel::Foreground(z) | Pixel::Other(z) if z > point.z - SEEN_PAST => Sight::Consistent,
+        pixel if sees_past(pixel, point.z) => Sight::FreeSpaceViolation,
+        Pixel::Background(z) | Pixel::Foreground(z) | Pixel::Other(z) if z > point.z - 2.0 * EXPLAINED => {
+            Sight::Consistent
+        }
         _ => Sight::Occluded,
     })
+}
+
+/// Whether a pixel shows what lies behind a surface at this depth, metres.
+pub(super) fn sees_past(pixel: Pixel, surface: f64) -> bool {
+    match pixel {
+        Pixel::Background(z) => z > surface + EXPLAINED,
+        Pixel::Foreground(z) | Pixel::Other(z) => z > surface + 2.0 * EXPLAINED,
+        Pixel::Unknown => false,
+    }
 }
 
 /// Cost of the points that the pose leaves unexplained: `w min(d^2 / c^2, 1)` of every candidate.

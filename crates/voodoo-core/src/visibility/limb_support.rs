@@ -10,9 +10,9 @@ use crate::body::two_bone::TwoBone;
 use crate::math::Pose;
 use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
 use crate::shape::TaperedEllipticCylinder;
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::evidence::{EXPLAINED, sees_past};
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP, SEEN_PAST};
+use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};
 
 /// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
 /// of each.
@@ -98,8 +98,7 @@ fn support_seen_by(
                 continue;
             }
             match pixel {
-                Pixel::Background(z) if z > point.z + 0.5 * SEEN_PAST => count(&mut support.free_space),
-                Pixel::Foreground(z) | Pixel::Other(z) if z > point.z + SEEN_PAST => count(&mut support.free_space),
+                _ if sees_past(pixel, point.z) => count(&mut support.free_space),
                 Pixel::Foreground(z) if (z - point.z).abs() < EXPLAINED => {
                     let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
                     if !strangers.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {

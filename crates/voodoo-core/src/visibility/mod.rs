@@ -16,10 +16,8 @@ pub(crate) const LIMB_RIM: f64 = 0.6;
 pub(crate) const ALONG_LIMB: [f64; SECTIONS] = middles();
 /// Where they are across a limb, in shares of its radius from the middle: evenly.
 pub(crate) const ACROSS_LIMB: [f64; SECTIONS] = evenly();
-/// A camera sees past the model's surface when what may be the body lies this much behind it, metres; half as much of what is
-/// known to be the background, since that is not the body.
-pub(crate) const SEEN_PAST: f64 = 0.08;
-/// A smaller share of what a limb should show is little: it is idle that alone explains no more.
+/// A smaller share of anything is little: of what a limb should show, of what it may be seen past, of a body that is hidden, of how
+/// round it is.
 pub(crate) const LITTLE: f64 = 0.3;
 /// Fewer patches flicker: shares are of so many at least. As many points make a limb measured where there is no depth image.
 pub(crate) const FEW: f64 = 5.0;

@@ -6,10 +6,8 @@
 use crate::body::Body;
 use crate::math::Pose;
 use crate::observation::depth_view::{DepthViews, Pixel};
-use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, SEEN_PAST};
-
-/// Fewer places along limbs than this, of all cameras, say nothing.
-const FEWEST_SECTIONS: usize = 20;
+use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::{ACROSS_LIMB, ALONG_LIMB};
 
 /// By how much the seen surface falls away from the cameras between the middle of limbs and their rims, in units of what the
 /// model's does: about one on a body, zero on a plane; `None` when the images show too little of it.
@@ -17,7 +15,7 @@ const FEWEST_SECTIONS: usize = 20;
 /// The least-squares factor between both over all places where middle and rims are seen near the model. Half the sum of the
 /// two rims is taken, so that a limb that points towards the camera, or is seen aslant, falls away no more than another.
 pub fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> {
-    let (mut product, mut square, mut count) = (0.0, 0.0, 0);
+    let (mut product, mut square) = (0.0, 0.0);
     for view in views.iter() {
         let camera_from_working = view.working_from_camera.inverse();
         for (limb, pose) in body.limbs().iter().zip(poses) {
@@ -27,7 +25,7 @@ pub fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> 
                 let depths = |across: f64| {
                     let point = camera_from_limb * facing.point(across);
                     match view.at(point) {
-                        Pixel::Foreground(z) if (z - point.z).abs() < SEEN_PAST => Some([point.z, z]),
+                        Pixel::Foreground(z) if (z - point.z).abs() < 2.0 * EXPLAINED => Some([point.z, z]),
                         _ => None,
                     }
                 };
@@ -37,10 +35,9 @@ pub fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> 
                     let [expected, seen] = [0, 1].map(|kind| 0.5 * (left[kind] + right[kind]) - middle[kind]);
                     product += expected * seen;
                     square += expected * expected;
-                    count += 1;
                 }
             }
         }
     }
-    (count >= FEWEST_SECTIONS && square > 0.0).then(|| product / square)
+    (square > 0.0).then(|| product / square)
 }

@@ -22,8 +22,8 @@ use super::history::{Basis, History};
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
-/// Bends of an arm or leg about the line from its root to its end that are tried; twice as many where nothing seen has to agree
-/// with them.
+/// Bends of an arm or leg about the line from its root to its end that are tried, twice as many where nothing seen has to agree
+/// with them; and places of its end, at most, and directions of its upper limb: all cost time in proportion.
 pub const SWIVELS: usize = 6;
 
 /// Looks for one kind of other configuration of an arm or leg.

@@ -7,9 +7,6 @@ use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
 use crate::visibility::FEW;
 
-/// Places where the end is tried, at most: costs time in proportion.
-const MOST_ENDS: usize = 5;
-
 /// The end at the clusters that are farthest from the root and from each other.
 #[derive(Debug, Default)]
 pub(in crate::hypotheses) struct UnexplainedCluster {
@@ -38,12 +35,12 @@ impl Propose for UnexplainedCluster {
 }
 
 /// Where the end may be: middles of clusters, each as far as can be from the root and the others.
-fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; MOST_ENDS] {
+fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; SWIVELS] {
     let WeightedPoints { points, weights } = cluster;
     apart.clear();
     apart.extend((0..points.len()).map(|index| (points.get(index) - root).length() as f32));
-    let (mut ends, mut found) = ([None; MOST_ENDS], 0);
-    while found < MOST_ENDS {
+    let (mut ends, mut found) = ([None; SWIVELS], 0);
+    while found < SWIVELS {
         let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
         let place = points.get(next);
         if f64::from(apart[next]) < APART {
@@ -93,8 +90,8 @@ mod tests {
     #[test]
     fn nothing_is_proposed_without_points_or_beside_the_root() {
         let mut points = WeightedPoints::default();
-        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; MOST_ENDS]);
+        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; SWIVELS]);
         cluster(&mut points, Vec3::new(0.02, 0.0, 0.0), 30);
-        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; MOST_ENDS]);
+        assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; SWIVELS]);
     }
 }

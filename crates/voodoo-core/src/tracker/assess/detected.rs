@@ -18,15 +18,16 @@ pub(super) fn said_by_detection(
         let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
         let seen = detection.joint(&joint.name)?;
         let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
-        Some(said_by_joint(tracked.distance(seen.position), seen.sigma))
+        Some(said_by_joint(tracked - seen.position, seen.sigma))
     };
     limbs.into_iter().flatten().filter_map(apart).sum()
 }
 
-/// The same of a joint that a detector, with this standard deviation, sees so many metres away: of a right one the mean square is
-/// that of three axes. What is tracked is as near to the truth as points to the limb that explains them.
-fn said_by_joint(apart: f64, sigma: f64) -> f64 {
-    0.5 * (3.0 - apart * apart / (sigma * sigma + EXPLAINED * EXPLAINED))
+/// The same of a joint that a detector, with this standard deviation along each axis, sees aside, metres: of a right one the mean
+/// square is the variance. What is tracked is as near to the truth as points to the limb that explains them.
+fn said_by_joint(apart: Vec3, sigma: f64) -> f64 {
+    let variance = sigma * sigma + EXPLAINED * EXPLAINED;
+    apart.to_array().iter().map(|along| 0.5 * (1.0 - along * along / variance)).sum()
 }
 
 #[cfg(test)]

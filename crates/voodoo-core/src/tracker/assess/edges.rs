@@ -7,16 +7,12 @@ use crate::body::Model;
 use crate::body::two_bone::TwoBone;
 use crate::tracker::estimate::LimbStatus;
 use crate::uncertainty::Found;
+use crate::visibility::evidence::EXPLAINED;
 
-/// A limb is in doubt whose end is known less well, metres. Edges err alike: errors are about twice as large.
-const UNSURE: f64 = 0.05;
-/// Where a second opinion on a limb ends so far away, metres, it is as sure as by edges alone, and less so with the root of what is
-/// more.
-const USUAL: f64 = 0.03;
-
-/// How much less sure a limb is whose second opinion ends so many metres away, as a factor of its standard deviation.
+/// How much less sure a limb is whose second opinion ends so many metres away, as a factor of its standard deviation: where both agree
+/// as well as a point with the limb that explains it, as sure as by edges alone.
 fn doubted_by(apart: f64) -> f64 {
-    (apart / USUAL).sqrt()
+    (apart / EXPLAINED).sqrt()
 }
 
 impl Assessor {
@@ -41,8 +37,8 @@ impl Assessor {
             let support = correspondences.region_support.get(limb).copied();
             let RegionSupport { own, shown, .. } = support.unwrap_or_default();
             let sigma = edges.end_sigma(limb) * differs(limb).map_or(1.0, doubted_by);
-            // What speaks for all of a limb makes it surer by a factor of e.
-            *known = (sigma / UNSURE).ln() - own[0] * shown;
+            // To be known as well as a point is explained is enough. What speaks for all of a limb makes it surer by a factor of e.
+            *known = (sigma / EXPLAINED).ln() - own[0] * shown;
         }
     }
 

@@ -3,11 +3,8 @@
 use super::two_state::{EVEN, TwoState};
 use crate::math::Vec3;
 use crate::tracker::estimate::LimbStatus;
+use crate::visibility::LITTLE;
 
-/// Share of the patches facing a camera that it may see past.
-const CONTRADICTED: f64 = 0.3;
-/// A limb of which a smaller share shows is hidden.
-const SHOWN: f64 = 0.35;
 /// Share of the past frames in what is known of a limb's support.
 const MEMORY: f64 = 0.6;
 
@@ -67,9 +64,9 @@ impl LimbHistory {
     /// The status by what the limb alone explains.
     pub(super) fn supported(&self) -> LimbStatus {
         // What it alone explains has to be twice that at which images leave it open.
-        if self.exclusive >= 2.0 * EVEN && self.contradicted <= CONTRADICTED {
+        if self.exclusive >= 2.0 * EVEN && self.contradicted <= LITTLE {
             LimbStatus::Measured
-        } else if self.shown < SHOWN && self.contradicted <= CONTRADICTED {
+        } else if self.shown < LITTLE && self.contradicted <= LITTLE {
             LimbStatus::Inferred
         } else {
             LimbStatus::Lost
@@ -81,7 +78,7 @@ impl LimbHistory {
         match self.shows {
             None => supported,
             Some([whole, _]) if whole.holds() => LimbStatus::Measured,
-            Some(_) if self.contradicted > CONTRADICTED => LimbStatus::Lost,
+            Some(_) if self.contradicted > LITTLE => LimbStatus::Lost,
             Some(_) => LimbStatus::Inferred,
         }
     }

@@ -27,18 +27,17 @@ use crate::fit::{Context, Matched};
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 use crate::uncertainty::{ByEdges, Uncertainty};
-use crate::visibility::FEW;
 use crate::visibility::evidence::{EXPLAINED, limb_visibility};
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
+use crate::visibility::{FEW, LITTLE};
 use detected::said_by_detection;
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
 use two_state::{EVEN, all, either, said_by};
 
-/// What is less round is no body, and the share of the past frames in what is known of it: a blurred frame is no cupboard.
-const FLAT: f64 = 0.2;
+/// Share of the past frames in what is known of how round a body is: a blurred frame is no cupboard.
 const ROUNDNESS_MEMORY: f64 = 0.9;
 /// Of a tracked body no larger share of the limbs is not measured. One of which no larger share is measured is lost, and so is one of
 /// which less than twice that is where the root is not.
@@ -142,7 +141,7 @@ impl Assessor {
             let mixed = |before: f64| ROUNDNESS_MEMORY * before + (1.0 - ROUNDNESS_MEMORY) * now;
             self.round = Some(self.round.map_or(now, mixed));
         }
-        if self.round.is_some_and(|round| round < FLAT) {
+        if self.round.is_some_and(|round| round < LITTLE) {
             self.give_up();
         }
     }
