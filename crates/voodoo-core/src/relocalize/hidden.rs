@@ -9,7 +9,7 @@ use crate::visibility::LITTLE;
 
 /// What is so much nearer to a camera than a joint hides it, and than a body stands before it, metres: more than half of a body is
 /// thick.
-const IN_FRONT: f64 = 0.4;
+const IN_FRONT: f64 = 0.25;
 
 /// A body that is hidden, or was a moment ago.
 #[derive(Debug, Default)]
