@@ -109,7 +109,7 @@ impl Fit {
             self.solve(context, predicted, poses, step);
             steps += 1;
             if steps == context.config.max_steps && schedule.whole_body && is_unexpected(context, predicted, poses) {
-                most *= 2;
+                most += most / 2;
             }
             let settled = (before - distance).abs() < context.config.min_change;
             if settled && self.correspondences.regions.is_empty() || steps >= edges && context.pictures_alone() {
