@@ -11,7 +11,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """How the pose is found from the correspondences."""
     max_steps: int = 6
     """Greatest number of ICP steps in a frame (K07 section 7: 6 is a good compromise); half as many again where
-    a limb ends farther than `gate_end` from where it was expected. (range: 1 to 100)
+    limbs end farther than `gate_end` from where they were expected, in the mean. (range: 1 to 100)
     """
     min_change: float = 1e-07
     """The steps end when the mean squared distance changes by less than this (K06 III-B step 6). (unit: m^2;
