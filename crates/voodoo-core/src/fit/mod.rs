@@ -297,7 +297,7 @@ fn problem<'a>(
 }
 
 /// Whether the limbs end farther from where they were expected, in the mean, than points may lie from them at last: then the body
-/// may not be there yet. One limb alone may be drawn aside by what hides it; in the first frame nobody knows how it moves.
+/// may not be there yet. One limb alone may be drawn aside by what hides it.
 fn is_unexpected(context: Context, predicted: &[Pose], poses: &[Pose]) -> bool {
     let limbs = context.model.body.limbs().iter().zip(predicted.iter().zip(poses));
     let apart = |(limb, (expected, pose)): (&Limb, (&Pose, &Pose))| {
