@@ -177,7 +177,7 @@ fn weights(criterion: &mut Criterion) {
 }
 
 fn images(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("from depth image to estimate, 6 steps");
+    let mut group = criterion.benchmark_group("from depth image to estimate");
     for (model, limbs) in [(HumanModel::Papers, "ten limbs"), (HumanModel::Full, "eighteen limbs")] {
         let body = human(model);
         for (width, height, focal) in [(160, 124, 145.0), (640, 480, 560.0)] {

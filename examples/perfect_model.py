@@ -124,7 +124,7 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     true = voodoo.Body.human(height=HEIGHT, model="papers")
-    chain, limbwise = voodoo.Config(), voodoo.Config(solver="limbwise")
+    chain, limbwise = voodoo.Config(), voodoo.Config(solver="limbwise", max_steps=6)
     long = grown(true, thicker=1.10, longer=1.05)
     ways: dict[str, tuple[voodoo.Body, Start, voodoo.Config]] = {
         "perfect model, default": (true, exact_pose, chain),

@@ -100,7 +100,7 @@ class Body:
 
 class Config:
     def to_toml(self):
-        return "max_steps = 6\n"
+        return "max_steps = 5\n"
 
 
 def pose(joints, stamp=0.0, **fields):

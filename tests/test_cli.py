@@ -330,7 +330,7 @@ def test_eval_with_a_failure_still_reports_and_ends_with_1(run):
 
 
 def test_config_body_info_version(run):
-    assert run("config").stdout == "max_steps = 6\n"
+    assert run("config").stdout == "max_steps = 5\n"
     assert run("body", "--height", "1.6").stdout == "height_m = 1.6\n"
     assert "12 in 0.367 s" in run("info", "somewhere").stdout
     assert run("--version").stdout.startswith("voodoo ")

@@ -23,7 +23,7 @@ TOLERANCE = 0.005
 def tracked():
     """Joint positions by (frame, name) and mean distance to the truth over the whole recording."""
     recording = voodoo.open_recording(sample_path())
-    config = voodoo.Config(solver="limbwise")
+    config = voodoo.Config(solver="limbwise", max_steps=6)
     positions, errors = {}, []
     truth = recording.reference
     # A depth image and a scan whose points all weigh 1, as in the papers.

@@ -212,9 +212,8 @@ words! {
 config! {
     /// How the pose is found from the correspondences.
     solver: SolverKind = SolverKind::Chain, "";
-    /// Greatest number of ICP steps in a frame (K07 section 7: 6 is a good compromise); half as many again where limbs end farther
-    /// than `gate_end` from where they were expected, in the mean.
-    max_steps: usize = 6, "", 1 ..= 100;
+    /// Greatest number of ICP steps in a frame (K07 section 7: of the published ones 6 are a good compromise).
+    max_steps: usize = 5, "", 1 ..= 100;
     /// The steps end when the mean squared distance changes by less than this (K06 III-B step 6).
     min_change: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
     /// Enlargement of the box around the whole body; free points outside are background (K06 IV-B.1).

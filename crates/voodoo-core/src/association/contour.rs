@@ -2,7 +2,7 @@
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
-use crate::math::{Points, Pose, Vec3};
+use crate::math::{Points, Pose, Vec3, widest};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbours as well.
@@ -53,7 +53,11 @@ pub fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found:
     let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
         let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
         let search = ContourSearch { start, along, rim, thickness, reach };
-        if let Some((seen, place)) = search.edge(view) {
+        let edge = widest(
+            #[inline(always)]
+            || search.edge(view),
+        );
+        if let Some((seen, place)) = edge {
             found(Edge { side, rim, foot, seen, place: view.working_from_camera * place });
         }
     };
@@ -94,6 +98,7 @@ struct ContourSearch {
 impl ContourSearch {
     /// How far from the start the body ends, and the last place seen on it; `None` when another thing stands before it, when
     /// the image does not tell, or when no edge comes within reach.
+    #[inline(always)]
     fn edge(&self, view: &DepthView) -> Option<(f64, Vec3)> {
         let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
         let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
@@ -120,6 +125,7 @@ impl ContourSearch {
     }
 
     /// Where the body ends between a look at it, of which the depth is known, and one past it; and the last place seen on it.
+    #[inline(always)]
     fn halved(&self, view: &DepthView, (mut on, mut depth): (f64, f64), mut past: f64) -> (f64, Vec3) {
         for _ in 0..HALVINGS {
             let middle = 0.5 * (on + past);

@@ -14,10 +14,10 @@ use crate::association::assignment::{Assignment, match_limb};
 use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
-use crate::body::{Limb, Pair};
+use crate::body::Pair;
 use crate::config::Config;
 use crate::error::TrackError;
-use crate::math::{Pose, Vec3};
+use crate::math::Pose;
 use crate::regions;
 use crate::solver::{Gate, Problem, Reassociation, Schedule, Solver, WarmStartInput, solver};
 
@@ -95,22 +95,18 @@ impl Fit {
         self.warm_start(context, poses);
         let schedule = self.schedule(context.config);
         let edges = regions::steps(self.far);
-        let (mut steps, mut most) = (0, context.config.max_steps);
+        let most = if self.far { edges } else { context.config.max_steps };
+        let mut steps = 0;
         let mut before = f64::INFINITY;
         while steps < most {
-            // Steps beyond the usual ones are as the last two of those.
-            let step = steps - steps.saturating_sub(context.config.max_steps - 1).next_multiple_of(2);
-            if schedule.reassociates(step) {
-                self.match_all(context, poses, step);
+            if schedule.reassociates(steps) {
+                self.match_all(context, poses, steps);
             } else {
-                self.match_again(context, poses, step);
+                self.match_again(context, poses, steps);
             }
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
-            self.solve(context, predicted, poses, step);
+            self.solve(context, predicted, poses, steps);
             steps += 1;
-            if steps == context.config.max_steps && schedule.whole_body && is_unexpected(context, predicted, poses) {
-                most += most / 2;
-            }
             let settled = (before - distance).abs() < context.config.min_change;
             if settled && self.correspondences.regions.is_empty() || steps >= edges && context.pictures_alone() {
                 break;
@@ -294,17 +290,6 @@ fn problem<'a>(
     let Context { config, model, seen, time_scale, .. } = context;
     let floor = seen.floor();
     Problem { body: &model.body, correspondences, predicted, floor, step, time_scale, config }
-}
-
-/// Whether the limbs end farther from where they were expected, in the mean, than points may lie from them at last: then the body
-/// may not be there yet. One limb alone may be drawn aside by what hides it.
-fn is_unexpected(context: Context, predicted: &[Pose], poses: &[Pose]) -> bool {
-    let limbs = context.model.body.limbs().iter().zip(predicted.iter().zip(poses));
-    let apart = |(limb, (expected, pose)): (&Limb, (&Pose, &Pose))| {
-        let end = limb.shape.length() * Vec3::Z;
-        (*expected * end).distance(*pose * end)
-    };
-    limbs.map(apart).sum::<f64>() > poses.len() as f64 * context.config.gate_end
 }
 
 #[cfg(test)]

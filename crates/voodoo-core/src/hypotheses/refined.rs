@@ -8,7 +8,7 @@ use crate::association::correspondence::Correspondences;
 use crate::body::unusual;
 use crate::fit::{Context, Fit, Matched};
 use crate::math::Pose;
-use crate::regions::{Backdrop, Posed};
+use crate::regions::{self, Backdrop, Posed};
 
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
 pub const REFINE: usize = 8;
@@ -90,7 +90,7 @@ impl Refined {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.exchange(&mut self.matched);
-        let last = context.config.max_steps;
+        let last = if context.pictures_alone() { regions::steps(true) } else { context.config.max_steps };
         for step in 0..REFINE {
             let at = last.saturating_sub(REFINE - step);
             let here = if step < ROUGH_STEPS { context.roughly() } else { context };

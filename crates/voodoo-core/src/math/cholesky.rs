@@ -19,8 +19,17 @@ pub fn factor(h: &mut [f64], n: usize) -> bool {
     )
 }
 
-/// The second half, once for every right-hand side: `l` is what [`factor`] left.
-pub fn substitute(l: &[f64], b: &mut [f64], n: usize) -> bool {
+/// Half of the second half, for every right-hand side: `b` becomes `y` with `L^T y = b`, of what [`factor`] left as `l`. Of two
+/// of them `y_1^T y_2 = b_1^T h^-1 b_2`.
+pub fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
+    widest(
+        #[inline(always)]
+        || half_substitute_lanes(l, b, n),
+    );
+}
+
+/// The second half: `l` is what [`factor`] left.
+fn substitute(l: &[f64], b: &mut [f64], n: usize) -> bool {
     widest(
         #[inline(always)]
         || substitute_lanes(l, b, n),
@@ -53,14 +62,19 @@ fn factor_lanes(h: &mut [f64], n: usize) -> bool {
 }
 
 #[inline(always)]
-fn substitute_lanes(h: &[f64], b: &mut [f64], n: usize) -> bool {
+fn half_substitute_lanes(l: &[f64], b: &mut [f64], n: usize) {
     for k in (0..n).rev() {
-        let value = b[k] / h[k * n + k];
+        let value = b[k] / l[k * n + k];
         b[k] = value;
-        for (b, factor) in b[..k].iter_mut().zip(&h[k * n..]) {
+        for (b, factor) in b[..k].iter_mut().zip(&l[k * n..]) {
             *b -= factor * value;
         }
     }
+}
+
+#[inline(always)]
+fn substitute_lanes(h: &[f64], b: &mut [f64], n: usize) -> bool {
+    half_substitute_lanes(h, b, n);
     for k in 0..n {
         let (known, rest) = b.split_at_mut(k);
         let dot: f64 = known.iter().zip(&h[k * n..]).map(|(b, factor)| b * factor).sum();
@@ -89,6 +103,13 @@ mod tests {
         for (found, expected) in b.iter().zip(&x) {
             assert!((found - expected).abs() < 1e-8, "{b:?}");
         }
+        // `x^T h^-1 x` by halves.
+        let [mut whole, mut half] = [x.clone(), x.clone()];
+        assert!(solve_in_place(&mut h.clone(), &mut whole, n));
+        half_substitute(&copy, &mut half, n);
+        let expected: f64 = whole.iter().zip(&x).map(|(a, b)| a * b).sum();
+        let found: f64 = half.iter().map(|y| y * y).sum();
+        assert!((found - expected).abs() < 1e-9 * expected, "{found} for {expected}");
         h[3 * n + 3] = -1.0;
         assert!(!solve_in_place(&mut h, &mut b, n));
     }

@@ -7,7 +7,7 @@ mod simd;
 mod weighted_points;
 
 pub use absolute_orientation::Moments;
-pub use cholesky::{factor, solve_in_place, substitute};
+pub use cholesky::{factor, half_substitute, solve_in_place};
 pub use geometry::*;
 pub(crate) use simd::{LANES, has_avx512, widest};
 pub use weighted_points::WeightedPoints;

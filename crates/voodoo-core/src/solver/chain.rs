@@ -20,12 +20,12 @@ pub struct ChainSolver {
 }
 
 impl ChainSolver {
-    /// One damped step from the normal equations at `poses`; the joints come out exactly closed.
-    pub fn step(&mut self, body: &Body, normal: &NormalEquations, damping: f64, poses: &mut [Pose]) {
+    /// One damped step from the normal equations at `poses`, `stride` times as far; the joints come out exactly closed.
+    pub fn step(&mut self, body: &Body, normal: &NormalEquations, (damping, stride): (f64, f64), poses: &mut [Pose]) {
         self.chain.layout(body);
         self.assemble(body, normal, poses, damping);
         if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {
-            self.apply(body, poses);
+            self.apply(body, stride, poses);
         }
     }
 
@@ -83,14 +83,14 @@ impl ChainSolver {
         }
     }
 
-    fn apply(&mut self, body: &Body, poses: &mut [Pose]) {
+    fn apply(&mut self, body: &Body, stride: f64, poses: &mut [Pose]) {
         let Self { chain, step, .. } = self;
         let largest = step
             .iter()
             .enumerate()
             .filter(|(i, _)| !(3..6).contains(i))
             .fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
-        let shrink = (LARGEST_TURN / largest.max(LARGEST_TURN)).min(1.0);
+        let shrink = stride.min(LARGEST_TURN / largest.max(f64::MIN_POSITIVE));
         let part = |index: usize| shrink * step[index];
         let turns = |limb: usize| -> Vec3 {
             let start = chain.start[limb];

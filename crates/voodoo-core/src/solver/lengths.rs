@@ -5,8 +5,7 @@ use nalgebra::Vector6;
 use super::ChainSolver;
 use crate::body::kinematics::Chain;
 use crate::body::{Body, Pair};
-use crate::math::{Pose, Vec3};
-use crate::math::{factor, solve_in_place, substitute};
+use crate::math::{Pose, Vec3, factor, half_substitute, solve_in_place};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory.
@@ -14,8 +13,6 @@ use crate::terms::normal_equations::NormalEquations;
 pub struct Lengths {
     /// Mixed second derivatives, one row of all pose unknowns a pair.
     mixed: Vec<f64>,
-    h: Vec<f64>,
-    column: Vec<f64>,
     reduced: Vec<f64>,
     gradient: Vec<f64>,
 }
@@ -69,15 +66,13 @@ impl Lengths {
     ) {
         self.couple(solver, body, poses, pairs);
         let (n, count) = (solver.chain.freedoms, pairs.len());
-        let Self { mixed, column, reduced, .. } = self;
+        let Self { mixed, reduced, .. } = self;
         information.clear();
         for row in 0..count {
-            let own = &mixed[row * n..(row + 1) * n];
-            column.clear();
-            column.extend_from_slice(own);
-            let known = substitute(&solver.h, column, n);
-            let taken: f64 = own.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
-            information.push(if known { (reduced[row * count + row] - taken).max(0.0) } else { 0.0 });
+            let own = &mut mixed[row * n..(row + 1) * n];
+            half_substitute(&solver.h, own, n);
+            // A number that is none leaves no information.
+            information.push((reduced[row * count + row] - dot(own, own)).max(0.0));
         }
     }
 
@@ -127,28 +122,31 @@ impl Lengths {
     }
 
     /// Eliminates the pose's unknowns; false when their matrix is not positive definite.
-    fn eliminate(&mut self, solver: &ChainSolver, count: usize) -> bool {
+    fn eliminate(&mut self, solver: &mut ChainSolver, count: usize) -> bool {
         // `step` holds the negative gradient of the pose's unknowns.
         let ChainSolver { chain: Chain { freedoms: n, .. }, h, step, .. } = solver;
-        let (n, Self { mixed, h: copy, column, reduced, gradient }) = (*n, self);
-        copy.clone_from(h);
-        if !factor(copy, n) {
+        let (n, Self { mixed, reduced, gradient }) = (*n, self);
+        if !factor(h, n) {
             return false;
         }
+        // With `H = L^T L`, `b^T H^-1 c` is the product of what half of the substitution leaves of both.
+        half_substitute(h, step, n);
         for row in 0..count {
-            column.clear();
-            column.extend_from_slice(&mixed[row * n..(row + 1) * n]);
-            if !substitute(copy, column, n) {
-                return false;
+            half_substitute(h, &mut mixed[row * n..(row + 1) * n], n);
+            let own = &mixed[row * n..(row + 1) * n];
+            for other in 0..=row {
+                let taken = dot(own, &mixed[other * n..(other + 1) * n]);
+                reduced[row * count + other] -= taken;
             }
-            for other in 0..count {
-                let dot: f64 = mixed[other * n..(other + 1) * n].iter().zip(column.iter()).map(|(a, b)| a * b).sum();
-                reduced[row * count + other] -= dot;
-            }
-            gradient[row] += column.iter().zip(step.iter()).map(|(a, b)| a * b).sum::<f64>();
+            gradient[row] += dot(own, step);
         }
         true
     }
+}
+
+/// A sum of products.
+fn dot(left: &[f64], right: &[f64]) -> f64 {
+    left.iter().zip(right).map(|(left, right)| left * right).sum()
 }
 
 /// Whether a limb hangs on another, directly or not; parents come first.

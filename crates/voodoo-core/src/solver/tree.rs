@@ -26,15 +26,23 @@ pub struct TreeSolver {
 }
 
 impl TreeSolver {
-    /// One damped step from the normal equations at `poses`; `band_sigma` is a band's standard deviation, metres.
-    pub fn step(&mut self, body: &Body, normal: &NormalEquations, damping: f64, band_sigma: f64, poses: &mut [Pose]) {
+    /// One damped step from the normal equations at `poses`, `stride` times as far; `band_sigma` is a band's standard deviation,
+    /// metres.
+    pub fn step(
+        &mut self,
+        body: &Body,
+        normal: &NormalEquations,
+        (damping, stride): (f64, f64),
+        band_sigma: f64,
+        poses: &mut [Pose],
+    ) {
         self.assemble(body, normal, damping, 1.0 / (band_sigma * band_sigma), poses);
         if !self.solve() {
             return;
         }
         let turn = |twist: &Vector6<f64>| twist.fixed_rows::<3>(0).amax();
         let largest = self.twist.iter().map(turn).fold(0.0_f64, f64::max);
-        let shrink = LARGEST_TURN / largest.max(LARGEST_TURN);
+        let shrink = stride.min(LARGEST_TURN / largest.max(f64::MIN_POSITIVE));
         for (pose, twist) in poses.iter_mut().zip(&self.twist) {
             *pose = exp(&(twist * shrink)) * *pose;
             pose.rotation = pose.rotation.normalize();

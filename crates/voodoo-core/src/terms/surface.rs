@@ -110,15 +110,13 @@ impl Surface<'_> {
             row[1][l] = z[l] * nx[l] - x[l] * nz[l];
             row[2][l] = x[l] * ny[l] - y[l] * nx[l];
         }
-        let mut entry = 0;
-        for i in 0..6 {
-            add_product(&mut sums.gradient[i], &pull, &row[i]);
-            let scaled = product(&plane, &row[i]);
-            for other in &row[..=i] {
-                add_product(&mut sums.plane[entry], &scaled, other);
-                entry += 1;
-            }
-        }
+        // A row at a time: loops of one length each are unrolled, and their sums stay in registers.
+        sums.add_row::<0>(&row, &plane, &pull);
+        sums.add_row::<1>(&row, &plane, &pull);
+        sums.add_row::<2>(&row, &plane, &pull);
+        sums.add_row::<3>(&row, &plane, &pull);
+        sums.add_row::<4>(&row, &plane, &pull);
+        sums.add_row::<5>(&row, &plane, &pull);
         let (wx, wy, wz) = (product(&iso, &x), product(&iso, &y), product(&iso, &z));
         for (sum, values) in sums.iso.iter_mut().zip([&iso, &wx, &wy, &wz]) {
             for l in 0..LANES {
@@ -149,6 +147,19 @@ fn add_product(sum: &mut Lanes, left: &Lanes, right: &Lanes) {
 }
 
 impl Sums {
+    /// Adds what row `I` of the information and of the gradient gets of a block of points.
+    #[inline(always)]
+    fn add_row<const I: usize>(&mut self, row: &[Lanes; 6], plane: &Lanes, pull: &Lanes) {
+        add_product(&mut self.gradient[I], pull, &row[I]);
+        let scaled = product(plane, &row[I]);
+        let first = I * (I + 1) / 2;
+        for j in 0..6 {
+            if j <= I {
+                add_product(&mut self.plane[first + j], &scaled, &row[j]);
+            }
+        }
+    }
+
     /// Adds the sums to a limb's normal equations; returns the cost.
     fn add_to(&self, block: &mut LimbBlock) -> f64 {
         let total = |lanes: &Lanes| lanes.iter().map(|value| f64::from(*value)).sum::<f64>();
