@@ -9,9 +9,9 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
 
     solver: Literal["limbwise", "chain", "tree"] = "chain"
     """How the pose is found from the correspondences."""
-    max_steps: int = 6
-    """Greatest number of ICP steps in a frame (K07 section 7: 6 is a good compromise); half as many again where
-    limbs end farther than `gate_end` from where they were expected, in the mean. (range: 1 to 100)
+    max_steps: int = 5
+    """Greatest number of ICP steps in a frame (K07 section 7: of the published ones 6 are a good compromise).
+    (range: 1 to 100)
     """
     min_change: float = 1e-07
     """The steps end when the mean squared distance changes by less than this (K06 III-B step 6). (unit: m^2;

@@ -21,7 +21,7 @@ const STILL_FROM: usize = 3;
 /// Where points are measured, all steps of a frame but the last go so many times as far as the linear system says: closest points
 /// follow the body, so what they ask for is only a part of the way (P. Besl and N. McKay, "A Method for Registration of 3-D
 /// Shapes", IEEE PAMI 1992, whose accelerated steps go on along a line as well).
-const STRIDE: f64 = 1.4;
+const OVER_RELAXATION: f64 = 1.4;
 /// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
@@ -74,7 +74,7 @@ impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses, true);
         let follows = problem.step + 1 < problem.config.max_steps && !contours_alone(problem);
-        let stride = if follows { STRIDE } else { 1.0 };
+        let stride = if follows { OVER_RELAXATION } else { 1.0 };
         match &mut self.tree {
             Some(tree) => tree.step(problem.body, &self.normal, (DAMPING, stride), problem.config.band_sigma, poses),
             None => self.chain.step(problem.body, &self.normal, (DAMPING, stride), poses),
