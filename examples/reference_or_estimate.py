@@ -6,6 +6,9 @@ A reference skeleton is itself wrong at times. For every elbow, wrist, knee and 
 lag) the limb is put between the joints of the estimate and between those of the reference, and the depth image is asked at 25
 places on each: seen there and explained by no other arm, leg or trunk, less seen past, weighted with the distance from the upper
 joint, as the tracker does itself. With exact truth as reference the estimate should hardly ever win.
+
+Bones of a reference skeleton change their length: `--bones 0.1` leaves out arms and legs of which one of the reference's bones is
+more than a tenth longer or shorter than in the start that the tracker was given.
 """
 
 import argparse
@@ -77,8 +80,15 @@ def joints_of(recording, steps):
     return estimated, moved
 
 
-def judged(recording):
-    """(winner among GROUPS, off by [m], called measured) of every limb that is off."""
+def bones(joints):
+    """Lengths (2) [m] of the bones between three joints (3, 3)."""
+    return np.linalg.norm(np.diff(joints, axis=0), axis=1)
+
+
+def judged(recording, changed):
+    """(winner among GROUPS, off by [m], called measured) of every limb that is off, if no bone of the reference has `changed` by
+    more than this share since the start."""
+    start = recording.start["joints"]
     tracker = start_tracker(recording)
     settings = FrontEndSettings.of(recording, use=("depth",))
     steps = [(step, tracker.body) for step in track(recording, tracker, settings=settings)]
@@ -93,6 +103,9 @@ def judged(recording):
             joints = [metrics.JOINTS.index(f"{side}_{name}") for name in CHAINS[kind]]
             limbs = [f"{side}_{name}" for name in LIMBS[kind]]
             if not (error[joints[1:]] > LIMIT_EXACT_M).any() or not np.isfinite(error[joints]).all():
+                continue
+            known = bones([start[metrics.JOINTS[joint]] for joint in joints])
+            if (np.abs(bones(other[joints]) / known - 1.0) > changed).any():
                 continue
             # The body without this arm or leg, which is put behind the camera.
             poses = {name: np.array(pose) for name, pose in step.estimate.world_from_limb.items()}
@@ -118,13 +131,16 @@ def judged(recording):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", type=Path)
+    parser.add_argument(
+        "--bones", type=float, default=np.inf, metavar="SHARE", help="most that the reference's bones may change"
+    )
     options = parser.parse_args()
     found, told = Counter(), Counter()
     for path in options.recordings:
         recording = voodoo.open_recording(path)
         if recording.reference is None:
             raise SystemExit(f"{recording.name}: expected a recording with a reference or truth, found none")
-        for winner, error, measured in judged(recording):
+        for winner, error, measured in judged(recording, options.bones):
             for limit in (0.10, 0.15, 0.20):
                 found[winner, limit] += error > limit
                 told[winner, limit] += error > limit and not measured
