@@ -131,8 +131,8 @@ def written(mean: Array, precision: Array) -> str:
 
 
 def literal(value: float) -> str:
-    """Four digits, never an integer."""
-    text = f"{round(value, 5):.4g}"
+    """Four digits, never an integer, and no negative zero: which it is hangs on the processor."""
+    text = f"{round(value, 5) + 0.0:.4g}"
     return text if "." in text or "e" in text else text + ".0"
 
 
