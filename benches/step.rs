@@ -32,7 +32,8 @@ impl Bench<'_> {
     fn frame(&mut self) -> usize {
         let (clouds, images) = self.instants[self.frames % 2];
         self.frames += 1;
-        let frame = Frame { clouds, images, ..Frame::empty(self.frames as f64) };
+        // As often as a camera measures: a detector looks by time.
+        let frame = Frame { clouds, images, ..Frame::empty(self.frames as f64 / 30.0) };
         black_box(self.tracker.step(&frame).unwrap()).steps
     }
 
