@@ -95,6 +95,7 @@ impl Fit {
         self.warm_start(context, poses);
         let schedule = self.schedule(context.config);
         let edges = regions::steps(self.far);
+        // What is looked for far away is a hypothesis, and takes the steps of its searches.
         let most = if self.far { edges } else { context.config.max_steps };
         let mut steps = 0;
         let mut before = f64::INFINITY;

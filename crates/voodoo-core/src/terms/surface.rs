@@ -110,7 +110,7 @@ impl Surface<'_> {
             row[1][l] = z[l] * nx[l] - x[l] * nz[l];
             row[2][l] = x[l] * ny[l] - y[l] * nx[l];
         }
-        // A row at a time: loops of one length each are unrolled, and their sums stay in registers.
+        // A row at a time: loops of one length each are unrolled as a whole.
         sums.add_row::<0>(&row, &plane, &pull);
         sums.add_row::<1>(&row, &plane, &pull);
         sums.add_row::<2>(&row, &plane, &pull);
