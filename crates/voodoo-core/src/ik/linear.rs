@@ -1,6 +1,6 @@
 //! Row vectors: damped pseudo-inverse and null spaces, without heap after the first use.
 
-use crate::math::solve_in_place;
+use crate::math::{dot, solve_in_place};
 
 /// A row that keeps less than this share of the longest one depends on those before it.
 const RANK: f64 = 1e-9;
@@ -67,10 +67,6 @@ fn orthogonalise(basis: &[f64], row: &mut [f64]) {
             row.iter_mut().zip(q).for_each(|(value, q)| *value -= along * q);
         }
     }
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 pub(super) fn largest(values: &[f64]) -> f64 {

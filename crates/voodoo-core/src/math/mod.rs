@@ -11,3 +11,8 @@ pub use cholesky::{factor, half_substitute, solve_in_place};
 pub use geometry::*;
 pub(crate) use simd::{LANES, has_avx512, widest};
 pub use weighted_points::WeightedPoints;
+
+/// The sum of the products of two rows.
+pub fn dot(left: &[f64], right: &[f64]) -> f64 {
+    left.iter().zip(right).map(|(left, right)| left * right).sum()
+}

@@ -21,7 +21,7 @@ pub struct ChainSolver {
 
 impl ChainSolver {
     /// One damped step from the normal equations at `poses`, `stride` times as far; the joints come out exactly closed.
-    pub fn step(&mut self, body: &Body, normal: &NormalEquations, (damping, stride): (f64, f64), poses: &mut [Pose]) {
+    pub fn step(&mut self, body: &Body, normal: &NormalEquations, damping: f64, stride: f64, poses: &mut [Pose]) {
         self.chain.layout(body);
         self.assemble(body, normal, poses, damping);
         if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {

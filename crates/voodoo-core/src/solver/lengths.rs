@@ -5,7 +5,7 @@ use nalgebra::Vector6;
 use super::ChainSolver;
 use crate::body::kinematics::Chain;
 use crate::body::{Body, Pair};
-use crate::math::{Pose, Vec3, factor, half_substitute, solve_in_place};
+use crate::math::{Pose, Vec3, dot, factor, half_substitute, solve_in_place};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory.
@@ -142,11 +142,6 @@ impl Lengths {
         }
         true
     }
-}
-
-/// A sum of products.
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
 }
 
 /// Whether a limb hangs on another, directly or not; parents come first.

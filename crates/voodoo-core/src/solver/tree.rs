@@ -32,7 +32,8 @@ impl TreeSolver {
         &mut self,
         body: &Body,
         normal: &NormalEquations,
-        (damping, stride): (f64, f64),
+        damping: f64,
+        stride: f64,
         band_sigma: f64,
         poses: &mut [Pose],
     ) {

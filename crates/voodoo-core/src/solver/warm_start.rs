@@ -100,7 +100,7 @@ impl WarmStart {
             term.add(body, &self.closed, &mut self.normal);
         }
         self.before.clone_from(&self.closed);
-        self.chain.step(body, &self.normal, (DAMPING, 1.0), &mut self.closed);
+        self.chain.step(body, &self.normal, DAMPING, 1.0, &mut self.closed);
         // The others stay where they were.
         self.moved.clone_from(&self.closed);
         for (limb, part) in body.limbs().iter().enumerate() {

@@ -76,8 +76,8 @@ impl Solver for WholeBody {
         let follows = problem.step + 1 < problem.config.max_steps && !contours_alone(problem);
         let stride = if follows { OVER_RELAXATION } else { 1.0 };
         match &mut self.tree {
-            Some(tree) => tree.step(problem.body, &self.normal, (DAMPING, stride), problem.config.band_sigma, poses),
-            None => self.chain.step(problem.body, &self.normal, (DAMPING, stride), poses),
+            Some(tree) => tree.step(problem.body, &self.normal, DAMPING, stride, problem.config.band_sigma, poses),
+            None => self.chain.step(problem.body, &self.normal, DAMPING, stride, poses),
         }
     }
 

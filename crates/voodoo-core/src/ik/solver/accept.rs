@@ -1,7 +1,7 @@
 //! What of a step is taken: no level may become worse than those above it must make it.
 
-use super::super::linear::dot;
 use super::{Problem, SETTLED, Solver};
+use crate::math::dot;
 
 impl Solver {
     /// Takes the whole step, or as much of it as leaves no level worse than those above it must make it.

@@ -1,8 +1,9 @@
 //! One step: the parts of all levels and of the image, each within the limits.
 
 use super::super::goal::level_rows;
-use super::super::linear::{dot, largest};
+use super::super::linear::largest;
 use super::{Problem, Solver};
+use crate::math::dot;
 
 /// Least damping, m^2: small beside `J J^T` of anything a person can see, so that the last steps are Newton's.
 const LEAST_DAMPING: f64 = 1e-10;
