@@ -1,5 +1,6 @@
 //! Steps 2-4: which candidate belongs to which limb, fewer of them, and the closest points (K06 IV-B.2-4).
 
+use crate::association::buried::Buried;
 use crate::association::correspondence::LimbMatches;
 use crate::association::nearest_limb::{NONE, Nearest};
 use crate::body::{Body, Limb};
@@ -14,6 +15,7 @@ pub struct Assignment {
     /// Candidates of each limb, ascending.
     members: Vec<Vec<u32>>,
     search: Nearest,
+    buried: Buried,
     /// The nearest limb of each candidate.
     nearest: Vec<u32>,
     /// Which limbs' boxes hold each candidate, where the policy asks for it.
@@ -23,7 +25,7 @@ pub struct Assignment {
 impl Assignment {
     /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
     pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, overlap: Overlap, box_margin: f64) {
-        let Self { members, search, nearest, inside } = self;
+        let Self { members, search, buried, nearest, inside } = self;
         // One more for those in no limb's box.
         members.resize_with(poses.len() + 1, Vec::new);
         for limb in members.iter_mut() {
@@ -33,7 +35,8 @@ impl Assignment {
         }
         nearest.resize(candidates.len(), NONE);
         inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
-        search.find(body, poses, box_margin, &candidates.clusters, nearest, inside);
+        search.place(body, poses, box_margin, buried.find(body, poses));
+        search.find(&candidates.clusters, nearest, inside);
         if overlap == Overlap::Exclusive {
             let count = candidates.len();
             let (nearest, known) = (&nearest[..count], &candidates.limb[..count]);

@@ -32,22 +32,21 @@ pub struct Nearest {
 }
 
 impl Nearest {
-    /// The nearest limb of every point, or [`NONE`], into `nearest`; the limbs' boxes are enlarged by `margin`.
-    ///
-    /// `inside` gets for every point and limb whether the limb's box holds it, if it has room for that; otherwise it is empty.
-    pub fn find(
-        &mut self,
-        body: &Body,
-        poses: &[Pose],
-        margin: f64,
-        clusters: &Clusters,
-        nearest: &mut [u32],
-        inside: &mut [bool],
-    ) {
+    /// Puts the limbs where they are, their boxes enlarged by `margin`; those that are `buried` hold no point.
+    pub fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
         self.limbs.clear();
-        self.limbs.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
+        self.limbs.extend(body.limbs().iter().zip(poses).zip(buried).map(|((limb, pose), buried)| {
+            let open = LimbBox::new(limb, pose, margin);
+            if *buried { LimbBox { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], ..open } } else { open }
+        }));
         self.groups.clear();
         self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
+    }
+
+    /// The nearest limb of every point, or [`NONE`], into `nearest`.
+    ///
+    /// `inside` gets for every point and limb whether the limb's box holds it, if it has room for that; otherwise it is empty.
+    pub fn find(&mut self, clusters: &Clusters, nearest: &mut [u32], inside: &mut [bool]) {
         self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
         self.expected.resize(clusters.iter().len(), [0; 2]);
         widest(
@@ -320,9 +319,10 @@ mod tests {
             let points = around(seed);
             clusters.arrange(&points);
             let (mut quick, mut thorough) = (vec![NONE; points.len()], vec![NONE; points.len()]);
-            search.find(&body, &poses, margin, &clusters, &mut quick, &mut []);
+            search.place(&body, &poses, margin, &vec![false; poses.len()]);
+            search.find(&clusters, &mut quick, &mut []);
             let mut inside = vec![false; points.len() * poses.len()];
-            search.find(&body, &poses, margin, &clusters, &mut thorough, &mut inside);
+            search.find(&clusters, &mut thorough, &mut inside);
             assert_eq!(quick, thorough);
             let mut found = 0;
             for (index, nearest) in quick.iter().enumerate() {

@@ -8,6 +8,7 @@ pub mod kinematics;
 mod model;
 mod pose_prior;
 mod pose_statistics;
+pub(crate) mod shoulders;
 pub mod two_bone;
 
 pub use edit::Pair;
@@ -91,6 +92,12 @@ impl Body {
         let joins =
             |child: usize, parent: usize| self.limbs[child].parent.as_ref().is_some_and(|(index, _)| *index == parent);
         joins(first, second) || joins(second, first)
+    }
+
+    /// True when two limbs are neither joined nor joined to the same parent: others overlap at their joints in any pose.
+    pub fn apart(&self, first: usize, second: usize) -> bool {
+        let parent = |limb: usize| self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
+        first != second && !self.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
     }
 
     /// The limbs that hang on a limb.

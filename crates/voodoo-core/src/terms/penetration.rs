@@ -27,7 +27,7 @@ impl Term for Penetration<'_> {
         let limbs = body.limbs();
         for first in 1..limbs.len() {
             for second in 0..first {
-                if meet(self.spheres[first], self.spheres[second]) && apart(body, first, second) {
+                if meet(self.spheres[first], self.spheres[second]) && body.apart(first, second) {
                     self.add_points(body, poses, [first, second], normal);
                     self.add_points(body, poses, [second, first], normal);
                 }
@@ -62,12 +62,6 @@ impl Penetration<'_> {
             normal.limbs[other].add_row(weight, &row, overlap);
         }
     }
-}
-
-/// True when two limbs are neither joined nor joined to the same parent.
-fn apart(body: &Body, first: usize, second: usize) -> bool {
-    let parent = |limb: usize| body.limbs()[limb].parent.as_ref().map(|(parent, _)| *parent);
-    !body.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
 }
 
 /// Whether a point, limb frame, lies outside the box around the shape.

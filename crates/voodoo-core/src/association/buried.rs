@@ -1,0 +1,81 @@
+//! Limbs inside others: no camera sees them, so that no point belongs to them.
+//!
+//! The surface of an arm that has slipped into the chest comes as near to the chest's points as the chest's own does: they hold it
+//! there.
+
+use crate::body::Body;
+use crate::math::{Pose, Vec3};
+
+/// Places on a limb's axis, as shares of its length.
+const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+/// A place that lies so deep in another limb is inside it, metres: limbs are soft, and thinner or thicker than their models.
+const DEEP: f64 = 0.03;
+
+/// Which limbs of a body lie inside others.
+#[derive(Debug, Default)]
+pub struct Buried {
+    limbs: Vec<bool>,
+    /// A sphere around each limb.
+    spheres: Vec<(Vec3, f64)>,
+}
+
+impl Buried {
+    /// Finds the limbs most of whose axis lies inside other limbs; those that are joined, or joined to the same parent, overlap in
+    /// any pose.
+    pub fn find(&mut self, body: &Body, poses: &[Pose]) -> &[bool] {
+        let Self { limbs, spheres } = self;
+        let parts = body.limbs();
+        spheres.clear();
+        spheres.extend(parts.iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
+        limbs.clear();
+        limbs.extend((0..poses.len()).map(|limb| {
+            let inside = |share: &&f64| {
+                let place = poses[limb] * (**share * parts[limb].shape.length() * Vec3::Z);
+                (0..poses.len()).any(|other| {
+                    let (middle, reach) = spheres[other];
+                    let depth =
+                        || -parts[other].shape.approximate_distance(poses[other].inverse_transform_point(place));
+                    (place - middle).length_squared() < reach * reach && body.apart(limb, other) && depth() > DEEP
+                })
+            };
+            2 * ALONG.iter().filter(inside).count() > ALONG.len()
+        }));
+        limbs
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::math::Quat;
+    use crate::testing::standing;
+
+    /// Names of the limbs that lie inside others.
+    fn buried<'a>(body: &'a Body, poses: &[Pose]) -> Vec<&'a str> {
+        let mut buried = Buried::default();
+        let found = buried.find(body, poses).iter().zip(body.limbs());
+        found.filter(|(inside, _)| **inside).map(|(_, limb)| limb.name.as_str()).collect()
+    }
+
+    #[test]
+    fn a_forearm_within_the_trunk_is_inside_it_and_one_that_lies_on_it_is_not() {
+        let (model, poses) = standing();
+        let body = &model.body;
+        assert!(buried(body, &poses).is_empty(), "limbs that are joined overlap");
+        let [forearm, hand, trunk] = ["l_forearm", "l_hand", "thorax"].map(|name| body.limb_index(name).unwrap());
+        let front = body.limbs()[trunk].shape.a0();
+        // Across the trunk's axis, in half of its height, so far in front of it.
+        let across = |ahead: f64| {
+            let mut poses = poses.clone();
+            let length = body.limbs()[forearm].shape.length();
+            let turn = poses[trunk].rotation * Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+            let start = Vec3::new(ahead, 0.5 * length, 0.5 * body.limbs()[trunk].shape.length());
+            poses[forearm] = Pose::from_parts(poses[trunk] * start, turn);
+            poses[hand] = poses[forearm] * Pose::from_parts(Vec3::Z * length, Quat::IDENTITY);
+            poses
+        };
+        assert_eq!(buried(body, &across(0.0)), ["l_forearm"]);
+        assert!(buried(body, &across(front)).is_empty() && buried(body, &across(front + 0.04)).is_empty());
+    }
+}
