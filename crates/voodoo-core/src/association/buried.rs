@@ -9,7 +9,7 @@ use crate::math::{Pose, Vec3};
 /// Places on a limb's axis, as shares of its length.
 const ON_AXIS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// A place that lies so deep in another limb is inside it, metres: limbs are soft, and thinner or thicker than their models.
-const DEEP: f64 = 0.02;
+const DEEP: f64 = 0.03;
 
 /// Which limbs of a body lie inside others.
 #[derive(Debug, Default)]

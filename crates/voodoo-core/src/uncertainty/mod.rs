@@ -25,7 +25,7 @@ use crate::terms::{Contour, Regions, Sites, Surface, Term};
 /// So many surface points a metre of limb err independently at most.
 const PATCHES_PER_METRE: f64 = 50.0;
 /// Share of what is measured of a limb that counts where the frame does not prove the limb right.
-const UNPROVEN: f64 = 0.016;
+const UNPROVEN: f64 = 0.012;
 /// Unexpected motion of a joint in 1/30 s, as a share of what its `motion` allows.
 const USUAL_MOTION: f64 = 0.35;
 /// Standard deviation of an unknown at most: radians of a turn, metres of the root's place.
