@@ -8,12 +8,14 @@ places on each: seen there and explained by no other arm, leg or trunk, less see
 joint, as the tracker does itself. With exact truth as reference the estimate should hardly ever win.
 
 Bones of a reference skeleton change their length: `--bones 0.1` leaves out arms and legs of which one of the reference's bones is
-more than a tenth longer or shorter than in the start that the tracker was given.
+more than a tenth longer or shorter than in the start that the tracker was given, `--consistent` what contradicts itself, as
+`voodoo eval` does. `--whole` asks both limbs of an arm or leg, `--offsets` takes each joint's constant offset off.
 """
 
 import argparse
 import itertools
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +37,23 @@ NEAR_M, PAST_M, BEFORE_M = 0.04, 0.08, 0.01
 CLEARLY = 0.1
 """A difference of shares that is more than chance."""
 GROUPS = ("the estimate", "neither", "the reference")
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What counts as off, and who explains it.
+
+    Args:
+        bones: most that the reference's bones may have changed since the start, as a share.
+        consistent: without joints of the reference whose bone is far off its median.
+        whole: an arm or leg is asked as a whole.
+        offsets: without each joint's constant offset from the reference.
+    """
+
+    bones: float = np.inf
+    consistent: bool = False
+    whole: bool = False
+    offsets: bool = False
 
 
 def net(ends, shape, depth, others, camera, cut_out):
@@ -85,14 +104,25 @@ def bones(joints):
     return np.linalg.norm(np.diff(joints, axis=0), axis=1)
 
 
-def judged(recording, changed):
-    """(winner among GROUPS, off by [m], called measured) of every limb that is off, if no bone of the reference has `changed` by
-    more than this share since the start."""
+def limb_nets(limb, both, body, cut):
+    """What speaks for a limb (net) between each of two pairs of joints, world frame."""
+    shape = body.limbs[body.limb_names.index(limb)].shape
+    camera_from_root, depth, others, camera, cut_out = cut
+    seen = [points @ camera_from_root[:3, :3].T + camera_from_root[:3, 3] for points in both]
+    return np.array([net(ends, shape, depth, others, camera, cut_out) for ends in seen])
+
+
+def judged(recording, by):
+    """(winner among GROUPS, off by [m], called measured) of every limb that is off."""
     start = recording.start["joints"]
     tracker = start_tracker(recording)
     settings = FrontEndSettings.of(recording, use=("depth",))
     steps = [(step, tracker.body) for step in track(recording, tracker, settings=settings)]
     estimated, reference = joints_of(recording, steps)
+    if by.consistent and not recording.reference.exact:
+        reference = metrics.without_contradictions(reference)
+    if by.offsets:
+        reference = reference + np.nanmean(estimated - reference, axis=0)
     errors = np.linalg.norm(estimated - reference, axis=2)
     cut_out = select_by(recording) == "segmented"
     for (step, body), mine, other, error in zip(steps, estimated, reference, errors, strict=True):
@@ -105,27 +135,25 @@ def judged(recording, changed):
             if not (error[joints[1:]] > LIMIT_EXACT_M).any() or not np.isfinite(error[joints]).all():
                 continue
             known = bones([start[metrics.JOINTS[joint]] for joint in joints])
-            if (np.abs(bones(other[joints]) / known - 1.0) > changed).any():
+            if (np.abs(bones(other[joints]) / known - 1.0) > by.bones).any():
                 continue
             # The body without this arm or leg, which is put behind the camera.
             poses = {name: np.array(pose) for name, pose in step.estimate.world_from_limb.items()}
             for name in limbs:
                 poses[name][:3, 3] -= 50.0 * image.root_from_sensor[:3, 2]
             others = render_depth(body, poses, camera=image.camera, world_from_sensor=image.root_from_sensor).depth
+            cut = (camera_from_root, depth, others, image.camera, cut_out)
+            nets = [
+                limb_nets(limbs[which], (mine[joints[which : which + 2]], other[joints[which : which + 2]]), body, cut)
+                for which in (0, 1)
+            ]
             for which in (1, 2):
                 if error[joints[which]] <= LIMIT_EXACT_M:
                     continue
-                limb = limbs[which - 1]
-                ends = joints[which - 1 : which + 1]
-                shape = body.limbs[body.limb_names.index(limb)].shape
-                nets = [
-                    net(points[ends] @ camera_from_root[:3, :3].T + camera_from_root[:3, 3], shape, depth, others,
-                        image.camera, cut_out)
-                    for points in (mine, other)
-                ]  # fmt: skip
-                better = nets[0] - nets[1]
+                own, its = np.mean(nets, axis=0) if by.whole else nets[which - 1]
+                better = own - its
                 winner = GROUPS[0] if better > CLEARLY else GROUPS[2] if better < -CLEARLY else GROUPS[1]
-                yield winner, error[joints[which]], step.estimate.limb_status[limb] == "measured"
+                yield winner, error[joints[which]], step.estimate.limb_status[limbs[which - 1]] == "measured"
 
 
 def main() -> None:
@@ -134,13 +162,17 @@ def main() -> None:
     parser.add_argument(
         "--bones", type=float, default=np.inf, metavar="SHARE", help="most that the reference's bones may change"
     )
+    parser.add_argument("--consistent", action="store_true", help="without what contradicts itself in the reference")
+    parser.add_argument("--whole", action="store_true", help="ask an arm or leg as a whole")
+    parser.add_argument("--offsets", action="store_true", help="without each joint's constant offset")
     options = parser.parse_args()
+    by = Judged(options.bones, options.consistent, options.whole, options.offsets)
     found, told = Counter(), Counter()
     for path in options.recordings:
         recording = voodoo.open_recording(path)
         if recording.reference is None:
             raise SystemExit(f"{recording.name}: expected a recording with a reference or truth, found none")
-        for winner, error, measured in judged(recording, options.bones):
+        for winner, error, measured in judged(recording, by):
             for limit in (0.10, 0.15, 0.20):
                 found[winner, limit] += error > limit
                 told[winner, limit] += error > limit and not measured
