@@ -1,6 +1,5 @@
 //! Steps 2-4: which candidate belongs to which limb, fewer of them, and the closest points (K06 IV-B.2-4).
 
-use crate::association::buried::Buried;
 use crate::association::correspondence::LimbMatches;
 use crate::association::nearest_limb::{NONE, Nearest};
 use crate::body::{Body, Limb};
@@ -15,7 +14,6 @@ pub struct Assignment {
     /// Candidates of each limb, ascending.
     members: Vec<Vec<u32>>,
     search: Nearest,
-    buried: Buried,
     /// The nearest limb of each candidate.
     nearest: Vec<u32>,
     /// Which limbs' boxes hold each candidate, where the policy asks for it.
@@ -23,9 +21,18 @@ pub struct Assignment {
 }
 
 impl Assignment {
-    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
-    pub fn assign(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates, overlap: Overlap, box_margin: f64) {
-        let Self { members, search, buried, nearest, inside } = self;
+    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; those of `buried` limbs to
+    /// others.
+    pub fn assign(
+        &mut self,
+        body: &Body,
+        poses: &[Pose],
+        candidates: &Candidates,
+        overlap: Overlap,
+        box_margin: f64,
+        buried: &[bool],
+    ) {
+        let Self { members, search, nearest, inside } = self;
         // One more for those in no limb's box.
         members.resize_with(poses.len() + 1, Vec::new);
         for limb in members.iter_mut() {
@@ -35,7 +42,7 @@ impl Assignment {
         }
         nearest.resize(candidates.len(), NONE);
         inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
-        search.place(body, poses, box_margin, buried.find(body, poses));
+        search.place(body, poses, box_margin, buried);
         search.find(&candidates.clusters, nearest, inside);
         if overlap == Overlap::Exclusive {
             let count = candidates.len();
@@ -172,7 +179,7 @@ mod tests {
     fn holders(overlap: Overlap) -> (Body, Vec<Pose>, Candidates, Vec<Vec<usize>>) {
         let (body, poses, candidates) = scene();
         let mut assignment = Assignment::default();
-        assignment.assign(&body, &poses, &candidates, overlap, MARGIN);
+        assignment.assign(&body, &poses, &candidates, overlap, MARGIN, &[]);
         let mut holders = vec![Vec::new(); candidates.len()];
         for (limb, members) in assignment.members[..poses.len()].iter().enumerate() {
             assert!(members.is_sorted_by(|a, b| a < b), "ascending, none twice");

@@ -5,7 +5,7 @@
 //! 4.3) are `landmarks`. `contour` adds the rims of limbs. All of them end in `correspondence`, which is all that solvers see.
 
 pub mod assignment;
-mod buried;
+pub(crate) mod buried;
 pub mod contour;
 pub mod correspondence;
 pub(crate) mod landmarks;

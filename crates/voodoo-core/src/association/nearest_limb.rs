@@ -32,12 +32,16 @@ pub struct Nearest {
 }
 
 impl Nearest {
-    /// Puts the limbs where they are, their boxes enlarged by `margin`; those that are `buried` hold no point.
+    /// Puts the limbs where they are, their boxes enlarged by `margin`; those that are `buried` hold no point. Empty: none is.
     pub fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
         self.limbs.clear();
-        self.limbs.extend(body.limbs().iter().zip(poses).zip(buried).map(|((limb, pose), buried)| {
+        self.limbs.extend(body.limbs().iter().zip(poses).enumerate().map(|(index, (limb, pose))| {
             let open = LimbBox::new(limb, pose, margin);
-            if *buried { LimbBox { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], ..open } } else { open }
+            if buried.get(index) == Some(&true) {
+                LimbBox { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], ..open }
+            } else {
+                open
+            }
         }));
         self.groups.clear();
         self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
@@ -319,7 +323,7 @@ mod tests {
             let points = around(seed);
             clusters.arrange(&points);
             let (mut quick, mut thorough) = (vec![NONE; points.len()], vec![NONE; points.len()]);
-            search.place(&body, &poses, margin, &vec![false; poses.len()]);
+            search.place(&body, &poses, margin, &[]);
             search.find(&clusters, &mut quick, &mut []);
             let mut inside = vec![false; points.len() * poses.len()];
             search.find(&clusters, &mut thorough, &mut inside);

@@ -11,6 +11,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::association::assignment::{Assignment, match_limb};
+use crate::association::buried::Buried;
 use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
@@ -29,6 +30,7 @@ pub const CONTOUR_FROM: usize = 2;
 pub struct Fit {
     solver: Box<dyn Solver>,
     assignment: Assignment,
+    buried: Buried,
     correspondences: Correspondences,
     contours: Contours,
     regions: regions::Regions,
@@ -50,6 +52,7 @@ impl Fit {
         Ok(Self {
             solver: solver(config.solver),
             assignment: Assignment::default(),
+            buried: Buried::default(),
             correspondences: Correspondences::default(),
             contours: Contours::default(),
             regions: regions::Regions::default(),
@@ -238,7 +241,9 @@ impl Fit {
 
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         let Context { config, model, seen, .. } = context;
-        self.assignment.assign(&model.body, poses, seen.candidates, config.overlap, gate.box_margin);
+        // The published solver takes points wherever its limbs are.
+        let buried = if self.schedule(config).whole_body { self.buried.find(&model.body, poses) } else { &[] };
+        self.assignment.assign(&model.body, poses, seen.candidates, config.overlap, gate.box_margin, buried);
     }
 
     fn find_contour(&mut self, context: Context, poses: &[Pose]) {
