@@ -21,7 +21,11 @@ pub fn raise_shoulders(body: &Body, previous: &[Pose], current: &[Pose], predict
     let limbs = body.limbs();
     let mut raised = false;
     for (arm, limb) in limbs.iter().enumerate() {
-        let Some((clavicle, shoulder)) = &limb.parent else { continue };
+        // What else somebody has hung on a clavicle is no arm.
+        let Some((clavicle, shoulder)) = limb.parent.as_ref().filter(|(_, joint)| joint.name.ends_with("shoulder"))
+        else {
+            continue;
+        };
         let Some((trunk, joint)) = limbs[*clavicle].parent.as_ref().filter(|(_, joint)| carries_shoulder(joint)) else {
             continue;
         };
