@@ -6,9 +6,9 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use voodoo_core::observation::body_view::{Beside, BodyView, Matrix, StillDepth};
 use voodoo_core::observation::frame::DepthPixels;
-use voodoo_core::observation::registration::Labels;
+use voodoo_sensors::body_view::{Beside, BodyView, Matrix, StillDepth};
+use voodoo_sensors::registration::Labels;
 
 use crate::arrays::contiguous;
 use crate::errors::{IntoPy, exception, wrong_argument};

@@ -4,8 +4,8 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use voodoo_core::observation::chroma;
-use voodoo_core::observation::mask_regions::{Region, SkinPicture, joined, regions};
+use voodoo_sensors::chroma;
+use voodoo_sensors::mask_regions::{Region, SkinPicture, joined, regions};
 
 use crate::errors::{IntoPy, exception};
 

@@ -5,8 +5,8 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use voodoo_core::error::TrackError;
-use voodoo_core::observation::registration::{MeasuredPixels, ProjectedPoints};
-use voodoo_core::observation::window::Window;
+use voodoo_sensors::registration::{MeasuredPixels, ProjectedPoints};
+use voodoo_sensors::window::Window;
 
 use crate::errors::{IntoPy, exception};
 

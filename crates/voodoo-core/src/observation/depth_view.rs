@@ -31,7 +31,7 @@ pub enum Pixel {
 }
 
 /// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
-pub(crate) const NEAREST_SEEN: f64 = 0.05;
+pub const NEAREST_SEEN: f64 = 0.05;
 /// An image with more pixels without return than this share was segmented: a sensor alone loses less of a room.
 const SEGMENTED_SHARE: f64 = 0.5;
 /// Every so manyth pixel is asked for that; a prime, so that all columns take part.
