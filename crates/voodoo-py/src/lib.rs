@@ -11,7 +11,9 @@ mod body_view;
 mod borrowed;
 mod chroma;
 mod config;
+#[cfg(feature = "detect")]
 mod detect;
+mod detector;
 mod errors;
 mod estimate;
 mod frame;
@@ -38,6 +40,7 @@ mod _core {
     use super::chroma::{color_bins, joined_mask, mask_regions, skin_mask};
     #[pymodule_export]
     use super::config::config_fields;
+    #[cfg(feature = "detect")]
     #[pymodule_export]
     use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
     #[pymodule_export]
