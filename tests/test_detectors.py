@@ -88,7 +88,9 @@ def test_the_shipped_network_may_be_wrapped_and_named(someone):
 
     def detect(image):
         shown = voodoo.Frame(0.0)
-        shown.add_depth(image.depth, camera=image.camera, metres_per_unit=1.0, world_from_sensor=image.world_from_sensor)
+        shown.add_depth(
+            image.depth, camera=image.camera, metres_per_unit=1.0, world_from_sensor=image.world_from_sensor
+        )
         return shipped.detect(shown)
 
     tracker, found = run(CallableDetector(detect, joints=JOINTS, lengths=LENGTHS), someone)
@@ -147,7 +149,7 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
 @pytest.mark.parametrize(
     ("found", "words"),
     [
-        ([3], "has no attribute|joints"),
+        ([3], "has no attribute 'joints'"),
         (3, "not iterable"),
         ([DetectedPerson({"tail": (0, 0, 1)}, 0.9)], 'expected some of .*, found "tail"'),
         ([DetectedPerson({"l_shoulder": (0, 1)}, 0.9)], r"joints\[l_shoulder\]"),
@@ -155,9 +157,12 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
         ([DetectedPerson({}, 2.0)], "confidence: expected a probability"),
         ([DetectedPerson({}, 0.9, facing="yes")], "facing: expected a probability"),
         ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, joint_sigma=-1.0)], "sigma: expected finite metres > 0"),
-        ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, mask=np.ones((3, 3), bool))], "mask: expected an array of shape"),
+        (
+            [DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, mask=np.ones((3, 3), bool))],
+            "mask: expected an array of shape",
+        ),
         ([DetectedPerson({}, 0.9, lengths={"thigh": 0.4})], "lengths"),
-        ([DetectedPerson(None, 0.9)], "low and high|joints"),
+        ([DetectedPerson(None, 0.9)], "joints: expected a mapping from names, found None"),
         ([DetectedPerson(7, 0.9)], "joints: expected a mapping from names"),
         ([DetectedPerson({}, 0.9, floor=3)], "floor: expected a unit normal"),
     ],
@@ -199,9 +204,9 @@ def test_persons_on_several_threads_ask_one_function_and_get_the_same(someone):
 def field(number, value):
     """A field of a protocol buffer: whole numbers, bytes and text."""
     if isinstance(value, int):
-        return bytes([number << 3]) + varint(value)
+        return varint(number << 3) + varint(value)
     value = value.encode() if isinstance(value, str) else value
-    return bytes([number << 3 | 2]) + varint(len(value)) + value
+    return varint(number << 3 | 2) + varint(len(value)) + value
 
 
 def varint(value):
@@ -222,7 +227,9 @@ def constant_network(path, **outputs):
     for name, values in outputs.items():
         values = np.asarray(values, dtype="<f4")
         tensor = b"".join(field(1, size) for size in values.shape) + field(2, 1) + field(9, values.tobytes())
-        graph += field(1, field(2, name) + field(4, "Constant") + field(5, field(1, "value") + field(5, tensor) + field(20, 4)))
+        graph += field(
+            1, field(2, name) + field(4, "Constant") + field(5, field(1, "value") + field(5, tensor) + field(20, 4))
+        )
     graph += field(2, "constant") + field(11, shaped("x", (1, 2, 96, 96)))
     graph += b"".join(field(12, shaped(name, np.shape(values))) for name, values in outputs.items())
     path.write_bytes(field(1, 8) + field(8, field(2, 13)) + field(7, graph))
