@@ -17,7 +17,7 @@ const FIVE: [&str; 5] = ["humanoid_root", "l_shoulder", "r_shoulder", "l_ankle",
 pub struct Fixed {
     pub joints: Vec<String>,
     pub lengths: Vec<String>,
-    pub found: Vec<Detection>,
+    pub found: Vec<(Vec3, Detection)>,
     pub fails: bool,
 }
 
@@ -31,7 +31,7 @@ impl Fixed {
     fn seeing(mut self, body: &Body, poses: &[Pose]) -> Self {
         let place = |name: &String| Some(body.site_position(poses, body.site_index(name).ok()?));
         let joint = |name| place(name).map(|position| DetectedJoint { position, sigma: 0.03, visible: 1.0 });
-        self.found.push(Detection::new(self.joints.iter().map(joint).collect(), 6.0));
+        self.found.push((poses[0].translation, Detection::new(self.joints.iter().map(joint).collect(), 6.0)));
         self
     }
 }
@@ -60,12 +60,12 @@ impl Detect for Fixed {
         }
         let mut depth = Vec::new();
         around.open_depth(image, &mut depth);
-        let shows = |seen: &&Detection| {
+        let shows = |root: Vec3| {
             let point = |index: usize| image.world_from_sensor * image.back_project(index, depth[index]);
-            let within = |index: usize| (point(index) - 0.5 * (seen.low + seen.high)).abs().max_element() < 0.9;
+            let within = |index: usize| (point(index) - root).abs().max_element() < 0.9;
             (0..depth.len()).filter(|index| depth[*index] > 0.0 && depth[*index] < 3.0 && within(*index)).count() > 100
         };
-        Ok(self.found.iter().filter(shows).cloned().collect())
+        Ok(self.found.iter().filter(|(root, _)| shows(*root)).map(|(_, seen)| seen.clone()).collect())
     }
 }
 
@@ -111,7 +111,7 @@ fn lengths_that_are_reported_set_the_sizes_and_others_stay_as_they_were_given() 
             Fixed::of(&["l_shoulder", "r_shoulder", "l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle"]);
         detector.lengths = lengths.iter().map(|(name, _)| (*name).to_owned()).collect();
         let mut detector = detector.seeing(&body, &poses);
-        detector.found[0].lengths = lengths.iter().map(|(_, length)| [*length, 0.02]).collect();
+        detector.found[0].1.lengths = lengths.iter().map(|(_, length)| [*length, 0.02]).collect();
         let mut tracker = Tracker::new(body.clone(), config.clone()).unwrap().with_detector(Box::new(detector));
         show(&mut tracker, &pixels, 0..1);
         let shape = |name: &str| tracker.body().limbs()[body.limb_index(name).unwrap()].shape.length();
@@ -176,7 +176,7 @@ fn what_cannot_be_meant_is_a_failure_that_names_it() {
     ];
     for (words, wrong) in wrongs {
         let mut detector = good.clone();
-        wrong(&mut detector.found[0]);
+        wrong(&mut detector.found[0].1);
         let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap().with_detector(Box::new(detector));
         show(&mut tracker, &pixels, 0..3);
         let error = tracker.detector_error().map(ToString::to_string).unwrap_or_default();

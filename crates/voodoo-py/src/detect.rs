@@ -260,7 +260,8 @@ pub fn person_candidates<'py>(
     let view = array.readonly();
     let [height, width] = [view.as_array().nrows(), view.as_array().ncols()];
     let rays = rays.map(|rays| {
-        let wrong = || wrong_argument(py, "rays", &format!("an array of shape ({height}, {width}, 2) and dtype float32"), rays);
+        let wrong =
+            || wrong_argument(py, "rays", &format!("an array of shape ({height}, {width}, 2) and dtype float32"), rays);
         let array = contiguous(rays).map_err(|_| wrong())?.cast_into::<PyArray3<f32>>().map_err(|_| wrong())?;
         if array.shape() == [height, width, 2] { Ok(array.readonly()) } else { Err(wrong()) }
     });
