@@ -47,7 +47,7 @@ fn allocations() -> usize {
         });
         let mut angles = vec![0.1; model.freedoms()];
         let before = allocations_so_far();
-        solver.solve(&model, &Pose::identity(), &goals, Some(&criterion), &Options::default(), &mut angles);
+        solver.solve(&model, &Pose::IDENTITY, &goals, Some(&criterion), &Options::default(), &mut angles);
         if index >= WARM_UP {
             count += allocations_so_far() - before;
         }

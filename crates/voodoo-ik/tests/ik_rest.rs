@@ -36,7 +36,7 @@ impl Arm {
 
     fn place(&self, angles: &[f64]) -> Kinematics {
         let mut at = Kinematics::default();
-        self.model.place(&Pose::identity(), angles, &mut at);
+        self.model.place(&Pose::IDENTITY, angles, &mut at);
         at
     }
 
@@ -54,8 +54,7 @@ impl Arm {
 
     fn solve(&self, goals: &[Goal], criterion: Option<&Criterion>, start: &[f64], rest: Vec<Rest>) -> Vec<f64> {
         let mut angles = start.to_vec();
-        let report =
-            Solver::with_rest(rest).solve(&self.model, &Pose::identity(), goals, criterion, &LONG, &mut angles);
+        let report = Solver::with_rest(rest).solve(&self.model, &Pose::IDENTITY, goals, criterion, &LONG, &mut angles);
         let h = criterion.map_or(0.0, |criterion| self.h(criterion, &angles));
         assert!((report.h - h).abs() < 1e-9, "{} {h}", report.h);
         for (angle, [low, high]) in angles.iter().zip(self.model.limits()) {

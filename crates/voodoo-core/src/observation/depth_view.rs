@@ -135,8 +135,7 @@ mod tests {
     fn a_place_is_seen_in_the_pixel_whose_ray_passes_nearest() {
         let pixels = distinct(24 * 16);
         let image = image(&pixels, 24, 20.0);
-        let view =
-            DepthView { image: &image, background: None, working_from_camera: Pose::identity(), segmented: false };
+        let view = DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
         for (index, depth) in pixels.iter().enumerate() {
             // Anywhere on the pixel, and at any depth: its edges are half a pixel from its centre.
             for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
@@ -170,7 +169,7 @@ mod tests {
         let rays = vec![[0.0_f32; 2]; pixels.len()];
         let distorted = DepthImage { rays: Some(&rays), ..image };
         let view =
-            DepthView { image: &distorted, background: None, working_from_camera: Pose::identity(), segmented: true };
+            DepthView { image: &distorted, background: None, working_from_camera: Pose::IDENTITY, segmented: true };
         assert_eq!(view.at(Vec3::Z), Pixel::Unknown, "a distorted image does not know the pixel of a place");
     }
 
