@@ -1,4 +1,4 @@
-"""The documentation: short lines, no history outside its record, code that runs, links that lead somewhere, a clean build."""
+"""The documentation: short lines, no history, code that runs, links that lead somewhere, a clean build."""
 
 import functools
 import importlib
@@ -17,6 +17,7 @@ import typer.main
 import typer.testing
 
 import voodoo
+from pages import headings, links, prose
 from voodoo.cli import app
 from voodoo.model.toml_io import parse_toml
 from voodoo.pipeline.start import Init
@@ -26,14 +27,13 @@ from voodoo.recordings.marker_files import MarkerMap
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-RECORD = DOCS / "experiments"
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
 TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CHANGELOG.md"]
-NOW = [page for page in [*PAGES, ROOT / "README.md"] if RECORD not in page.parents]
+NOW = [*PAGES, ROOT / "README.md"]
 """Pages that say what is, not what was."""
 
 WIDTH = 99
-COLUMNS, COLUMNS_OF_THE_RECORD = 5, 10
+COLUMNS = 5
 HISTORY = (
     "used to ",
     "version before",
@@ -69,12 +69,6 @@ def blocks(page: Path) -> list[Block]:
     return [Block(language, text, needs) for needs, language, text in found]
 
 
-@functools.cache
-def prose(page: Path) -> str:
-    """The text without fenced blocks."""
-    return re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
-
-
 def name(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
@@ -85,11 +79,10 @@ def with_blocks(*languages: str) -> list[Path]:
 
 @pytest.mark.parametrize("page", TEXTS, ids=name)
 def test_lines_and_tables_fit_a_screen(page: Path):
-    most = COLUMNS_OF_THE_RECORD if RECORD in page.parents else COLUMNS
     for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         assert len(line) <= WIDTH, f"{name(page)}:{number} has {len(line)} characters"
         if re.match(r"\|[-|: ]+\|$", line):
-            assert line.count("|") - 1 <= most, f"{name(page)}:{number} is a table of {line.count('|') - 1} columns"
+            assert line.count("|") - 1 <= COLUMNS, f"{name(page)}:{number} is a table of {line.count('|') - 1} columns"
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=name)
@@ -175,19 +168,6 @@ def test_files_can_be_read(page: Path, tmp_path: Path):
                 assert read_calibration(file).depth.camera.width == 640
 
 
-def headings(page: Path) -> set[str]:
-    """Anchors of a page, as GitHub and MyST make them."""
-    found = re.findall(r"^#+ (.+)$", prose(page), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.replace("`", "").lower()).replace(" ", "-") for heading in found}
-
-
-def links(page: Path) -> list[tuple[Path, str]]:
-    """File and anchor of every link that stays in the repository."""
-    text = re.sub(r"\s+", " ", prose(page))
-    found = re.findall(r"\[[^\]]*\]\((?!https?:)([^)#]*)#?([^)]*)\)", text)
-    return [((page.parent / path).resolve() if path else page, anchor) for path, anchor in found]
-
-
 @pytest.mark.parametrize("page", [*TEXTS, ROOT / "ARCHITECTURE.md"], ids=name)
 def test_links_lead_somewhere(page: Path):
     for target, anchor in links(page):
@@ -216,7 +196,7 @@ def test_names_exist(page: Path):
             if not hasattr(found, part):
                 importlib.import_module(".".join(["voodoo", *parts[:count]]))
             found = getattr(found, part)
-    rooms = r"(?:^|\s)((?:examples|benches|tests|scripts|python)/[\w./]+)"
+    rooms = r"(?:^|\s)((?:examples|benches|lab|tests|scripts|python)/[\w./]+)"
     for path in {match for text in code for match in re.findall(rooms, text)}:
         assert (ROOT / path).exists(), f"{name(page)} names {path}"
     core = ROOT / "crates" / "voodoo-core" / "src"
