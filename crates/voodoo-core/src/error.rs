@@ -102,7 +102,8 @@ pub enum TrackError {
 }
 
 impl TrackError {
-    pub(crate) fn measurement(what: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
+    /// A measurement that cannot be used: which argument, what would be right, what was there.
+    pub fn measurement(what: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
         Self::Measurement { what: what.into(), expected, found: found.into() }
     }
 }

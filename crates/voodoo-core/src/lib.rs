@@ -60,7 +60,6 @@ pub mod detect;
 pub mod error;
 pub mod fit;
 pub mod hypotheses;
-pub mod ik;
 pub mod math;
 pub mod observation;
 pub mod people;
@@ -68,7 +67,6 @@ pub mod regions;
 pub mod relocalize;
 pub mod shape;
 pub mod sizes;
-pub mod skin;
 pub mod solver;
 pub mod terms;
 #[cfg(test)]

@@ -8,8 +8,6 @@ mod shape_support;
 mod detector_check;
 mod determinism;
 mod hostile;
-mod ik;
-mod ik_rest;
 mod people;
 mod properties;
 mod refusals;

@@ -155,7 +155,7 @@ fn a_refused_reset_changes_nothing() {
     assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
     let millimetres: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();
     assert!(tracker.reset(&millimetres, true).unwrap_err().to_string().contains("found 1000.0000 times"));
-    assert!(tracker.reset_pose(&[Pose::identity()]).unwrap_err().to_string().contains("10 limbs"));
+    assert!(tracker.reset_pose(&[Pose::IDENTITY]).unwrap_err().to_string().contains("10 limbs"));
     assert!(tracker.scale(0.0).is_err() && tracker.scale(f64::NAN).is_err());
     assert!(tracker.remove_limb("torso").is_err() && tracker.remove_limb("tail").is_err());
     assert_eq!(tracker.body(), &body);
@@ -169,8 +169,8 @@ fn sites_of(tracker: &Tracker) -> Vec<(usize, Vec3)> {
 fn limb(name: &str, parent: Option<usize>) -> Limb {
     let joint = Joint {
         name: format!("{name}_joint"),
-        parent_from_joint: Pose::identity(),
-        limb_from_joint: Pose::identity(),
+        parent_from_joint: Pose::IDENTITY,
+        limb_from_joint: Pose::IDENTITY,
         semi_axes: [0.0; 2],
         weight: 1.0,
         limits: None,

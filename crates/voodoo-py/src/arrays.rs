@@ -120,7 +120,7 @@ pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
 
 /// A pose from a rigid 4x4 matrix; the identity without one.
 pub fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
-    let Some(value) = value else { return Ok(Pose::identity()) };
+    let Some(value) = value else { return Ok(Pose::IDENTITY) };
     let wrong = || wrong_argument(value.py(), name, "a rigid 4x4 transform", value);
     let rows: [[f64; 4]; 4] = match entries::<16>(value, &[4, 4]) {
         Some(numbers) => [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| numbers[4 * row + column])),

@@ -6,8 +6,8 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use voodoo_core::observation::body_view::{Beside, BodyView, Matrix, StillDepth};
 use voodoo_core::observation::frame::DepthPixels;
+use voodoo_sensors::body_view::{Beside, BodyView, Matrix, StillDepth};
 
 use crate::arrays::contiguous;
 use crate::errors::{IntoPy, exception, wrong_argument};

@@ -4,10 +4,8 @@ use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, Py
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
-use voodoo_core::ik::{
-    self, Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, Trunk,
-};
 use voodoo_core::math::Vec3;
+use voodoo_ik::{self, Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, Trunk};
 
 use crate::arrays::{frozen, limb_poses, matrix, pose};
 use crate::body::PyBody;
@@ -74,13 +72,13 @@ impl PyChain {
     fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Bone>> {
         match parts {
             Some(parts) => self.segments(py, &parts),
-            None => Ok(ik::bones(&self.body, &self.model, margin)),
+            None => Ok(voodoo_ik::bones(&self.body, &self.model, margin)),
         }
     }
 
     /// The trunk, and limbs of the body beside the chain with their world poses.
     fn trunk(&self, py: Python<'_>, others: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<Trunk>> {
-        let mut found = ik::trunk(&self.body, &self.model);
+        let mut found = voodoo_ik::trunk(&self.body, &self.model);
         for (name, world_from_limb) in others {
             let limb = self.body.limb_index(name).map_err(|error| error.into_py(py))?;
             if self.model.part_of(limb).is_some() {
@@ -176,7 +174,7 @@ impl PyChain {
         let (part, point) = self.site(py, site)?;
         let goal = Goal { part, point, aim: Aim::Position(Vec3::ZERO), weight: 1.0, level: 0 };
         let (mut rows, mut residual) = (Vec::new(), Vec::new());
-        ik::level_rows(&self.model, &[goal], &at, &mut rows, &mut residual);
+        voodoo_ik::level_rows(&self.model, &[goal], &at, &mut rows, &mut residual);
         frozen(py, rows, &[3, self.model.freedoms()])
     }
 
@@ -193,7 +191,7 @@ impl PyChain {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
         let segments = self.bones(py, segments, depth.0)?;
-        let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<voodoo_ik::View> = views.iter().map(|view| view.view()).collect();
         let trunk = self.trunk(py, &others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
         let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
@@ -214,9 +212,9 @@ impl PyChain {
         let (base, poses) = (pose("world_from_base", Some(base))?, limb_poses(&self.body, &world_from_limb)?);
         let mut angles = Vec::new();
         if closest {
-            ik::project(&self.body, &self.model, &base, &poses, &mut angles);
+            voodoo_ik::project(&self.body, &self.model, &base, &poses, &mut angles);
         } else {
-            ik::read(&self.body, &self.model, &base, &poses, &mut angles);
+            voodoo_ik::read(&self.body, &self.model, &base, &poses, &mut angles);
         }
         Ok(angles)
     }
@@ -243,7 +241,7 @@ impl PyChain {
         let mut ordered = goals.clone();
         ordered.sort_by_key(|goal| goal.level);
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
-        let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<voodoo_ik::View> = views.iter().map(|view| view.view()).collect();
         let trunk = self.trunk(py, &others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let mut solver = resting(&rest);
@@ -285,8 +283,8 @@ impl PyChain {
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
-        let views: Vec<ik::View> = views.iter().map(|view| view.view()).collect();
-        let trunk = ik::trunk(&self.body, &self.model);
+        let views: Vec<voodoo_ik::View> = views.iter().map(|view| view.view()).collect();
+        let trunk = voodoo_ik::trunk(&self.body, &self.model);
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let (count, n) = (starts.shape()[0], self.model.freedoms());
         let mut angles = starts.as_slice()?.to_vec();

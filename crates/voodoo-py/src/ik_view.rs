@@ -2,7 +2,6 @@
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::ik;
 use voodoo_core::math::Pose;
 
 use crate::arrays::pose;
@@ -49,8 +48,8 @@ impl PyView {
 }
 
 impl PyView {
-    pub(crate) fn view(&self) -> ik::View<'_> {
-        ik::View {
+    pub(crate) fn view(&self) -> voodoo_ik::View<'_> {
+        voodoo_ik::View {
             pixels: &self.pixels,
             depth: &self.depth,
             border: self.border,

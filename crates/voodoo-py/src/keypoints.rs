@@ -3,10 +3,10 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::body_view::Matrix;
-use voodoo_core::observation::carried::{Carrying, in_sensor, in_world};
-use voodoo_core::observation::eye::Eye;
-use voodoo_core::observation::keypoints::{Part, Sensor, Sighting, Told, nearest_person};
+use voodoo_sensors::body_view::Matrix;
+use voodoo_sensors::carried::{Carrying, in_sensor, in_world};
+use voodoo_sensors::eye::Eye;
+use voodoo_sensors::keypoints::{Part, Sensor, Sighting, Told, nearest_person};
 
 use crate::arrays::rows;
 use crate::body_view::rows_of;

@@ -2,7 +2,7 @@
 
 use numpy::{PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use voodoo_core::observation::registration::MeasuredPixels;
+use voodoo_sensors::registration::MeasuredPixels;
 
 use crate::errors::{IntoPy, exception};
 

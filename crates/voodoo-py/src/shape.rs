@@ -102,7 +102,7 @@ impl PyShape {
             }
             let mut batch = SurfaceBatch::default();
             if bad.is_none() {
-                self.0.closest_points(&Pose::identity(), &queries, &mut batch);
+                self.0.closest_points(&Pose::IDENTITY, &queries, &mut batch);
             }
             (batch, bad)
         });

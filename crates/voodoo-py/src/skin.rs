@@ -7,12 +7,12 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::chroma::{CHROMA_BINS, LUMA_BINS};
-use voodoo_core::observation::eye::Eye;
-use voodoo_core::skin::candidates::{Candidate, candidates};
-use voodoo_core::skin::cue::{Look, SkinCue, SkinSettings};
-use voodoo_core::skin::rules::{Expected, LimbDistances};
-use voodoo_core::skin::teacher::{Pace, Shown, Teacher};
+use voodoo_sensors::chroma::{CHROMA_BINS, LUMA_BINS};
+use voodoo_sensors::eye::Eye;
+use voodoo_sensors::skin::candidates::{Candidate, candidates};
+use voodoo_sensors::skin::cue::{Look, SkinCue, SkinSettings};
+use voodoo_sensors::skin::rules::{Expected, LimbDistances};
+use voodoo_sensors::skin::teacher::{Pace, Shown, Teacher};
 
 use crate::arrays::rows;
 use crate::body_view::{PyBodyView, rows_of};

@@ -90,7 +90,7 @@ impl View {
         for index in 0..self.depth.len() {
             if self.depth[index] > 0.0 {
                 let point = *world_from_camera * self.point(index);
-                if boxes.iter().any(|bounds| bounds.contains_local_point(point)) {
+                if boxes.iter().any(|bounds| bounds.contains(point)) {
                     self.depth[index] = 0.0;
                 }
             }

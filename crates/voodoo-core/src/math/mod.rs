@@ -9,7 +9,7 @@ mod weighted_points;
 pub use absolute_orientation::Moments;
 pub use cholesky::{factor, half_substitute, solve_in_place};
 pub use geometry::*;
-pub(crate) use simd::{LANES, has_avx512, widest};
+pub use simd::{LANES, has_avx512, widest};
 pub use weighted_points::WeightedPoints;
 
 /// The sum of the products of two rows.

@@ -38,7 +38,7 @@ const ROUGH_POINTS: usize = 700;
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
 pub fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
-    let mut total = Aabb::new_invalid();
+    let mut total = Aabb::EMPTY;
     for (limb, pose) in body.limbs().iter().zip(poses) {
         let bounds = limb.shape.aabb(pose);
         total.mins = total.mins.min(bounds.mins);
@@ -141,7 +141,7 @@ impl Candidates {
             }
             let point = self.points.get(index) + origin;
             let measured = self.limb[index] != ANY_LIMB;
-            if measured || !boxes.iter().any(|bounds| bounds.contains_local_point(point)) {
+            if measured || !boxes.iter().any(|bounds| bounds.contains(point)) {
                 let [x, y, z] = [self.points.x[index], self.points.y[index], self.points.z[index]];
                 self.points.set(kept, [x, y, z]);
                 self.weight[kept] = self.weight[index];
@@ -233,7 +233,7 @@ pub fn image_window(
     }
     let [fx, fy, cx, cy] = image.intrinsics;
     let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-    for corner in bounds.vertices() {
+    for corner in bounds.corners() {
         let corner = working_from_sensor.inverse_transform_point(corner);
         if corner.z < NEAREST_SEEN {
             return whole;
@@ -291,7 +291,7 @@ mod tests {
             .map(|index| world_from_sensor * images[0].back_project(index, pixels[index]))
             .filter(|point| point.z >= 0.5 + config.ground_clearance)
             .map(|point| point - origin)
-            .filter(|point| bounds.contains_local_point(*point))
+            .filter(|point| bounds.contains(*point))
             .collect();
         assert!(expected.len() > 100 && expected.len() < 700, "{}", expected.len());
         assert_eq!(found.len(), expected.len());
@@ -329,7 +329,7 @@ mod tests {
         let points = [[9.0, 9.0, 9.0], [0.1, 0.0, 0.0]];
         let cloud = |scope| Cloud {
             points: PointSlice::F64(&points),
-            world_from_sensor: Pose::identity(),
+            world_from_sensor: Pose::IDENTITY,
             weight: 2.0,
             scope,
             source: 0,

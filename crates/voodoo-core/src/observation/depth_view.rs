@@ -31,7 +31,7 @@ pub enum Pixel {
 }
 
 /// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
-pub(crate) const NEAREST_SEEN: f64 = 0.05;
+pub const NEAREST_SEEN: f64 = 0.05;
 /// An image with more pixels without return than this share was segmented: a sensor alone loses less of a room.
 const SEGMENTED_SHARE: f64 = 0.5;
 /// Every so manyth pixel is asked for that; a prime, so that all columns take part.
@@ -135,8 +135,7 @@ mod tests {
     fn a_place_is_seen_in_the_pixel_whose_ray_passes_nearest() {
         let pixels = distinct(24 * 16);
         let image = image(&pixels, 24, 20.0);
-        let view =
-            DepthView { image: &image, background: None, working_from_camera: Pose::identity(), segmented: false };
+        let view = DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
         for (index, depth) in pixels.iter().enumerate() {
             // Anywhere on the pixel, and at any depth: its edges are half a pixel from its centre.
             for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
@@ -170,7 +169,7 @@ mod tests {
         let rays = vec![[0.0_f32; 2]; pixels.len()];
         let distorted = DepthImage { rays: Some(&rays), ..image };
         let view =
-            DepthView { image: &distorted, background: None, working_from_camera: Pose::identity(), segmented: true };
+            DepthView { image: &distorted, background: None, working_from_camera: Pose::IDENTITY, segmented: true };
         assert_eq!(view.at(Vec3::Z), Pixel::Unknown, "a distorted image does not know the pixel of a place");
     }
 

@@ -73,7 +73,7 @@ impl Segments {
         if !frame.excluded.is_empty() {
             let inside = |sample: &Sample| {
                 let point = Vec3::from_array(sample.point.map(f64::from)) + origin;
-                frame.excluded.iter().any(|bounds| bounds.contains_local_point(point))
+                frame.excluded.iter().any(|bounds| bounds.contains(point))
             };
             self.samples.retain(|sample| !inside(sample));
         }
@@ -223,7 +223,7 @@ mod tests {
         for _ in 0..2 {
             let clouds = [Cloud {
                 points: PointSlice::F64(&points),
-                world_from_sensor: Pose::identity(),
+                world_from_sensor: Pose::IDENTITY,
                 weight: 1.0,
                 scope: Scope::Free,
                 source: 0,

@@ -132,7 +132,7 @@ impl Claims {
         self.pixels.clear();
         for index in 0..cloud.points.len() {
             let point = cloud.world_from_sensor * cloud.points.get(index);
-            if bounds.contains_local_point(point) {
+            if bounds.contains(point) {
                 self.queries.push((point - origin).to_array().map(|value| value as f32));
                 self.pixels.push((index as u32, 1));
             }
@@ -184,7 +184,7 @@ impl Claims {
                 }
                 let [x, y] = image.rays.map_or([across[column], down], |rays| rays[start + column].map(f64::from));
                 let point = image.world_from_sensor * (f64::from(z) * Vec3::new(x, y, 1.0));
-                if bounds.contains_local_point(point) {
+                if bounds.contains(point) {
                     queries.push((point - origin).to_array().map(|value| value as f32));
                     pixels.push(((start + column) as u32, run as u32));
                 }

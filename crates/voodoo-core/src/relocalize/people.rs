@@ -90,7 +90,7 @@ impl People {
                 (self.image, self.seen) = (number, Some(found));
             }
             if let (Wanted::Near(place), Some((person, bounds))) = (wanted, detector.first_look())
-                && bounds.contains_local_point(place)
+                && bounds.contains(place)
             {
                 self.verdict = Some(self.verdict.map_or(person, |before| before.max(person)));
             }
@@ -108,7 +108,7 @@ pub(crate) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<P
 
 /// A body with the lengths of `LENGTHS`, like on both sides.
 fn with_sizes(reference: &Body, lengths: &[f64]) -> Option<Body> {
-    let rest = reference.rest_pose(Pose::identity());
+    let rest = reference.rest_pose(Pose::IDENTITY);
     let mut joints = Vec::with_capacity(JOINTS.len());
     for name in JOINTS {
         joints.push(reference.site_position(&rest, reference.site_index(name).ok()?));
@@ -120,7 +120,7 @@ fn with_sizes(reference: &Body, lengths: &[f64]) -> Option<Body> {
 /// The pose of a body that fits a detected person's joints best, world frame.
 pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
     let mut joints: Vec<Vec3> = detection.joints.iter().map(|joint| joint.position).collect();
-    let rest = body.rest_pose(Pose::identity());
+    let rest = body.rest_pose(Pose::IDENTITY);
     let own: Option<Vec<Vec3>> =
         JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
     take_lengths(&mut joints, &lengths(&own?));
@@ -129,7 +129,7 @@ pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
 
 /// Whether a body has the sizes of a detected person, each within so many of its standard deviations.
 pub(super) fn is_sized_like(body: &Body, detection: &Detection, sigmas: f64) -> bool {
-    let rest = body.rest_pose(Pose::identity());
+    let rest = body.rest_pose(Pose::IDENTITY);
     let joints: Option<Vec<Vec3>> =
         JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
     let own = joints.map_or_else(Vec::new, |joints| lengths(&joints));

@@ -148,7 +148,7 @@ mod tests {
 
     /// What a camera at the origin sees of a body, and `behind` where it sees none of it, millimetres.
     fn shoot(body: &Body, poses: &[Pose], behind: u16) -> Vec<u16> {
-        let world_from_sensor = Pose::identity();
+        let world_from_sensor = Pose::IDENTITY;
         let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
         let mut image = Rendering::default();
         image.render(body, poses, &view, None).unwrap();
@@ -165,7 +165,7 @@ mod tests {
             metres_per_unit: 0.001,
             intrinsics: INTRINSICS,
             rays: None,
-            world_from_sensor: Pose::identity(),
+            world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,
         }];
@@ -240,7 +240,7 @@ mod tests {
             metres_per_unit: 0.001,
             intrinsics: [140.0, 140.0, 79.5, 59.5],
             rays: None,
-            world_from_sensor: Pose::identity(),
+            world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,
         }];

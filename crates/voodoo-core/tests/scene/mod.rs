@@ -95,7 +95,7 @@ pub fn with_cloud<'a>(stamp: f64, clouds: &'a [Cloud<'a>]) -> Frame<'a> {
 pub fn cloud(points: &[[f64; 3]]) -> Cloud<'_> {
     Cloud {
         points: PointSlice::F64(points),
-        world_from_sensor: Pose::identity(),
+        world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         scope: Scope::Free,
         source: 0,

@@ -1,0 +1,104 @@
+//! What a site shall reach: a position, or a line of sight.
+
+use std::ops::Range;
+
+use super::model::{Kinematics, Model};
+use voodoo_core::math::Vec3;
+
+/// Where a point shall be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aim {
+    /// At a world position.
+    Position(Vec3),
+    /// On a line in Pluecker form (R07 eq. 11): unit direction `n` and moment `m = p x n` of any point `p` on it.
+    Line {
+        /// Unit direction.
+        n: Vec3,
+        /// Moment.
+        m: Vec3,
+    },
+}
+
+impl Aim {
+    /// The line through `origin` along `direction` (any length but zero).
+    pub fn line(origin: Vec3, direction: Vec3) -> Self {
+        let n = direction.normalize_or_zero();
+        Self::Line { n, m: origin.cross(n) }
+    }
+
+    /// The residual of a point at `x`: its offset, or `x x n - m` (R07 eq. 11), as long as its distance from the line.
+    pub fn residual(&self, x: Vec3) -> Vec3 {
+        match self {
+            Self::Position(p) => x - *p,
+            Self::Line { n, m } => x.cross(*n) - *m,
+        }
+    }
+
+    /// Derivative of the residual for a velocity of the point (R07 eq. 13).
+    pub fn derivative(&self, velocity: Vec3) -> Vec3 {
+        match self {
+            Self::Position(_) => velocity,
+            Self::Line { n, .. } => velocity.cross(*n),
+        }
+    }
+}
+
+/// A point on a part and its aim.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    /// Index of the part.
+    pub part: usize,
+    /// The point in the limb's frame.
+    pub point: Vec3,
+    /// Where it shall be.
+    pub aim: Aim,
+    /// Weight against the other goals of its level.
+    pub weight: f64,
+    /// Priority: a goal never disturbs one of a smaller level.
+    pub level: usize,
+}
+
+impl Goal {
+    /// The residual at a pose of the chain, see [`Aim::residual`].
+    pub fn residual(&self, at: &Kinematics) -> Vec3 {
+        self.aim.residual(at.poses[self.part].transform_point(self.point))
+    }
+}
+
+/// Weighted squared residual of the goals.
+pub fn level_cost(goals: &[Goal], at: &Kinematics) -> f64 {
+    goals.iter().map(|goal| goal.weight * goal.residual(at).length_squared()).sum()
+}
+
+/// Residuals and Jacobian (row-major, three rows a goal) of the goals, both times the roots of the weights.
+pub fn level_rows(model: &Model, goals: &[Goal], at: &Kinematics, jacobian: &mut Vec<f64>, residual: &mut Vec<f64>) {
+    let n = model.freedoms();
+    jacobian.clear();
+    jacobian.resize(3 * goals.len() * n, 0.0);
+    residual.clear();
+    for (index, goal) in goals.iter().enumerate() {
+        let x = at.poses[goal.part].transform_point(goal.point);
+        let root = goal.weight.sqrt();
+        residual.extend((root * goal.aim.residual(x)).to_array());
+        let rows = &mut jacobian[3 * index * n..3 * (index + 1) * n];
+        for &mover in model.movers(goal.part) {
+            let column = &at.columns[mover];
+            let d = root * goal.aim.derivative(column.omega.cross(x) + column.v);
+            rows[mover] = d.x;
+            rows[n + mover] = d.y;
+            rows[2 * n + mover] = d.z;
+        }
+    }
+}
+
+/// The runs of equal levels in goals sorted by level.
+pub(super) fn level_ranges(goals: &[Goal], ranges: &mut Vec<Range<usize>>) {
+    ranges.clear();
+    let mut start = 0;
+    for end in 1..=goals.len() {
+        if end == goals.len() || goals[end].level != goals[start].level {
+            ranges.push(start..end);
+            start = end;
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Row vectors: damped pseudo-inverse and null spaces, without heap after the first use.
+
+use voodoo_core::math::{dot, solve_in_place};
+
+/// A row that keeps less than this share of the longest one depends on those before it.
+const RANK: f64 = 1e-9;
+
+/// Orthonormal directions taken by higher levels and by limits: `I - Q^T Q` projects into the null space.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Taken {
+    rows: Vec<f64>,
+    n: usize,
+}
+
+impl Taken {
+    pub fn clear(&mut self, n: usize) {
+        self.rows.clear();
+        self.n = n;
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Leaves of `row` only what lies in the null space.
+    pub fn project(&self, row: &mut [f64]) {
+        orthogonalise(&self.rows, row);
+    }
+
+    /// Takes the directions of the rows of a matrix.
+    pub fn take(&mut self, rows: &[f64]) {
+        let longest = rows.chunks_exact(self.n).map(|row| dot(row, row)).fold(0.0, f64::max).sqrt();
+        for row in rows.chunks_exact(self.n) {
+            self.rows.extend_from_slice(row);
+            self.close(RANK * longest);
+        }
+    }
+
+    /// Takes one unknown, which stands at its limit; false when it was taken before.
+    pub fn pin(&mut self, unknown: usize) -> bool {
+        let start = self.rows.len();
+        self.rows.resize(start + self.n, 0.0);
+        self.rows[start + unknown] = 1.0;
+        self.close(1e-7)
+    }
+
+    /// Makes the last row orthonormal to the others, or drops it when less than `least` is left.
+    fn close(&mut self, least: f64) -> bool {
+        let start = self.rows.len() - self.n;
+        let (taken, new) = self.rows.split_at_mut(start);
+        orthogonalise(taken, new);
+        let length = dot(new, new).sqrt();
+        if length > least && start < self.n * self.n {
+            new.iter_mut().for_each(|value| *value /= length);
+            return true;
+        }
+        self.rows.truncate(start);
+        false
+    }
+}
+
+/// Gram-Schmidt, twice: once leaves an error of the size of the cancellation.
+fn orthogonalise(basis: &[f64], row: &mut [f64]) {
+    for _ in 0..2 {
+        for q in basis.chunks_exact(row.len()) {
+            let along = dot(q, row);
+            row.iter_mut().zip(q).for_each(|(value, q)| *value -= along * q);
+        }
+    }
+}
+
+pub(super) fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
+}
+
+/// Memory of [`Damped::solve`].
+#[derive(Clone, Debug, Default)]
+pub(super) struct Damped {
+    h: Vec<f64>,
+    z: Vec<f64>,
+}
+
+impl Damped {
+    /// `x = A^T (A A^T + damping I)^-1 b = (A^T A + damping I)^-1 A^T b`, whichever side is smaller; zero for a zero matrix.
+    pub fn solve(&mut self, a: &[f64], b: &[f64], damping: f64, x: &mut [f64]) {
+        let (rows, n) = (b.len(), x.len());
+        let size = rows.min(n);
+        let mut damping = damping;
+        x.fill(0.0);
+        // Rounding can make the matrix indefinite when it is all but singular: then more damping is the answer.
+        for _ in 0..6 {
+            self.h.clear();
+            self.h.resize(size * size, 0.0);
+            self.z.clear();
+            if rows <= n {
+                for i in 0..rows {
+                    let row = &a[i * n..(i + 1) * n];
+                    for j in 0..=i {
+                        self.h[i * size + j] = dot(row, &a[j * n..(j + 1) * n]);
+                    }
+                }
+                self.z.extend_from_slice(b);
+            } else {
+                self.z.resize(n, 0.0);
+                for (row, b) in a.chunks_exact(n).zip(b) {
+                    for i in 0..n {
+                        if row[i] != 0.0 {
+                            self.h[i * n..=i * n + i].iter_mut().zip(row).for_each(|(h, value)| *h += row[i] * value);
+                            self.z[i] += row[i] * b;
+                        }
+                    }
+                }
+            }
+            let trace: f64 = (0..size).map(|i| self.h[i * size + i]).sum();
+            if trace.is_nan() || trace <= 0.0 {
+                return;
+            }
+            let floor = 1e-14 * trace;
+            for i in 0..size {
+                self.h[i * size + i] += damping.max(floor);
+            }
+            if solve_in_place(&mut self.h, &mut self.z, size) {
+                if rows <= n {
+                    for (row, z) in a.chunks_exact(n).zip(&self.z) {
+                        x.iter_mut().zip(row).for_each(|(x, value)| *x += z * value);
+                    }
+                } else {
+                    x.copy_from_slice(&self.z);
+                }
+                return;
+            }
+            damping = 100.0 * damping.max(floor);
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! A body, or a part of one, as a chain with exact joints; its unknowns are the vector of joint angles.
+
+use voodoo_core::body::kinematics::hinge_axis;
+use voodoo_core::body::{Body, JointKind};
+use voodoo_core::error::BodyError;
+use voodoo_core::math::{Mat3, Pose, Vec3};
+
+use super::twist::turn;
+
+/// Whether the first limb of the chain is among the unknowns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Root {
+    /// Six unknowns: position and rotation vector of the root limb in the base frame.
+    Free,
+    /// The base frame is the parent of the chain's first limb, or the root limb itself.
+    Fixed,
+}
+
+/// How a part moves against its parent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Turn {
+    /// Not at all.
+    Rigid,
+    /// Three shifts and a rotation vector.
+    Free,
+    /// One angle about an axis of the joint frame.
+    Hinge(Vec3),
+    /// A rotation vector in the joint frame on the parent.
+    Ball,
+}
+
+/// One limb of the chain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Index of the limb in the body.
+    pub limb: usize,
+    /// Part it hangs on; `None`: the base.
+    pub parent: Option<usize>,
+    /// Joint frame on the parent.
+    pub parent_from_joint: Pose,
+    /// Joint frame on the limb, inverted.
+    pub joint_from_limb: Pose,
+    /// The freedoms of its joint.
+    pub turn: Turn,
+    /// Its first unknown.
+    pub start: usize,
+}
+
+/// The chain: what stays constant while it moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    parts: Vec<Part>,
+    names: Vec<String>,
+    limits: Vec<[f64; 2]>,
+    /// Of every part, the unknowns that move it, and where they start in that list.
+    movers: Vec<Vec<usize>>,
+}
+
+/// Derivative of the world position of a point `x` on any limb beyond: `omega x x + v` for a unit rate of the unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Angular velocity, world axes.
+    pub omega: Vec3,
+    /// Velocity of the world's origin.
+    pub v: Vec3,
+}
+
+/// Where everything is at one vector of angles; memory to be used again.
+#[derive(Clone, Debug, Default)]
+pub struct Kinematics {
+    /// World pose of the base.
+    pub base: Pose,
+    /// World pose of every part.
+    pub poses: Vec<Pose>,
+    /// One column an unknown.
+    pub columns: Vec<Column>,
+}
+
+impl Model {
+    /// The chain of the chosen limbs of a body (all when `limbs` is empty). They must hang together: each but the first on
+    /// another one.
+    pub fn new(body: &Body, limbs: &[usize], root: Root) -> Result<Self, BodyError> {
+        let all: Vec<usize> = (0..body.limbs().len()).collect();
+        let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
+        chosen.sort_unstable();
+        chosen.dedup();
+        let mut model = Self { parts: Vec::new(), names: Vec::new(), limits: Vec::new(), movers: Vec::new() };
+        for limb in chosen {
+            let Some(description) = body.limbs().get(limb) else {
+                return Err(value("limbs", "indices of limbs", limb.to_string()));
+            };
+            model.add(limb, &description.name, description.parent.as_ref(), root)?;
+        }
+        Ok(model)
+    }
+
+    fn add(
+        &mut self,
+        limb: usize,
+        name: &str,
+        joint: Option<&(usize, voodoo_core::body::Joint)>,
+        root: Root,
+    ) -> Result<(), BodyError> {
+        let start = self.names.len();
+        let parent = joint.and_then(|(index, _)| self.parts.iter().position(|part| part.limb == *index));
+        if parent.is_none() && !self.parts.is_empty() {
+            return Err(value(
+                "limbs",
+                "limbs that hang together, parents included",
+                format!("{name} without its parent"),
+            ));
+        }
+        let free = [f64::NEG_INFINITY, f64::INFINITY];
+        let first = self.parts.is_empty();
+        let mut part = Part {
+            limb,
+            parent,
+            parent_from_joint: Pose::IDENTITY,
+            joint_from_limb: Pose::IDENTITY,
+            turn: Turn::Rigid,
+            start,
+        };
+        match joint {
+            _ if first && root == Root::Free => {
+                part.turn = Turn::Free;
+                self.names.extend(["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("root_{axis}")));
+                self.limits.extend([free; 6]);
+            }
+            None => {}
+            Some((_, joint)) => {
+                part.parent_from_joint = joint.parent_from_joint;
+                part.joint_from_limb = joint.limb_from_joint.inverse();
+                if joint.kind() == JointKind::Hinge {
+                    let axis = hinge_axis(joint);
+                    part.turn = Turn::Hinge(axis);
+                    self.names.push(format!("{}_flexion", joint.name));
+                    self.limits.push(joint.limits.map_or(free, |limits| limits[usize::from(axis == Vec3::Y)]));
+                } else {
+                    part.turn = Turn::Ball;
+                    self.names.extend(["rx", "ry", "rz"].map(|axis| format!("{}_{axis}", joint.name)));
+                    self.limits.extend(joint.limits.unwrap_or([free; 3]));
+                }
+            }
+        }
+        let mut movers = parent.map_or_else(Vec::new, |parent| self.movers[parent].clone());
+        movers.extend(start..self.names.len());
+        self.movers.push(movers);
+        self.parts.push(part);
+        Ok(())
+    }
+
+    /// The limbs, parents first.
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// Names of the unknowns: `root_x` ... `root_rz`, `NAME_flexion` of a hinge, `NAME_rx`, `NAME_ry`, `NAME_rz` otherwise.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Least and greatest value of every unknown; infinite where there is no limit.
+    pub fn limits(&self) -> &[[f64; 2]] {
+        &self.limits
+    }
+
+    /// Number of unknowns.
+    pub fn freedoms(&self) -> usize {
+        self.names.len()
+    }
+
+    /// The unknowns that move a part.
+    pub fn movers(&self, part: usize) -> &[usize] {
+        &self.movers[part]
+    }
+
+    /// The part that is a limb of the body.
+    pub fn part_of(&self, limb: usize) -> Option<usize> {
+        self.parts.iter().position(|part| part.limb == limb)
+    }
+
+    /// Forward kinematics and its derivative (R07 eq. 10): poses of all parts and the screw of every unknown.
+    pub fn place(&self, world_from_base: &Pose, angles: &[f64], at: &mut Kinematics) {
+        let Kinematics { base, poses, columns } = at;
+        *base = *world_from_base;
+        poses.clear();
+        columns.clear();
+        for part in &self.parts {
+            let world_from_parent = part.parent.map_or(*world_from_base, |parent| poses[parent]);
+            let joint = world_from_parent * part.parent_from_joint;
+            let value = &angles[part.start..];
+            let pose = match part.turn {
+                Turn::Rigid => joint * part.joint_from_limb,
+                Turn::Hinge(axis) => {
+                    let (sine, cosine) = (0.5 * value[0]).sin_cos();
+                    let rotation =
+                        voodoo_core::math::Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
+                    let omega = joint.rotation * axis;
+                    columns.push(Column { omega, v: joint.translation.cross(omega) });
+                    Pose::from_parts(joint.translation, joint.rotation * rotation) * part.joint_from_limb
+                }
+                Turn::Ball => {
+                    let rotation = ball(Vec3::new(value[0], value[1], value[2]), &joint, columns);
+                    Pose::from_parts(joint.translation, joint.rotation * rotation) * part.joint_from_limb
+                }
+                Turn::Free => {
+                    let axes = Mat3::from_quat(joint.rotation);
+                    for v in [axes.x_axis, axes.y_axis, axes.z_axis] {
+                        columns.push(Column { omega: Vec3::ZERO, v });
+                    }
+                    let centre = joint.translation + joint.rotation * Vec3::new(value[0], value[1], value[2]);
+                    let joint = Pose::from_parts(centre, joint.rotation);
+                    let rotation = ball(Vec3::new(value[3], value[4], value[5]), &joint, columns);
+                    Pose::from_parts(centre, joint.rotation * rotation)
+                }
+            };
+            poses.push(pose);
+        }
+    }
+
+    /// Brings rotation vectors without limits back to at most pi, so that they stay away from the singularity at 2 pi.
+    pub fn normalise(&self, angles: &mut [f64]) {
+        for part in &self.parts {
+            let start = match part.turn {
+                Turn::Ball => part.start,
+                Turn::Free => part.start + 3,
+                _ => continue,
+            };
+            if self.limits[start..start + 3].iter().any(|[low, high]| low.is_finite() || high.is_finite()) {
+                continue;
+            }
+            let v = Vec3::new(angles[start], angles[start + 1], angles[start + 2]);
+            let angle = v.length();
+            if angle > std::f64::consts::PI {
+                let turns = (angle / std::f64::consts::TAU).round();
+                let shorter = v * (1.0 - turns * std::f64::consts::TAU / angle);
+                angles[start..start + 3].copy_from_slice(&shorter.to_array());
+            }
+        }
+    }
+}
+
+/// Rotation of a ball joint; pushes its three columns, `J_left(v) e_i` about the joint's centre.
+fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> voodoo_core::math::Quat {
+    let (rotation, b, c) = turn(v);
+    let axes = Mat3::from_quat(joint.rotation);
+    for e in Vec3::AXES {
+        let first = v.cross(e);
+        let omega = axes * (e + b * first + c * v.cross(first));
+        columns.push(Column { omega, v: joint.translation.cross(omega) });
+    }
+    rotation
+}
+
+fn value(key: &str, expected: &'static str, found: String) -> BodyError {
+    BodyError::Value { key: key.into(), expected, found }
+}

@@ -1,0 +1,56 @@
+//! Poses of limbs that are not quite joined (K07's elastic joints) as angles of the chain.
+
+use super::goal::{Aim, Goal};
+use super::model::{Model, Turn};
+use super::solver::{Options, Solver};
+use super::twist::rotation_vector;
+use voodoo_core::body::kinematics::joint_turn;
+use voodoo_core::body::{Body, Joint};
+use voodoo_core::math::{Pose, Vec3};
+
+/// Lever of a limb's turns about its axis against its position, metres: about the radius of an arm.
+const GIRTH: f64 = 0.05;
+
+/// Angles as the joints of `poses` (one a limb of the body, world) stand; gaps are not looked at. Within the limits.
+pub fn read(body: &Body, model: &Model, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
+    angles.clear();
+    angles.resize(model.freedoms(), 0.0);
+    for part in model.parts() {
+        let joint: Option<&(usize, Joint)> = body.limbs()[part.limb].parent.as_ref();
+        let world_from_limb = &poses[part.limb];
+        let value = &mut angles[part.start..];
+        match (part.turn, joint) {
+            (Turn::Free, _) => {
+                let pose = world_from_base.inv_mul(world_from_limb);
+                value[..3].copy_from_slice(&pose.translation.to_array());
+                value[3..6].copy_from_slice(&rotation_vector(pose.rotation).to_array());
+            }
+            (Turn::Hinge(axis), Some((parent, joint))) => {
+                value[0] = rotation_vector(joint_turn(joint, &poses[*parent], world_from_limb)).dot(axis);
+            }
+            (Turn::Ball, Some((parent, joint))) => {
+                let v = rotation_vector(joint_turn(joint, &poses[*parent], world_from_limb));
+                value[..3].copy_from_slice(&v.to_array());
+            }
+            _ => {}
+        }
+    }
+    for (angle, [low, high]) in angles.iter_mut().zip(model.limits()) {
+        *angle = angle.clamp(*low, *high);
+    }
+}
+
+/// The angles of the closed chain that is nearest to `poses`: least squares over both ends and the girth of every limb.
+pub fn project(body: &Body, model: &Model, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
+    read(body, model, world_from_base, poses, angles);
+    let mut goals = Vec::with_capacity(4 * model.parts().len());
+    for (index, part) in model.parts().iter().enumerate() {
+        let end = Vec3::Z * body.limbs()[part.limb].shape.length();
+        for point in [Vec3::ZERO, end, GIRTH * Vec3::X, GIRTH * Vec3::Y] {
+            let aim = Aim::Position(poses[part.limb].transform_point(point));
+            goals.push(Goal { part: index, point, aim, weight: 1.0, level: 0 });
+        }
+    }
+    let options = Options { steps: 20, tolerance: 1e-9, still: 1e-8, ..Options::default() };
+    Solver::default().solve(model, world_from_base, &goals, None, &options, angles);
+}

@@ -1,0 +1,103 @@
+//! What of a step is taken: no level may become worse than those above it must make it.
+
+use super::{Problem, SETTLED, Solver};
+use voodoo_core::math::dot;
+
+impl Solver {
+    /// Takes the whole step, or as much of it as leaves no level worse than those above it must make it.
+    pub(super) fn advance(
+        &mut self,
+        problem: &Problem,
+        count: usize,
+        image: bool,
+        slack: bool,
+        angles: &mut [f64],
+    ) -> f64 {
+        let n = angles.len();
+        let last = if image { count } else { count.saturating_sub(1) };
+        if count == 0 && !image {
+            return 0.0;
+        }
+        self.propose(problem, angles, last, 1.0);
+        self.evaluate(problem);
+        let Some(failed) = self.first_failure(n, count, image, slack, last) else {
+            for level in 0..count {
+                // Slow progress is the sign of a goal out of reach, where less damping would overshoot.
+                let shrink = if self.trial.cost[level] < 0.9 * self.here.cost[level] { 0.3 } else { 0.8 };
+                self.levels.trust[level] = (shrink * self.levels.trust[level]).max(1e-6);
+            }
+            self.gain = (1.5 * self.gain).min(problem.options.gain);
+            return self.take_trial(angles);
+        };
+        if failed < count {
+            self.levels.trust[failed] = (4.0 * self.levels.trust[failed]).min(1e6);
+        } else {
+            self.gain *= 0.5;
+        }
+        // Without what is below; then a quarter of its own part; then nothing but the levels above.
+        for (stage, share) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
+            if (stage == last && share == 1.0) || (stage == 0 && share == 0.0) {
+                continue;
+            }
+            self.propose(problem, angles, stage, share);
+            self.evaluate(problem);
+            if (share == 0.0 && slack)
+                || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
+            {
+                return self.take_trial(angles);
+            }
+        }
+        // A refused step is not rest: more damping comes next.
+        if self.levels.trust.first().is_none_or(|trust| *trust < 1e5) { f64::INFINITY } else { 0.0 }
+    }
+
+    fn propose(&mut self, problem: &Problem, angles: &[f64], stage: usize, share: f64) {
+        let n = angles.len();
+        let limits = problem.model.limits();
+        for i in 0..n {
+            let above = if stage == 0 { 0.0 } else { self.stages[(stage - 1) * n + i] };
+            let step = above + share * (self.stages[stage * n + i] - above);
+            // The clamp only takes off rounding: stages end at the limits.
+            self.trial_angles[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
+        }
+    }
+
+    /// The first level that the trial leaves worse than it was before its own part, beyond the second-order effect of the
+    /// others' parts; `count` stands for the image.
+    fn first_failure(&self, n: usize, count: usize, image: bool, slack: bool, stage: usize) -> Option<usize> {
+        let length = |from: Option<usize>| -> f64 {
+            let step = &self.stages[stage * n..(stage + 1) * n];
+            (0..n).map(|i| step[i] - from.map_or(0.0, |from| self.stages[from * n + i])).map(|d| d * d).sum()
+        };
+        for level in 0..count.min(stage + 1) {
+            let rise = match level {
+                0 if stage == 0 => 0.0,
+                0 => length(Some(0)),
+                _ => length(None),
+            };
+            let limit = match self.levels.best.get(level) {
+                Some(best) if !slack => (best + 0.1 * SETTLED).max(self.levels.before[level]),
+                _ => self.levels.before[level] + rise + 1e-13,
+            };
+            let residual = self.trial.cost[level].sqrt();
+            if residual.is_nan() || residual > limit {
+                return Some(level);
+            }
+        }
+        if image && stage == self.levels.ranges.len() {
+            let above =
+                if stage == 0 { 0.0 } else { dot(&self.here.gradient, &self.stages[(stage - 1) * n..stage * n]) };
+            if self.trial.h.is_nan() || self.trial.h > self.here.h + above.max(0.0) + 1e-9 {
+                return Some(self.levels.ranges.len());
+            }
+        }
+        None
+    }
+
+    fn take_trial(&mut self, angles: &mut [f64]) -> f64 {
+        let moved = angles.iter().zip(&self.trial_angles).fold(0.0_f64, |most, (old, new)| most.max((old - new).abs()));
+        angles.copy_from_slice(&self.trial_angles);
+        self.accept();
+        moved
+    }
+}

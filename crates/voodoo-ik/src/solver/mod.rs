@@ -1,0 +1,341 @@
+//! The solver (J10 eq. 4): damped pseudo-inverse steps, strictly ordered levels, the image criterion in what is left free, and
+//! a rest posture in what that leaves.
+
+mod accept;
+mod rest;
+mod step;
+
+use std::ops::Range;
+
+use super::goal::{Goal, level_cost, level_ranges};
+use super::image::Criterion;
+use super::linear::{Damped, Taken};
+use super::model::{Kinematics, Model};
+use voodoo_core::math::Pose;
+
+pub use rest::Rest;
+
+/// Residual that a lower level may leave in a higher one, metres.
+const SETTLED: f64 = 1e-10;
+/// Turn that leaves a stationary pose with a residual, radians.
+const NUDGE: f64 = 0.05;
+/// The same for an angle that stands at its limit: a knee bent backwards as far as it goes has its stretched pose, which is
+/// farther from a near goal, between itself and all that bend forwards.
+const NUDGE_AT_LIMIT: f64 = 0.35;
+/// The image is at rest when the criterion falls by less than this share in [`STALLED_STEPS`] steps, one after the other.
+const LEAST_FALL: f64 = 1e-3;
+/// Steps without a fall after which the image is at rest.
+const STALLED_STEPS: usize = 3;
+
+/// How to solve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Most steps; J10 uses 15.
+    pub steps: usize,
+    /// A single level with a residual below this is solved; metres.
+    pub tolerance: f64,
+    /// A step that turns nothing by more is the last one; radians (root: metres).
+    pub still: f64,
+    /// Share of the image step `h / |grad h|^2` to take, 0 to 1: alpha of J10 eq. 4 over that step.
+    pub gain: f64,
+    /// Change of `h` per radian, as a share of the bones' length in the images, below which its gradient says little: damps the
+    /// image step where few samples lie outside, and along the line of sight. 0: Polyak's step undamped.
+    pub caution: f64,
+    /// Largest change of an unknown in one step, radians.
+    pub largest_turn: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, caution: 0.3, largest_turn: 0.5 }
+    }
+}
+
+/// How it went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Steps used.
+    pub steps: usize,
+    /// Postures tried, refused ones included.
+    pub tried: usize,
+    /// How many of them were compared with the images.
+    pub looked: usize,
+    /// Whether the angles or the image criterion came to rest (or the only level was reached).
+    pub converged: bool,
+    /// Image criterion at the end, pixels; 0 without images.
+    pub h: f64,
+}
+
+/// Working memory, and the posture at rest; nothing is allocated after the first call with a problem of the same size.
+#[derive(Clone, Debug, Default)]
+pub struct Solver {
+    /// The posture so far, and the one that is tried.
+    here: Posture,
+    trial: Posture,
+    trial_angles: Vec<f64>,
+    levels: Levels,
+    linear: Linear,
+    /// The step after each level, and after the image: `stages x freedoms`.
+    stages: Vec<f64>,
+    /// Share of the image step.
+    gain: f64,
+    phase_start: Vec<f64>,
+    /// From before a nudge.
+    saved: Saved,
+    looks: Looks,
+    /// What angles are drawn to below all else; empty: nothing.
+    rest: Vec<Rest>,
+    /// Gradients of the criterion where the images refused a step to rest.
+    objections: Vec<f64>,
+}
+
+/// A posture, and what it costs: each level, and the images with their gradient.
+#[derive(Clone, Debug, Default)]
+struct Posture {
+    at: Kinematics,
+    cost: Vec<f64>,
+    gradient: Vec<f64>,
+    h: f64,
+}
+
+/// The levels of goals.
+#[derive(Clone, Debug, Default)]
+struct Levels {
+    ranges: Vec<Range<usize>>,
+    /// Damping over the squared residual, each level.
+    trust: Vec<f64>,
+    /// Residual each level would have before its own part of the step.
+    before: Vec<f64>,
+    /// Residual of the levels whose turn is over.
+    best: Vec<f64>,
+}
+
+/// The linear system of one level, and its solution.
+#[derive(Clone, Debug, Default)]
+struct Linear {
+    taken: Taken,
+    damped: Damped,
+    jacobian: Vec<f64>,
+    projected: Vec<f64>,
+    residual: Vec<f64>,
+    wanted: Vec<f64>,
+    part: Vec<f64>,
+}
+
+/// Angles and their costs.
+#[derive(Clone, Debug, Default)]
+struct Saved {
+    angles: Vec<f64>,
+    cost: Vec<f64>,
+}
+
+/// Postures that were tried, how many of them were compared with the images, and whether it is the images' turn.
+#[derive(Clone, Debug, Default)]
+struct Looks {
+    tried: usize,
+    looked: usize,
+    looking: bool,
+}
+
+struct Problem<'a> {
+    model: &'a Model,
+    base: &'a Pose,
+    goals: &'a [Goal],
+    criterion: Option<&'a Criterion<'a>>,
+    options: &'a Options,
+}
+
+impl Solver {
+    /// Moves `angles` towards the goals (sorted by level) and, in what they leave free, the bones into the silhouettes.
+    ///
+    /// Angles stay within the model's limits, whatever the goals; a start outside is moved onto them. Goals that cannot be
+    /// reached, or contradict each other within a level, end at the least sum of weighted squares.
+    pub fn solve(
+        &mut self,
+        model: &Model,
+        world_from_base: &Pose,
+        goals: &[Goal],
+        criterion: Option<&Criterion>,
+        options: &Options,
+        angles: &mut [f64],
+    ) -> Report {
+        let criterion = criterion.filter(|criterion| !criterion.views.is_empty() && !criterion.segments.is_empty());
+        let problem = Problem { model, base: world_from_base, goals, criterion, options };
+        self.start(&problem, angles);
+        let count = self.levels.ranges.len();
+        let mut report = Report { converged: true, ..Report::default() };
+        // One level after the other joins, the image last: what a level reaches does not depend on those below it.
+        for phase in 0..count + usize::from(criterion.is_some()) {
+            // The images are looked at when it is their turn: what the levels above do does not depend on them.
+            self.looks.looking = phase == count;
+            if self.looks.looking {
+                self.evaluate_here(&problem, angles);
+            }
+            self.phase_start.clear();
+            self.phase_start.extend_from_slice(angles);
+            self.phase(&problem, phase, true, angles, &mut report);
+            if phase > 0 && !self.settle(&problem, phase.min(count), angles) {
+                // Finite steps along curved null spaces led to another valley: again, with no rise allowed at all.
+                angles.copy_from_slice(&self.phase_start);
+                self.evaluate_here(&problem, angles);
+                self.phase(&problem, phase, false, angles, &mut report);
+            }
+            if phase < count {
+                self.levels.best.push(self.here.cost[phase].sqrt());
+            }
+        }
+        if !self.rest.is_empty() {
+            self.draw(&problem, angles, &mut report);
+        }
+        report.h = self.here.h;
+        (report.tried, report.looked) = (self.looks.tried, self.looks.looked);
+        report
+    }
+
+    /// Steps with the first `phase + 1` levels, or all and the image. `slack`: levels above may rise by the second order of a
+    /// step, to be made good by the next.
+    fn phase(&mut self, problem: &Problem, phase: usize, slack: bool, angles: &mut [f64], report: &mut Report) {
+        let (count, options) = (self.levels.ranges.len(), problem.options);
+        let image = phase == count;
+        let active = if image { count } else { phase + 1 };
+        let mut nudged = false;
+        let mut idle = 0;
+        let mut rest = false;
+        for step in 0..options.steps {
+            let reached = self.here.cost[..active].iter().all(|cost| cost.sqrt() < options.tolerance);
+            if reached && (!image || self.here.h <= 0.0) {
+                rest = true;
+                break;
+            }
+            report.steps += 1;
+            let before = self.here.h;
+            let moved = self.step(problem, active, image, slack, angles);
+            idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
+            if moved >= options.still && idle < STALLED_STEPS {
+                continue;
+            }
+            let stuck = !image && self.here.cost[phase].sqrt() > options.tolerance;
+            if nudged || !stuck || step + 1 == options.steps {
+                rest = true;
+                break;
+            }
+            // A saddle (a stretched arm whose hand shall come nearer) or the best there is: a nudge tells.
+            nudged = true;
+            self.nudge(problem, angles);
+        }
+        if nudged && self.worse_than_saved() {
+            angles.copy_from_slice(&self.saved.angles);
+            self.evaluate_here(problem, angles);
+            rest = true;
+        }
+        report.converged &= rest;
+    }
+
+    /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
+    /// are as good as before the phase.
+    fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
+        let looking = self.looks.looking;
+        self.looks.looking = false;
+        let mut moved = false;
+        for active in (1..=levels).rev() {
+            for _ in 0..problem.options.steps {
+                let reached = self.here.cost[..active].iter().all(|cost| *cost < SETTLED * SETTLED);
+                if reached {
+                    break;
+                }
+                moved = true;
+                if self.step(problem, active, false, true, angles) < 1e-12 {
+                    break;
+                }
+            }
+        }
+        self.looks.looking = looking;
+        if looking && moved {
+            self.evaluate_here(problem, angles);
+        }
+        self.here.cost.iter().zip(&self.levels.best).all(|(cost, best)| cost.sqrt() <= best + SETTLED)
+    }
+
+    /// Poses and derivatives at the last solution.
+    pub fn kinematics(&self) -> &Kinematics {
+        &self.here.at
+    }
+
+    fn start(&mut self, problem: &Problem, angles: &mut [f64]) {
+        let n = problem.model.freedoms();
+        for (angle, [low, high]) in angles.iter_mut().zip(problem.model.limits()) {
+            *angle = angle.clamp(*low, *high);
+        }
+        problem.model.normalise(angles);
+        level_ranges(problem.goals, &mut self.levels.ranges);
+        let count = self.levels.ranges.len();
+        self.levels.trust.clear();
+        self.levels.trust.resize(count, 0.1);
+        self.levels.before.clear();
+        self.levels.before.resize(count, 0.0);
+        for vector in [&mut self.linear.part, &mut self.here.gradient, &mut self.trial.gradient, &mut self.trial_angles]
+        {
+            vector.clear();
+            vector.resize(n, 0.0);
+        }
+        self.stages.clear();
+        self.stages.resize((count + 1) * n, 0.0);
+        self.levels.best.clear();
+        (self.looks.tried, self.looks.looked, self.looks.looking) = (0, 0, false);
+        self.gain = problem.options.gain;
+        self.evaluate_here(problem, angles);
+    }
+
+    fn evaluate_here(&mut self, problem: &Problem, angles: &[f64]) {
+        self.trial_angles.copy_from_slice(angles);
+        self.evaluate(problem);
+        self.accept();
+    }
+
+    /// Costs and kinematics at the trial angles, and the criterion if it is the images' turn.
+    fn evaluate(&mut self, problem: &Problem) {
+        self.looks.tried += 1;
+        problem.model.place(problem.base, &self.trial_angles, &mut self.trial.at);
+        self.trial.cost.clear();
+        let costs = self.levels.ranges.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial.at));
+        self.trial.cost.extend(costs);
+        self.trial.h = match problem.criterion {
+            Some(criterion) if self.looks.looking => {
+                self.looks.looked += 1;
+                criterion.evaluate(problem.model, &self.trial.at, &mut self.trial.gradient)
+            }
+            _ => 0.0,
+        };
+    }
+
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.here, &mut self.trial);
+    }
+
+    fn nudge(&mut self, problem: &Problem, angles: &mut [f64]) {
+        self.saved.angles.clear();
+        self.saved.angles.extend_from_slice(angles);
+        self.saved.cost.clear();
+        self.saved.cost.extend_from_slice(&self.here.cost);
+        for (i, (angle, [low, high])) in angles.iter_mut().zip(problem.model.limits()).enumerate() {
+            // Uneven, so that symmetric chains leave their symmetry; away from the nearer limit.
+            let at_limit = *angle <= *low || *angle >= *high;
+            let by = if at_limit { NUDGE_AT_LIMIT } else { NUDGE } * (1.0 + 0.37 * (i % 3) as f64);
+            *angle = if *high - *angle < *angle - *low { *angle - by } else { *angle + by }.clamp(*low, *high);
+        }
+        self.levels.trust.fill(0.1);
+        self.evaluate_here(problem, angles);
+    }
+
+    fn worse_than_saved(&self) -> bool {
+        for (now, saved) in self.here.cost.iter().zip(&self.saved.cost) {
+            if *now > saved + 1e-13 {
+                return true;
+            }
+            if *now < saved - 1e-13 {
+                return false;
+            }
+        }
+        false
+    }
+}

@@ -1,0 +1,69 @@
+//! The trunk and other limbs, in which no bone can lie: silhouettes cannot tell, since an arm in the trunk is content before and
+//! behind it, and a leg in the other one, too.
+
+use super::model::Kinematics;
+use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::shape::TaperedEllipticCylinder;
+
+/// A bone keeps this share of its radius off the trunk: flesh gives way, and the model's limbs are stiffer than a back.
+const CLEARANCE: f64 = 0.5;
+
+/// What carries a limb that no bone can lie in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Carrier {
+    /// It is the base of the chain.
+    Base,
+    /// It is a part of the chain.
+    Part(usize),
+    /// It is no part of the chain and has this pose in the world.
+    World(Pose),
+}
+
+/// A limb no bone can lie in: a tapered elliptic cylinder along z of its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trunk {
+    /// What carries it.
+    pub carrier: Carrier,
+    /// Length, metres.
+    pub length: f64,
+    /// Semi-axes along x at both ends.
+    pub a: [f64; 2],
+    /// Semi-axes along y at both ends.
+    pub b: [f64; 2],
+}
+
+impl Trunk {
+    /// A limb's shape somewhere.
+    pub fn new(shape: &TaperedEllipticCylinder, carrier: Carrier) -> Self {
+        Self { carrier, length: shape.length(), a: [shape.a0(), shape.a1()], b: [shape.b0(), shape.b1()] }
+    }
+
+    /// Its pose.
+    pub(super) fn pose(&self, at: &Kinematics) -> Pose {
+        match self.carrier {
+            Carrier::Base => at.base,
+            Carrier::Part(part) => at.poses[part],
+            Carrier::World(pose) => pose,
+        }
+    }
+
+    /// How deep a point with flesh of a radius around it lies inside, metres (about: by the level of the ellipse), and the
+    /// derivative by the point, in the trunk's frame.
+    pub(super) fn depth(&self, x: Vec3, radius: f64) -> (f64, Vec3) {
+        let t = x.z / self.length;
+        if !(0.0..=1.0).contains(&t) {
+            return (0.0, Vec3::ZERO);
+        }
+        let (slope_a, slope_b) = (self.a[1] - self.a[0], self.b[1] - self.b[0]);
+        let (a, b) = (self.a[0] + t * slope_a, self.b[0] + t * slope_b);
+        let (p, q) = (x.x / a, x.y / b);
+        let level = p.hypot(q).max(1e-6);
+        let thickness = self.a[0].min(self.a[1]).min(self.b[0]).min(self.b[1]);
+        let depth = thickness * (1.0 - level) + CLEARANCE * radius;
+        if depth <= 0.0 {
+            return (0.0, Vec3::ZERO);
+        }
+        let along = -(p * p * slope_a / a + q * q * slope_b / b) / self.length;
+        (depth, -thickness / level * Vec3::new(p / a, q / b, along))
+    }
+}

@@ -1,0 +1,166 @@
+//! One picture of the image criterion: how far a point lies outside of its silhouette, or before what it sees.
+
+use voodoo_core::math::{Pose, Vec3};
+
+/// Points nearer to the camera plane than this, or behind it, are not seen; metres.
+pub(super) const NEAREST: f64 = 0.05;
+/// Four depths that differ by more than this share do not belong to one surface.
+const EDGE: f64 = 0.03;
+/// So many radii behind what is seen of a limb its bone is at least: one across the line of sight, less where the person is
+/// slimmer than the body.
+const LEAST_RADII: f64 = 0.5;
+/// And at most: more than one where the limb is seen along its axis.
+const MOST_RADII: f64 = 2.0;
+
+/// One calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Of every pixel, row by row, at least 2 x 2: its distance and, inside, the radius of the largest disc within the silhouette
+    /// that covers it, pixels: half its local width. Radii of zero: no bone is centred. Together, since they are looked up together.
+    pub pixels: &'a [[f32; 2]],
+    /// Of every pixel the depth seen along the optical axis, metres, zero where there is none; or none at all. A bone lies its radius
+    /// behind what is seen, or farther; where the silhouette is the limb itself, no farther.
+    pub depth: &'a [f32],
+    /// How far its border may be from where it should be, pixels: that much less deep is deep enough. The middle between two
+    /// borders is known to half of that.
+    pub border: f64,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Focal lengths fx, fy and centre cx, cy, pixels; integer coordinates are pixel centres.
+    pub intrinsics: [f64; 4],
+    /// Pose of the world in the optical frame.
+    pub camera_from_world: Pose,
+}
+
+impl View<'_> {
+    /// `max(distance + depth, 0)` of a point in the optical frame and how far it lies before what is seen, both pixels, and the
+    /// derivative by that point.
+    pub(super) fn outside(&self, x: Vec3, radius: f64, thin: f64) -> (f64, Vec3) {
+        if x.z < NEAREST {
+            return (0.0, Vec3::ZERO);
+        }
+        let [fx, fy, cx, cy] = self.intrinsics;
+        let inverse = 1.0 / x.z;
+        let (px, py) = (x.x * inverse, x.y * inverse);
+        let Some(at) = self.locate(fx * px + cx, fy * py + cy) else { return (0.0, Vec3::ZERO) };
+        let Some([distance, half]) = at.sample(self.pixels, self.width) else { return (0.0, Vec3::ZERO) };
+        let [distance, mut du, mut dv] = distance.at(&at);
+        let projected = fx * radius * inverse;
+        let mut depth = (projected - self.border).max(0.0);
+        // The derivative of the depth by the distance from the camera plane.
+        let mut closer = if depth > 0.0 { projected } else { 0.0 };
+        let middle = 0.5 * self.border;
+        let mut itself = false;
+        // No place is deeper than half the width: what is too deep to be thin need not be looked at.
+        if distance < 0.0 && -distance <= thin * projected {
+            let [half, su, sv] = half.at(&at);
+            itself = half > 0.0 && half <= thin * projected;
+            if itself && half - middle > depth {
+                depth = half - middle;
+                (du, dv, closer) = (du + su, dv + sv, 0.0);
+            }
+        }
+        let (mut value, mut slope) = (distance + depth, Vec3::ZERO);
+        if value > 0.0 {
+            let (gx, gy) = (du * fx, dv * fy);
+            slope = Vec3::new(gx, gy, -(gx * px + gy * py) - closer) * inverse;
+        } else {
+            value = 0.0;
+        }
+        if !self.depth.is_empty() && radius > 0.0 {
+            let (before, by) = self.before(&at, x, radius, itself);
+            value += before;
+            slope += by;
+        }
+        (value, slope)
+    }
+
+    /// How far the flesh around a point lies before what is seen there, or behind it if what is seen is the limb itself, pixels
+    /// (metres as they would appear across the line of sight), and the derivative by the point.
+    fn before(&self, at: &Place, x: Vec3, radius: f64, itself: bool) -> (f64, Vec3) {
+        let nothing = (0.0, Vec3::ZERO);
+        let Some(corners) = at.corners(self.depth, self.width) else { return nothing };
+        let corners = corners.map(f64::from);
+        let (least, most) = corners.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(*d), b.max(*d)));
+        if at.beyond != [0.0; 2] || !(least > NEAREST && most < (1.0 + EDGE) * least) {
+            return nothing;
+        }
+        let [seen, du, dv] = Corners(corners).at(at);
+        let (before, behind) = (seen + LEAST_RADII * radius - x.z, x.z - seen - MOST_RADII * radius);
+        let (gap, sign) = if before > 0.0 { (before, 1.0) } else { (behind, -1.0) };
+        if sign < 0.0 && !itself {
+            return nothing;
+        }
+        let [fx, fy, ..] = self.intrinsics;
+        let inverse = 1.0 / x.z;
+        let value = fx * gap * inverse - self.border;
+        if value <= 0.0 {
+            return nothing;
+        }
+        let (gx, gy) = (du * fx * inverse, dv * fy * inverse);
+        let slope = Vec3::new(gx, gy, -(gx * x.x + gy * x.y) * inverse - 1.0);
+        (value, fx * inverse * (sign * slope - gap * inverse * Vec3::Z))
+    }
+
+    /// The four pixels around a place; outside of the picture those of its border.
+    fn locate(&self, u: f64, v: f64) -> Option<Place> {
+        let (right, bottom) = ((self.width - 1) as f64, (self.height - 1) as f64);
+        let (x, y) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
+        let column = (x as usize).min(self.width - 2);
+        let row = (y as usize).min(self.height - 2);
+        let place =
+            Place { start: row * self.width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
+        (place.start + self.width + 2 <= self.pixels.len()).then_some(place)
+    }
+}
+
+/// A place between four pixels, and how far beyond the picture it lies.
+struct Place {
+    start: usize,
+    s: f64,
+    t: f64,
+    beyond: [f64; 2],
+}
+
+/// The values of those four pixels: upper row, lower row.
+struct Corners([f64; 4]);
+
+impl Place {
+    fn corners<T: Copy>(&self, image: &[T], width: usize) -> Option<[T; 4]> {
+        let (upper, lower) =
+            (image.get(self.start..self.start + 2)?, image.get(self.start + width..self.start + width + 2)?);
+        Some([upper[0], upper[1], lower[0], lower[1]])
+    }
+
+    /// The corners of both images; none for images of another size.
+    fn sample(&self, pixels: &[[f32; 2]], width: usize) -> Option<[Corners; 2]> {
+        let corners = self.corners(pixels, width)?;
+        Some([0, 1].map(|image| Corners(corners.map(|pixel| f64::from(pixel[image])))))
+    }
+}
+
+impl Corners {
+    /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the
+    /// picture is background.
+    fn at(&self, place: &Place) -> [f64; 3] {
+        let (s, t) = (place.s, place.t);
+        let [d00, d01, d10, d11] = self.0;
+        let (first, second) = (d00 + s * (d01 - d00), d10 + s * (d11 - d10));
+        let value = first + t * (second - first);
+        let (mut du, mut dv) = ((1.0 - t) * (d01 - d00) + t * (d11 - d10), second - first);
+        let [ox, oy] = place.beyond;
+        if ox == 0.0 && oy == 0.0 {
+            return [value, du, dv];
+        }
+        let beyond = ox.hypot(oy);
+        if ox != 0.0 {
+            du = ox / beyond;
+        }
+        if oy != 0.0 {
+            dv = oy / beyond;
+        }
+        [value + beyond, du, dv]
+    }
+}

@@ -1,0 +1,237 @@
+//! Inverse kinematics: derivatives against differences, twists, lines against rays, priorities, limits, singular cases.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use nalgebra::Matrix6;
+use proptest::prelude::*;
+use voodoo_core::Body;
+use voodoo_core::body::HumanModel;
+use voodoo_core::body::kinematics::exp;
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::terms::normal_equations::{LimbBlock, line};
+use voodoo_ik::{
+    Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Solver, Trunk, View, bones, level_rows, log,
+    project, trunk,
+};
+
+fn human() -> Body {
+    Body::human(1.75, HumanModel::Full).unwrap()
+}
+
+fn arm() -> (Body, Model) {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let limbs = ["l_upperarm", "l_forearm"].map(|name| body.limb_index(name).unwrap());
+    let model = Model::new(&body, &limbs, Root::Fixed).unwrap();
+    (body, model)
+}
+
+fn goal(body: &Body, model: &Model, site: &str, aim: Aim, level: usize) -> Goal {
+    let site = &body.sites()[body.site_index(site).unwrap()];
+    Goal { part: model.part_of(site.limb).unwrap(), point: site.position, aim, weight: 1.0, level }
+}
+
+fn position(model: &Model, goal: &Goal, angles: &[f64]) -> Vec3 {
+    let mut at = Kinematics::default();
+    model.place(&Pose::IDENTITY, angles, &mut at);
+    at.poses[goal.part].transform_point(goal.point)
+}
+
+fn close(a: Vec3, b: Vec3, within: f64) -> bool {
+    (a - b).length() < within
+}
+
+fn values(count: usize, size: f64) -> impl Strategy<Value = Vec<f64>> {
+    proptest::collection::vec(-size..size, count)
+}
+
+/// Signed distance to a disc, as a picture.
+fn disc(width: usize, height: usize, centre: [f64; 2], radius: f64) -> Vec<f32> {
+    (0..width * height)
+        .map(|i| ((i % width) as f64 - centre[0]).hypot((i / width) as f64 - centre[1]) as f32 - radius as f32)
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+
+    #[test]
+    fn exp_of_log(omega in values(3, 1.0), v in values(3, 2.0), angle in prop_oneof![
+        Just(0.0), 1e-12..1e-3_f64, 0.0..3.1_f64, (std::f64::consts::PI - 1e-7)..std::f64::consts::PI,
+    ]) {
+        let axis = Vec3::new(omega[0], omega[1], omega[2]).try_normalize().unwrap_or(Vec3::X);
+        let pose = Pose::from_parts(Vec3::new(v[0], v[1], v[2]), Quat::from_axis_angle(axis, angle));
+        let back = exp(&log(&pose));
+        prop_assert!(close(back.translation, pose.translation, 1e-9), "{pose:?} {back:?}");
+        prop_assert!(back.rotation.dot(pose.rotation).abs() > 1.0 - 1e-14);
+        prop_assert!((log(&pose).fixed_rows::<3>(0).norm() - angle).abs() < 1e-8);
+    }
+
+    #[test]
+    fn jacobian_is_the_derivative(angles in values(64, 1.2), site in 0..20_usize, kind in any::<bool>()) {
+        let body = human();
+        let model = Model::new(&body, &[], Root::Free).unwrap();
+        let angles = &angles[..model.freedoms()];
+        let site = &body.sites()[site % body.sites().len()];
+        let aim = if kind {
+            Aim::line(Vec3::new(0.3, -0.2, 0.9), Vec3::new(0.2, 1.0, -0.4))
+        } else {
+            Aim::Position(Vec3::new(0.1, 0.2, 0.3))
+        };
+        let goal = Goal { part: model.part_of(site.limb).unwrap(), point: site.position, aim, weight: 2.0, level: 0 };
+        let evaluate = |angles: &[f64]| {
+            let (mut at, mut rows, mut residual) = (Kinematics::default(), Vec::new(), Vec::new());
+            model.place(&Pose::IDENTITY, angles, &mut at);
+            level_rows(&model, &[goal], &at, &mut rows, &mut residual);
+            (rows, residual)
+        };
+        let (rows, _) = evaluate(angles);
+        for i in 0..angles.len() {
+            let moved = |by: f64| {
+                let mut angles = angles.to_vec();
+                angles[i] += by;
+                evaluate(&angles).1
+            };
+            let (plus, minus) = (moved(1e-6), moved(-1e-6));
+            for axis in 0..3 {
+                let numeric = (plus[axis] - minus[axis]) / 2e-6;
+                prop_assert!((rows[axis * angles.len() + i] - numeric).abs() < 1e-7, "unknown {i} axis {axis}");
+            }
+        }
+    }
+
+    #[test]
+    fn criterion_gradient_is_the_derivative(angles in values(64, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
+        let body = human();
+        let model = Model::new(&body, &[], Root::Free).unwrap();
+        let mut angles = angles[..model.freedoms()].to_vec();
+        angles[2] += 0.2;
+        let image = disc(160, 120, [60.0, 50.0], 12.0);
+        // A disc is nowhere thinner than itself; a little slope, so that its derivative is seen.
+        let pixels: Vec<[f32; 2]> = image.iter().enumerate().map(|(i, d)| [*d, if *d < 0.0 { 6.0 + 0.02 * (i % 160) as f32 } else { 0.0 }]).collect();
+        // A surface through the body, oblique.
+        let depth: Vec<f32> = (0..160 * 120).map(|i| 3.0 + 0.001 * (i % 160) as f32 - 0.002 * (i / 160) as f32).collect();
+        // Optical frame: z towards -x of the world, 3 m away.
+        let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
+        let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
+        let view = View { pixels: &pixels, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
+        let deep = View { depth: &depth, ..view };
+        let mut segments = bones(&body, &model, 0.0);
+        segments.iter_mut().for_each(|segment: &mut Bone| segment.radius = [radius, 0.5 * radius]);
+        let mut trunk = trunk(&body, &model);
+        prop_assert_eq!(trunk.len(), 2);
+        // A limb beside the chain, through the body's middle.
+        let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
+        trunk.push(Trunk::new(&body.limbs()[0].shape, Carrier::World(beside)));
+        let criterion = Criterion { views: &[view, deep], segments: &segments, thin, trunk: &trunk };
+        let evaluate = |angles: &[f64]| {
+            let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
+            model.place(&Pose::IDENTITY, angles, &mut at);
+            (criterion.evaluate(&model, &at, &mut gradient), gradient)
+        };
+        let (h, gradient) = evaluate(&angles);
+        prop_assert!(h > 0.0);
+        for i in 0..angles.len() {
+            let moved = |by: f64| {
+                let mut angles = angles.clone();
+                angles[i] += by;
+                evaluate(&angles).0
+            };
+            // Differences straddle the kinks between pixels: a tiny step makes that rare, and the bound allows for one.
+            let numeric = (moved(1e-7) - moved(-1e-7)) / 2e-7;
+            prop_assert!((gradient[i] - numeric).abs() < 1e-3 * (1.0 + numeric.abs()) + 0.3, "{i}: {} {numeric}", gradient[i]);
+        }
+        let error: f64 = (0..angles.len()).map(|i| {
+            let moved = |by: f64| { let mut angles = angles.clone(); angles[i] += by; evaluate(&angles).0 };
+            (gradient[i] - (moved(1e-7) - moved(-1e-7)) / 2e-7).abs()
+        }).sum::<f64>() / angles.len() as f64;
+        prop_assert!(error < 0.05 * (1.0 + gradient.iter().map(|g| g.abs()).sum::<f64>() / angles.len() as f64), "{error}");
+    }
+
+    #[test]
+    fn no_bone_in_the_trunk(x in -0.2..0.2_f64, y in -0.2..0.2_f64) {
+        let (body, model) = arm();
+        let trunk = trunk(&body, &model);
+        // The base of an arm is the trunk.
+        prop_assert_eq!(trunk.len(), 1);
+        let image = vec![[-100.0_f32, 0.0]; 160 * 120];
+        let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
+        let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
+        let view = View { pixels: &image, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+        // One short bone beside the shoulder, moved into the trunk by its base.
+        let segment = Bone { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
+        let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };
+        let mut at = Kinematics::default();
+        model.place(&Pose::IDENTITY, &vec![0.0; model.freedoms()], &mut at);
+        at.poses[0] = Pose::from_parts(Vec3::new(x, y, 0.3), at.poses[0].rotation);
+        let h = criterion.evaluate(&model, &at, &mut vec![0.0; model.freedoms()]);
+        let shape = &body.limbs()[0].shape;
+        let t = 0.3 / shape.length();
+        let (a, b) = (shape.a0() + t * (shape.a1() - shape.a0()), shape.b0() + t * (shape.b1() - shape.b0()));
+        let level = (x / a).hypot(y / b);
+        prop_assert!((h > 0.0) == (level < 1.0) || (level - 1.0).abs() < 0.02, "{h} {level}");
+    }
+
+    #[test]
+    fn lines_equal_rays(x in values(3, 2.0), p in values(3, 2.0), d in values(3, 1.0)) {
+        let (x, p) = (Vec3::new(x[0], x[1], x[2]), Vec3::new(p[0], p[1], p[2]));
+        let d = Vec3::new(d[0], d[1], d[2]).try_normalize().unwrap_or(Vec3::Z);
+        // R07 eq. 13: three rows of the twist.
+        let aim = Aim::line(p, d);
+        let mut pluecker = LimbBlock::default();
+        let residual = aim.residual(x);
+        let columns: Vec<Vec3> = (0..6).map(|i| {
+            let e = Vec3::AXES[i % 3];
+            aim.derivative(if i < 3 { e.cross(x) } else { e })
+        }).collect();
+        for axis in 0..3 {
+            let row = nalgebra::Vector6::from_fn(|i, _| columns[i][axis]);
+            pluecker.add_row(1.0, &row, residual[axis]);
+        }
+        // Our ray correspondence: W = I - d d^T to any point of the ray.
+        let information = Mat3::IDENTITY - Mat3::from_cols(d * d.x, d * d.y, d * d.z);
+        let mut ray = LimbBlock::default();
+        ray.add_point(&information, x, x - p);
+        let difference: Matrix6<f64> = pluecker.h - ray.h;
+        prop_assert!(difference.abs().max() < 1e-12 * (1.0 + ray.h.abs().max()));
+        prop_assert!((pluecker.g - ray.g).abs().max() < 1e-12 * (1.0 + ray.g.abs().max()));
+        // The distance itself.
+        let offset = x - p;
+        let distance = (offset - offset.dot(d) * d).length();
+        prop_assert!((residual.length() - distance).abs() < 1e-12);
+        prop_assert!(line(x, d).norm() > 0.0);
+    }
+
+    #[test]
+    fn lower_levels_never_disturb_higher_ones(start in values(6, 0.4), hand in values(3, 0.9), elbow in values(3, 0.9)) {
+        let (body, model) = arm();
+        let shoulder = model.parts()[0].parent_from_joint.translation;
+        let options = Options { steps: 400, tolerance: 1e-12, still: 1e-12, ..Options::default() };
+        let top = goal(&body, &model, "l_hand", Aim::Position(shoulder + Vec3::new(hand[0], hand[1], hand[2])), 0);
+        let low = goal(&body, &model, "l_elbow", Aim::Position(shoulder + Vec3::new(elbow[0], elbow[1], elbow[2])), 1);
+        let third = goal(&body, &model, "l_wrist", Aim::Position(Vec3::ZERO), 2);
+        let residual = |goals: &[Goal]| {
+            let mut angles = start[..model.freedoms()].to_vec();
+            Solver::default().solve(&model, &Pose::IDENTITY, goals, None, &options, &mut angles);
+            for (angle, [least, greatest]) in angles.iter().zip(model.limits()) {
+                prop_assert!(*least <= *angle && *angle <= *greatest);
+            }
+            Ok(top.aim.residual(position(&model, &top, &angles)).length())
+        };
+        let (alone, two, three) = (residual(&[top])?, residual(&[top, low])?, residual(&[top, low, third])?);
+        prop_assert!(two <= alone + 1e-9, "{alone} {two}");
+        prop_assert!(three <= alone + 1e-9, "{alone} {three}");
+    }
+
+    #[test]
+    fn projection_finds_the_angles_again(angles in values(64, 0.5)) {
+        let body = human();
+        let model = Model::new(&body, &[], Root::Free).unwrap();
+        let wanted: Vec<f64> = angles[..model.freedoms()].iter().zip(model.limits()).map(|(a, [l, h])| a.clamp(*l, *h)).collect();
+        let mut at = Kinematics::default();
+        model.place(&Pose::IDENTITY, &wanted, &mut at);
+        let mut found = Vec::new();
+        project(&body, &model, &Pose::IDENTITY, &at.poses, &mut found);
+        for (found, wanted) in found.iter().zip(&wanted) {
+            prop_assert!((found - wanted).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! What a depth camera sees of the body, in the picture of a colour camera beside it; and what may be the still scene.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::registration::{MeasuredPixels, ProjectedPoints};
+use crate::still::still;
+use crate::window::Window;
+use voodoo_core::error::TrackError;
+use voodoo_core::observation::depth_view::NEAREST_SEEN;
+use voodoo_core::observation::frame::DepthPixels;
+
+/// A pose whose entries change by less is that of a camera that stands.
+const CAMERA_STANDS: f64 = 1e-3;
+/// Over so many pictures the depth of a still surface hardly changes.
+const STAYS_PICTURES: usize = 6;
+/// A 4x4 transform, row by row.
+pub type Matrix = [[f64; 4]; 4];
+
+/// What a depth camera saw of the body, in the picture of a colour camera beside it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BodyView {
+    /// Rows and columns of the picture.
+    pub size: [usize; 2],
+    /// Of every pixel of the picture whether something near the body was seen there, or the depth camera does not look.
+    pub mask: Vec<bool>,
+    /// Columns and rows of the points in the picture.
+    pub pixels: Vec<[f64; 2]>,
+    /// Theirs along the colour camera's optical axis, metres.
+    pub depths: Vec<f64>,
+    /// Of every point whether nothing behind it was ever seen there: it may be the scene. None: not known.
+    pub still: Option<Vec<bool>>,
+    /// Of every pixel whether something is before what was seen there once. None: not known.
+    pub before: Option<Vec<bool>>,
+}
+
+impl BodyView {
+    /// What was measured.
+    pub fn measured(&self) -> MeasuredPixels<'_> {
+        MeasuredPixels { places: &self.pixels, depths: &self.depths, still: self.still.as_deref() }
+    }
+}
+
+/// Of every pixel that is looked at whether it shows what may be the scene, and whether something before what was seen there once.
+pub type Standing = (Vec<bool>, Vec<bool>);
+
+/// What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind which
+/// nothing was ever seen. A table's edge does not become a hand.
+///
+/// The surface of a person who has not moved yet looks the same, so this only tells what has moved.
+#[derive(Clone, Debug, Default)]
+pub struct StillDepth {
+    size: [usize; 2],
+    pose: Matrix,
+    /// Images are never changed in place: copies share them.
+    farthest: Arc<Vec<f32>>,
+    last: VecDeque<Arc<Vec<f32>>>,
+    /// Images that are needed no more, once no copy has them.
+    spare: VecDeque<Arc<Vec<f32>>>,
+}
+
+impl StillDepth {
+    /// The same, without memory that it would reuse.
+    pub fn twin(&self) -> Self {
+        let mut twin = self.clone();
+        twin.spare.clear();
+        twin
+    }
+
+    /// Memory for an image.
+    fn image(&mut self) -> Vec<f32> {
+        let mut image = self.spare.pop_front().and_then(|spare| Arc::try_unwrap(spare).ok()).unwrap_or_default();
+        image.clear();
+        image
+    }
+
+    /// Takes up an image, metres, 0 = no return, of so many rows and columns; a camera that has moved starts anew.
+    ///
+    /// Of every pixel whether it shows what may be the scene, and whether something before what was seen there once; none as long
+    /// as too little was seen. Nothing is told of pixels outside some rows and columns.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when the image is not of that size.
+    pub fn see(
+        &mut self,
+        z: Vec<f32>,
+        size: [usize; 2],
+        pose: &Matrix,
+        within: [Range<usize>; 2],
+    ) -> Result<Option<Standing>, TrackError> {
+        let entries = self.pose.as_flattened().iter().zip(pose.as_flattened());
+        let moved = entries.into_iter().any(|(before, now)| !((before - now).abs() <= CAMERA_STANDS));
+        if self.farthest.is_empty() || moved || self.size != size || self.farthest.len() != z.len() {
+            (self.size, self.pose) = (size, *pose);
+            self.farthest = Arc::new(z.clone());
+            self.last.clear();
+        } else {
+            // A NaN stays one.
+            let farther = |(far, z): (&f32, &f32)| if *far > *z || far.is_nan() { *far } else { *z };
+            let mut farthest = self.image();
+            farthest.extend(self.farthest.iter().zip(&z).map(farther));
+            self.spare.push_back(std::mem::replace(&mut self.farthest, Arc::new(farthest)));
+        }
+        let found = match self.last.front() {
+            Some(then) if self.last.len() == STAYS_PICTURES => Some(still(&z, &self.farthest, then, size[1], within)?),
+            _ => None,
+        };
+        if self.last.len() == STAYS_PICTURES {
+            self.spare.extend(self.last.pop_front());
+        }
+        self.last.push_back(Arc::new(z));
+        Ok(found)
+    }
+}
+
+/// A depth camera beside a colour camera, and where the body is expected.
+#[derive(Clone, Copy, Debug)]
+pub struct Beside<'a> {
+    /// Depths, row by row.
+    pub image: DepthPixels<'a>,
+    /// Metres each of their units is.
+    pub metres_per_unit: f64,
+    /// Rows and columns of the depth camera.
+    pub size: [usize; 2],
+    /// Its focal lengths and middle, pixels; none: its lens distorts.
+    pub intrinsics: Option<[f64; 4]>,
+    /// `(x/z, y/z)` of every pixel of it, row by row.
+    pub rays: &'a [[f32; 2]],
+    /// Its pose.
+    pub world_from_depth: Matrix,
+    /// From its frame to the colour camera's.
+    pub color_from_depth: Matrix,
+    /// Every step-th row and column is used.
+    pub step: usize,
+    /// Enlargement of the box around the body, metres.
+    pub margin: f64,
+    /// Places of the body in the world, metres.
+    pub joints: &'a [[f64; 3]],
+}
+
+/// The points of a depth image near the body, in the frame of a colour camera.
+#[derive(Clone, Debug)]
+pub struct Nearby {
+    /// Metres.
+    pub points: Vec<[f64; 3]>,
+    still: Option<Vec<bool>>,
+    moved: Option<Vec<bool>>,
+}
+
+impl Beside<'_> {
+    /// How far the body is along the depth camera's optical axis, metres: the median of its places.
+    pub fn away(&self) -> f64 {
+        let mut depths: Vec<f64> = self.joints.iter().map(|place| self.in_depth(*place)[2]).collect();
+        depths.sort_unstable_by(f64::total_cmp);
+        let upper = depths.len() / 2;
+        match (depths.get(upper.wrapping_sub(1)), depths.get(upper)) {
+            (Some(lower), Some(upper)) if depths.len().is_multiple_of(2) => 0.5 * (lower + upper),
+            (_, Some(middle)) => *middle,
+            _ => f64::NAN,
+        }
+    }
+
+    /// The points near the body; `scene` takes up the image.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when sizes do not fit together.
+    pub fn nearby(&self, scene: Option<&mut StillDepth>) -> Result<Nearby, TrackError> {
+        let (size, step) = (self.size.map(|size| size.div_ceil(self.step.max(1))), self.step.max(1));
+        if self.size[0].checked_mul(self.size[1]) != Some(self.image.len()) {
+            let found = format!("{} for {:?}", self.image.len(), self.size);
+            return Err(TrackError::measurement("depth", "a depth for every pixel of the camera", found));
+        }
+        let (low, high) = self.bounds();
+        let [rows, columns] = self.window(low, high).map(|span| span.start.div_ceil(step)..span.end.div_ceil(step));
+        let mut scene = scene;
+        let depth = self.metres(scene.as_mut().map_or_else(Vec::new, |scene| scene.image()));
+        let within = [rows.clone(), columns.clone()];
+        let window = Window { depth: &depth, size, rays: self.rays, camera: self.size, step, rows, columns };
+        let (points, pixels) = window.within(low, high, &self.world_from_depth, &self.color_from_depth)?;
+        let standing = match scene {
+            Some(scene) => scene.see(depth, size, &self.world_from_depth, within)?,
+            None => None,
+        };
+        let at = |marks: Vec<bool>| pixels.iter().map(|index| marks[*index as usize]).collect();
+        let (still, moved) = standing.map_or((None, None), |(still, moved)| (Some(at(still)), Some(at(moved))));
+        Ok(Nearby { points, still, moved })
+    }
+
+    /// Every step-th row and column, metres, into memory.
+    fn metres(&self, mut metres: Vec<f32>) -> Vec<f32> {
+        let (scale, width, step) = (self.metres_per_unit as f32, self.size[1].max(1), self.step.max(1));
+        fn every<T: Copy>(pixels: &[T], width: usize, step: usize) -> impl Iterator<Item = T> {
+            pixels.chunks(width).step_by(step).flat_map(move |row| row.iter().step_by(step)).copied()
+        }
+        match (self.image, step) {
+            (DepthPixels::U16(pixels), 1) => metres.extend(pixels.iter().map(|pixel| f32::from(*pixel) * scale)),
+            (DepthPixels::U16(pixels), _) => {
+                metres.extend(every(pixels, width, step).map(|pixel| f32::from(pixel) * scale));
+            }
+            (DepthPixels::F32(pixels), 1) => metres.extend(pixels.iter().map(|pixel| pixel * scale)),
+            (DepthPixels::F32(pixels), _) => metres.extend(every(pixels, width, step).map(|pixel| pixel * scale)),
+        }
+        metres
+    }
+
+    fn in_depth(&self, place: [f64; 3]) -> [f64; 3] {
+        let pose = &self.world_from_depth;
+        let offset = [0, 1, 2].map(|axis| place[axis] - pose[axis][3]);
+        [0, 1, 2].map(|axis| (0..3).map(|row| offset[row] * pose[row][axis]).sum())
+    }
+
+    /// Low and high corner of the box around the body, world.
+    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let least = |axis: usize| self.joints.iter().fold(f64::INFINITY, |least, place| least.min(place[axis]));
+        let most = |axis: usize| self.joints.iter().fold(f64::NEG_INFINITY, |most, place| most.max(place[axis]));
+        ([0, 1, 2].map(|axis| least(axis) - self.margin), [0, 1, 2].map(|axis| most(axis) + self.margin))
+    }
+
+    /// Rows and columns of the depth image that can show the box between two corners; all where the lens distorts.
+    fn window(&self, low: [f64; 3], high: [f64; 3]) -> [Range<usize>; 2] {
+        let all = self.size.map(|size| 0..size);
+        let Some([fx, fy, cx, cy]) = self.intrinsics else { return all };
+        let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for corner in 0..8 {
+            let place = [0, 1, 2].map(|axis| if corner >> axis & 1 == 1 { high[axis] } else { low[axis] });
+            let [x, y, z] = self.in_depth(place);
+            if !(z >= NEAREST_SEEN) {
+                return all;
+            }
+            for (axis, value) in [y / z * fy + cy, x / z * fx + cx].into_iter().enumerate() {
+                (least[axis], most[axis]) = (least[axis].min(value), most[axis].max(value));
+            }
+        }
+        let within = |value: f64, size: usize| value.clamp(0.0, size as f64) as usize;
+        [0, 1].map(|axis| {
+            let size = self.size[axis];
+            within(least[axis].floor(), size)..within(most[axis].ceil() + 1.0, size)
+        })
+    }
+}
+
+impl Nearby {
+    /// Columns and rows of the points, for a lens without distortion; NaN for points at or behind the camera.
+    pub fn projected(&self, [fx, fy, cx, cy]: [f64; 4]) -> Vec<[f64; 2]> {
+        let seen = |[x, y, z]: &[f64; 3]| {
+            if *z > 0.0 { [x / z * fx + cx, y / z * fy + cy] } else { [f64::NAN; 2] }
+        };
+        self.points.iter().map(seen).collect()
+    }
+
+    /// Where the points are in a picture of `[height, width]`, at some places (column, row); the gaps between the depth pixels are
+    /// closed within `reach` pixels, and where the depth camera does not look (`beyond`) nothing is ruled out.
+    ///
+    /// # Errors
+    /// [`TrackError::Measurement`] when sizes do not fit together.
+    pub fn view(
+        self,
+        pixels: Vec<[f64; 2]>,
+        beyond: &[bool],
+        reach: usize,
+        size: [usize; 2],
+    ) -> Result<BodyView, TrackError> {
+        let projected = ProjectedPoints::new(&pixels, &self.points, self.moved.as_deref(), size)?;
+        let (mask, before) = projected.shown(beyond, reach, size)?;
+        let inside = |index: &isize| *index as usize;
+        let depths = projected.inside.iter().map(|index| self.points[inside(index)][2]).collect();
+        let still = self.still.map(|still| projected.inside.iter().map(|index| still[inside(index)]).collect());
+        let pixels = projected.inside.iter().map(|index| pixels[inside(index)]).collect();
+        Ok(BodyView { size, mask, pixels, depths, still, before })
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    const LEVEL: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+    #[test]
+    fn a_scene_is_known_after_some_pictures_and_copies_have_their_own() {
+        let mut scene = StillDepth::default();
+        for count in 0..9 {
+            let twin = scene.twin();
+            let found = scene.see(vec![3.0; 12], [3, 4], &LEVEL, [0..3, 0..4]).unwrap();
+            assert_eq!(found.is_some(), count >= STAYS_PICTURES, "{count}");
+            assert_eq!(twin.last.len(), count.min(STAYS_PICTURES));
+        }
+        let twin = scene.twin();
+        let mut hand = vec![3.0; 12];
+        hand[5] = 2.0;
+        hand[11] = f32::NAN;
+        let (still, before) = scene.see(hand, [3, 4], &LEVEL, [0..3, 0..4]).unwrap().unwrap();
+        assert_eq!((still[5], before[5], still[0]), (false, true, true));
+        assert!(scene.farthest[11].is_nan() && *twin.farthest == [3.0; 12]);
+        let moved = [[1.0, 0.0, 0.0, 0.01], LEVEL[1], LEVEL[2], LEVEL[3]];
+        assert!(scene.see(vec![3.0; 12], [3, 4], &moved, [0..3, 0..4]).unwrap().is_none());
+    }
+
+    #[test]
+    fn noise_is_not_before_the_scene_but_a_hand_that_came_is_and_stays_so() {
+        let mut scene = StillDepth::default();
+        let (size, hand) =
+            ([60, 80], |index: usize| (20..30).contains(&(index / 80)) && (30..40).contains(&(index % 80)));
+        let mut found = None;
+        for step in 0..20_u32 {
+            // Of three hundredths of a metre to either side, another in every pixel and picture.
+            let noise =
+                |index: usize| (step * 4800 + index as u32).wrapping_mul(2_654_435_761) as f32 / u32::MAX as f32;
+            let depth = |index: usize| {
+                if step >= 8 && hand(index) { 2.5 } else { 3.0 + 0.06 * (noise(index) - 0.5) }
+            };
+            found = scene.see((0..4800).map(depth).collect(), size, &LEVEL, [0..60, 0..80]).unwrap();
+            assert_eq!(found.is_some(), step as usize >= STAYS_PICTURES);
+        }
+        let (still, before) = found.unwrap();
+        let within = |index: usize, margin: usize| {
+            let (row, column) = (index / 80, index % 80);
+            (20 + margin..30 - margin).contains(&row) && (30 + margin..40 - margin).contains(&column)
+        };
+        let around = |index: usize| (19..31).contains(&(index / 80)) && (29..41).contains(&(index % 80));
+        assert!((0..4800).filter(|index| within(*index, 1)).all(|index| before[index] && !still[index]));
+        let outside: Vec<usize> = (0..4800).filter(|index| !around(*index)).collect();
+        assert!(outside.iter().all(|index| !before[*index]));
+        assert!(20 * outside.iter().filter(|index| !still[**index]).count() < outside.len());
+    }
+
+    #[test]
+    fn the_body_is_looked_for_in_its_box_alone() {
+        let mut image = vec![4000_u16; 24 * 16];
+        (6..10).for_each(|row| image[row * 24 + 8..row * 24 + 12].fill(2000));
+        let rays: Vec<[f32; 2]> =
+            (0..16).flat_map(|v| (0..24).map(move |u| [(u as f32 - 11.5) / 20.0, (v as f32 - 7.5) / 20.0])).collect();
+        let beside = Beside {
+            image: DepthPixels::U16(&image),
+            metres_per_unit: 0.001,
+            size: [16, 24],
+            intrinsics: Some([20.0, 20.0, 11.5, 7.5]),
+            rays: &rays,
+            world_from_depth: LEVEL,
+            color_from_depth: LEVEL,
+            step: 1,
+            margin: 0.3,
+            joints: &[[-0.2, 0.0, 1.9], [-0.1, 0.1, 2.0], [-0.1, 0.1, 2.2]],
+        };
+        assert_eq!(beside.away(), 2.0);
+        let nearby = beside.nearby(None).unwrap();
+        assert_eq!(nearby.points.len(), 16);
+        let pixels = nearby.projected([20.0, 20.0, 11.5, 7.5]);
+        let view = nearby.view(pixels, &vec![false; 24 * 16], 1, [16, 24]).unwrap();
+        assert_eq!(view.mask.iter().filter(|pixel| **pixel).count(), 36);
+        assert!((view.depths[0] - 2.0).abs() < 1e-6 && view.mask[5 * 24 + 7] && !view.mask[4 * 24 + 7]);
+        let coarse = Beside { step: 2, intrinsics: None, ..beside };
+        assert_eq!(coarse.nearby(None).unwrap().points.len(), 4);
+        assert!(Beside { size: [16, 23], ..beside }.nearby(None).is_err());
+    }
+}

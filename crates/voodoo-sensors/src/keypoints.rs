@@ -1,0 +1,219 @@
+//! What the 2-D keypoints of a network say about the sites of a body.
+
+use crate::eye::Eye;
+use voodoo_core::math::Vec3;
+use voodoo_core::observation::sites::{SiteGate, SiteRay};
+
+/// Standard deviation along a ray of a place on it, where none is told, metres.
+const ALONG_SIGMA: f64 = 0.04;
+/// Standard deviation of a site behind so many metres of the person's own body, beyond half a limb: the network guesses it.
+const GUESSED: f64 = 0.4;
+
+/// A site, and the keypoints that it is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Its name.
+    pub site: String,
+    /// Number and share of each.
+    pub shares: Vec<(usize, f64)>,
+    /// How far the network's idea of the site lies from ours, metres.
+    pub spread: f64,
+    /// How far behind the visible surface it lies, metres.
+    pub behind: f64,
+}
+
+/// A site seen in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SitePixel {
+    /// Column and row.
+    pub pixel: [f64; 2],
+    /// The least of its keypoints' confidences, at most 1.
+    pub confidence: f64,
+}
+
+impl Part {
+    /// Where a site is by keypoints (column, row, confidence); none where one of them is missing, or believed less than `least`.
+    pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
+        let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
+        for (index, share) in &self.shares {
+            let [u, v, believed] = *keypoints.get(*index)?;
+            pixel = [pixel[0] + share * u, pixel[1] + share * v];
+            total += believed;
+            confidence = if believed < confidence { believed } else { confidence };
+        }
+        // What is not finite anywhere is not in the sums.
+        let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
+        known.then_some(SitePixel { pixel, confidence })
+    }
+}
+
+/// The camera of a picture, and how its keypoints become measurements.
+#[derive(Clone, Copy, Debug)]
+pub struct Sensor<'a> {
+    /// Where it stands.
+    pub eye: Eye,
+    /// Its name.
+    pub source: &'a str,
+    /// Standard deviation of a keypoint that is believed, pixels.
+    pub noise: f64,
+    /// Least standard deviation of a place by a depth camera, metres: how well it is known how far behind a surface a site lies.
+    pub place_sigma: f64,
+    /// Time of the frame, seconds.
+    pub stamp: f64,
+}
+
+/// A site that was seen, and what else is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sighting {
+    /// Where in the picture.
+    pub seen: SitePixel,
+    /// The pixel without the lens: `x/z` and `y/z`, NaN where that is not known.
+    pub flat: [f64; 2],
+    /// Where the site is expected, world, metres.
+    pub expected: Vec3,
+    /// How much of the person's own body lies before it, metres.
+    pub hidden: f64,
+    /// What a depth camera sees there, along the optical axis, metres.
+    pub surface: Option<f64>,
+}
+
+/// What a site that was seen becomes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    /// A ray.
+    Ray(SiteRay),
+    /// A place in the world, and its standard deviation, metres.
+    Place(Vec3, f64),
+    /// Nothing: it is too far from where the site is expected, or the lens shows nothing there.
+    Dropped,
+}
+
+impl Part {
+    /// What a sighting becomes: a place where a depth camera sees a surface that is near enough, else a ray that passes near enough.
+    pub fn told(&self, sighting: &Sighting, sensor: &Sensor, mut gate: Option<&mut SiteGate>) -> Told {
+        let (eye, expected) = (&sensor.eye, sighting.expected);
+        let direction = eye.direction(sighting.flat);
+        let depth = eye.in_sensor(expected).z;
+        let offset = expected - eye.origin();
+        let away = (offset - offset.dot(direction).max(0.0) * direction).length();
+        if !(depth > 0.0 && away >= 0.0) {
+            return Told::Dropped;
+        }
+        let across = sensor.noise / sighting.seen.confidence.min(1.0) * depth / eye.focal();
+        let sigma = across.hypot(self.spread);
+        let mut accepts = |distance: f64, source: &str| {
+            gate.as_deref_mut().is_none_or(|gate| gate.accepts(&self.site, distance, sensor.stamp, source))
+        };
+        if let Some(surface) = sighting.surface {
+            let place = eye.origin() + direction * (surface / direction.dot(eye.axis()) + self.behind);
+            if accepts(place.distance(expected), "points") {
+                return Told::Place(place, sigma.max(sensor.place_sigma));
+            }
+        }
+        if !accepts(away, sensor.source) {
+            return Told::Dropped;
+        }
+        let hidden = sighting.hidden - self.behind;
+        Told::Ray(SiteRay {
+            site: self.site.clone(),
+            origin: eye.origin(),
+            direction,
+            sigma: if hidden > 0.0 { sigma.hypot(GUESSED * hidden) } else { sigma },
+            source: sensor.source.to_owned(),
+            trust: 1.0,
+            bias: 0.0,
+            place: None,
+            place_sigma: ALONG_SIGMA,
+        })
+    }
+}
+
+/// Number of the person whose sites lie nearest to where they are expected in the picture (column, row; NaN: nowhere), by the median
+/// distance; none without any site that both have.
+pub fn nearest_person<'a>(
+    people: impl Iterator<Item = &'a [[f64; 3]]>,
+    parts: &[Part],
+    expected: &[[f64; 2]],
+    least: f64,
+) -> Option<usize> {
+    let mut best: Option<(usize, f64)> = None;
+    for (number, keypoints) in people.enumerate() {
+        let apart = |(part, place): (&Part, &[f64; 2])| {
+            let [u, v] = part.pixel(keypoints, least)?.pixel;
+            Some((u - place[0]).hypot(v - place[1])).filter(|distance| distance.is_finite())
+        };
+        let mut distances: Vec<f64> = parts.iter().zip(expected).filter_map(apart).collect();
+        distances.sort_unstable_by(f64::total_cmp);
+        let Some(upper) = distances.get(distances.len() / 2) else { continue };
+        let lower = distances.get((distances.len() - 1) / 2).unwrap_or(upper);
+        let middle = 0.5 * (lower + upper);
+        if best.is_none_or(|(_, least)| middle < least) {
+            best = Some((number, middle));
+        }
+    }
+    best.map(|(number, _)| number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(shares: &[(usize, f64)]) -> Part {
+        Part { site: "l_wrist".to_owned(), shares: shares.to_vec(), spread: 0.02, behind: 0.03 }
+    }
+
+    #[test]
+    fn a_site_is_where_its_keypoints_are_and_unseen_without_one_of_them() {
+        let rows = [[100.0, 50.0, 0.9], [120.0, 54.0, 0.4], [0.0, 0.0, 0.0], [1.0, f64::NAN, 0.9]];
+        let ears = part(&[(0, 0.5), (1, 0.5)]);
+        assert_eq!(ears.pixel(&rows, 0.1), Some(SitePixel { pixel: [110.0, 52.0], confidence: 0.4 }));
+        assert_eq!(ears.pixel(&rows, 0.5), None);
+        for missing in [2, 3, 4] {
+            assert_eq!(part(&[(0, 0.5), (missing, 0.5)]).pixel(&rows, 0.0), None, "{missing}");
+        }
+    }
+
+    #[test]
+    fn the_nearest_of_several_people_is_the_one() {
+        let parts = [part(&[(0, 1.0)]), part(&[(1, 1.0)]), part(&[(2, 1.0)])];
+        let far = [[90.0, 10.0, 1.0], [90.0, 20.0, 1.0], [90.0, 30.0, 1.0]];
+        let near = [[12.0, 10.0, 1.0], [12.0, 20.0, 1.0], [99.0, 30.0, 1.0]];
+        let expected = [[10.0, 10.0], [10.0, 20.0], [10.0, 30.0]];
+        let choose = |people: &[&[[f64; 3]]], expected: &[[f64; 2]]| {
+            nearest_person(people.iter().copied(), &parts, expected, 0.1)
+        };
+        assert_eq!(choose(&[&far, &near], &expected), Some(1));
+        assert_eq!(choose(&[], &expected), None);
+        assert_eq!(choose(&[&near], &[[f64::NAN; 2]; 3]), None);
+    }
+    #[test]
+    fn what_was_seen_becomes_a_ray_or_a_place_or_is_dropped() {
+        let world_from_sensor =
+            [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+        let eye = Eye { world_from_sensor, intrinsics: [300.0, 300.0, 160.0, 120.0] };
+        let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
+        let seen = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
+        let sighting =
+            Sighting { seen, flat: [0.0; 2], expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
+        let wrist = part(&[(0, 1.0)]);
+        let mut gate = SiteGate::new(0.1, 0.0, 0.1);
+        let sigma = |told: Told| match told {
+            Told::Ray(ray) => ray.sigma,
+            _ => f64::NAN,
+        };
+        let clear = sigma(wrist.told(&sighting, &sensor, Some(&mut gate)));
+        assert!((clear - 0.02_f64.hypot(0.02)).abs() < 1e-12);
+        let behind = Sighting { hidden: 0.13, ..sighting };
+        assert!((sigma(wrist.told(&behind, &sensor, None)) - clear.hypot(0.04)).abs() < 1e-12);
+        let deep = Sighting { surface: Some(1.95), ..sighting };
+        let Told::Place(place, least) = wrist.told(&deep, &sensor, Some(&mut gate)) else { panic!("a place") };
+        assert!(place.distance(Vec3::new(0.0, 0.0, 1.98)) < 1e-12 && least == 0.03);
+        let before = Sighting { surface: Some(1.0), ..sighting };
+        assert!(matches!(wrist.told(&before, &sensor, Some(&mut gate)), Told::Ray(_)), "what hides it is refused");
+        let far = Sighting { expected: Vec3::new(0.2, 0.0, 2.0), ..sighting };
+        assert_eq!(wrist.told(&far, &sensor, Some(&mut gate)), Told::Dropped);
+        for wrong in [Sighting { flat: [f64::NAN; 2], ..sighting }, Sighting { expected: -Vec3::Z, ..sighting }] {
+            assert_eq!(wrist.told(&wrong, &sensor, None), Told::Dropped);
+        }
+    }
+}

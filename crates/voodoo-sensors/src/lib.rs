@@ -1,0 +1,15 @@
+//! Measurements for [`voodoo_core`] from what sensors deliver: keypoints of 2-D networks, depth registered to another
+//! camera's picture, skin colour, masks.
+
+pub mod body_view;
+pub mod carried;
+pub mod chroma;
+pub mod eye;
+pub mod far_edges;
+pub mod keypoints;
+pub mod mask_regions;
+pub mod masks;
+pub mod registration;
+pub mod skin;
+pub mod still;
+pub mod window;

@@ -1,0 +1,326 @@
+//! The colour of one person's skin in the light of the moment: a histogram that is learnt and forgets.
+
+use std::ops::Range;
+
+use crate::chroma::{BINS, CHROMA_BINS, Counter, LUMA_BINS, is_among};
+use crate::skin::discs::Disc;
+use voodoo_core::math::widest;
+
+/// Share of the old histograms that a picture leaves.
+const FORGETTING: f32 = 0.86;
+/// Pictures after which that holds: the first make the general skin this person's.
+const SETTLED_PICTURES: u32 = 5;
+/// The share that those leave.
+const FORGETTING_AT_FIRST: f32 = 0.5;
+/// Skin has to be this many times as likely as the rest.
+const RATIO: f32 = 2.0;
+/// And to be learnt, so many times: colours near to those that were skin.
+const NEAR_RATIO: f32 = 1.0;
+/// Standard deviation of the smoothing along luma, bins.
+const LUMA_SPREAD: f64 = 0.7;
+/// And along either axis of chroma.
+const CHROMA_SPREAD: f64 = 0.8;
+/// Bins to either side that smoothing reaches.
+const SMOOTHED_BINS: usize = 2;
+/// Two places that share less of their colours than this do not both show skin.
+const IN_COMMON: f64 = 0.1;
+/// Middle of the chroma (Cr, Cb) of human skin of any tone under white light, of 256.
+const PRIOR_MIDDLE: [f32; 2] = [150.0, 110.0];
+/// And its spread.
+const PRIOR_SPREAD: f32 = 8.0;
+/// A place with fewer pixels of about skin's colour shows none.
+const FEWEST_IN_PLACE: usize = 8;
+/// All places together show at least so many.
+const FEWEST: usize = 20;
+/// Share of the rest that is spread over all colours: one seen nowhere yet is not skin.
+const UNSEEN: f32 = 0.05;
+/// Bins that share a value of Cr.
+const PLANE: usize = CHROMA_BINS * LUMA_BINS;
+
+/// Decides by the ratio of two histograms, skin's and everything else's.
+#[derive(Clone, Debug)]
+pub struct SkinColors {
+    /// Of skin, by Cr, Cb and luma.
+    pub skin: Vec<f32>,
+    /// Of the rest.
+    pub rest: Vec<f32>,
+    /// Which bins are skin's.
+    pub table: Box<[bool; BINS]>,
+    /// Which are near to what skin was.
+    near: Box<[bool; BINS]>,
+    pictures: u32,
+    counter: Counter,
+    scratch: [Vec<f32>; 4],
+}
+
+/// Where in a picture of `[height, width]` skin is and where not.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lesson<'a> {
+    /// Of each pixel's colour, see [`crate::chroma::bins`].
+    pub bins: &'a [u16],
+    pub size: [usize; 2],
+    /// Where the head is and where each hand is; of it only what has about skin's colour is learnt.
+    pub inside: &'a [Disc],
+    /// 1 where no head or hand is.
+    pub outside: &'a [u8],
+    /// Where the body is, if known: half of the rest is learnt from its clothes.
+    pub body: Option<&'a [bool]>,
+}
+
+impl Default for SkinColors {
+    /// The colours of all skins against evenly spread ones.
+    fn default() -> Self {
+        let axis = |middle: f32| {
+            let place = move |bin: usize| (bin as f32 + 0.5) * (256 / CHROMA_BINS) as f32;
+            (0..CHROMA_BINS).map(move |bin| ((place(bin) - middle) / PRIOR_SPREAD).powi(2))
+        };
+        let (cr, cb) = (axis(PRIOR_MIDDLE[0]), axis(PRIOR_MIDDLE[1]));
+        let chroma = cr.flat_map(|cr| cb.clone().map(move |cb| (-0.5 * (cr + cb)).exp()));
+        let prior: Vec<f32> = chroma.flat_map(|value| [value; LUMA_BINS]).collect();
+        let total = sum(&prior) as f32;
+        let mut colors = Self {
+            skin: prior.into_iter().map(|value| value / total).collect(),
+            rest: vec![1.0 / BINS as f32; BINS],
+            table: Box::new([false; BINS]),
+            near: Box::new([false; BINS]),
+            pictures: 0,
+            counter: Counter::default(),
+            scratch: [const { Vec::new() }; 4],
+        };
+        colors.judge();
+        colors
+    }
+}
+
+fn sum(values: &[f32]) -> f64 {
+    // Several sums, so that none waits for the last.
+    let (blocks, rest) = values.as_chunks::<8>();
+    let mut sums = [0.0_f64; 8];
+    for block in blocks {
+        sums.iter_mut().zip(block).for_each(|(sum, value)| *sum += f64::from(*value));
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|value| f64::from(*value)).sum::<f64>()
+}
+
+impl SkinColors {
+    fn judge(&mut self) {
+        let bins = self.skin.iter().zip(&self.rest).zip(self.table.iter_mut().zip(self.near.iter_mut()));
+        for ((skin, rest), (table, near)) in bins {
+            *table = *skin > RATIO * rest;
+            *near = *skin > NEAR_RATIO * rest;
+        }
+    }
+
+    /// Learns from the pixels where skin must be, and from those far from it; whether there was enough skin to learn from.
+    ///
+    /// A colour is learnt as far as two places show it: a shirt behind one hand is not skin.
+    pub(super) fn learn(&mut self, lesson: &Lesson) -> bool {
+        let mut shown = std::mem::take(&mut self.scratch);
+        let enough = self.learn_with(lesson, &mut shown);
+        self.scratch = shown;
+        enough
+    }
+
+    fn learn_with(&mut self, lesson: &Lesson, [most, shown, shares, work]: &mut [Vec<f32>; 4]) -> bool {
+        let masks: Vec<_> = lesson.inside.iter().map(|disc| self.skin_in(lesson, disc)).collect();
+        let places: Vec<_> = masks.iter().filter(|found| found.len() >= FEWEST_IN_PLACE).collect();
+        if places.len() < 2 || places.iter().map(|found| found.len()).sum::<usize>() < FEWEST {
+            return false;
+        }
+        for values in [&mut *most, &mut *shown, &mut *shares] {
+            values.clear();
+            values.resize(BINS, 0.0);
+        }
+        let (mut first, mut end) = (BINS, 0);
+        for found in places {
+            // So few pixels are counted without rounding.
+            found.iter().for_each(|bin| shares[usize::from(*bin)] += 1.0);
+            let planes = smooth(shares, work);
+            let count = found.len() as f32;
+            (first, end) = (first.min(planes.start), end.max(planes.end));
+            for ((most, shown), share) in
+                most[planes.clone()].iter_mut().zip(&mut shown[planes.clone()]).zip(&mut shares[planes])
+            {
+                let smoothed = std::mem::take(share) / count;
+                *shown = shown.max(most.min(smoothed));
+                *most = most.max(smoothed);
+            }
+        }
+        let total = sum(&shown[first..end]);
+        if total < IN_COMMON {
+            return false;
+        }
+        let keep = if self.pictures >= SETTLED_PICTURES { FORGETTING } else { FORGETTING_AT_FIRST };
+        let total = total as f32;
+        for (skin, shown) in self.skin.iter_mut().zip(&*shown) {
+            *skin = keep * *skin + (1.0 - keep) * (shown / total);
+        }
+        self.count_rest(lesson, shares);
+        smooth(shares, work);
+        for (rest, share) in self.rest.iter_mut().zip(&*shares) {
+            *rest = keep * *rest + (1.0 - keep) * ((1.0 - UNSEEN) * share + UNSEEN / BINS as f32);
+        }
+        self.pictures += 1;
+        self.judge();
+        true
+    }
+
+    /// Bins of the pixels of a circle that have about skin's colour.
+    fn skin_in(&self, lesson: &Lesson, disc: &Disc) -> Vec<u16> {
+        let [rows, columns] = disc.window(lesson.size);
+        if rows.is_empty() || columns.is_empty() {
+            return Vec::new();
+        }
+        let middle = [disc.middle[0] - columns.start as i64, disc.middle[1] - rows.start as i64];
+        let mut mask = vec![0_u8; rows.len() * columns.len()];
+        Disc { middle, ..*disc }.fill(&mut mask, [rows.len(), columns.len()], 1);
+        let here = rows.flat_map(|row| &lesson.bins[row * lesson.size[1]..][columns.clone()]).copied();
+        let inside = here.zip(mask).filter(|(bin, mask)| *mask != 0 && is_among(*bin, &self.near));
+        inside.map(|(bin, _)| bin).collect()
+    }
+
+    /// Shares of bins where no skin is; half of them of the body's clothes, where it is known.
+    fn count_rest(&mut self, lesson: &Lesson, shares: &mut [f32]) {
+        let outside = lesson.outside.iter().map(|outside| *outside != 0);
+        let pixels = lesson.bins.iter().copied().zip(outside);
+        let mut all = lesson.outside.iter().map(|outside| u32::from(*outside)).sum::<u32>();
+        let mut clothes = 0;
+        match lesson.body {
+            Some(body) => {
+                clothes =
+                    lesson.outside.iter().zip(body).map(|(outside, body)| u32::from(*outside & u8::from(*body))).sum();
+                self.counter.count(pixels.zip(body).map(|((bin, outside), body)| (bin, outside, *body)));
+            }
+            None => self.counter.count(pixels.map(|(bin, outside)| (bin, outside, false))),
+        }
+        all = all.max(1);
+        self.counter.take(|bin, [other, inside]| {
+            let share = (other + inside) as f32 / all as f32;
+            shares[bin] = if clothes > 0 { 0.5 * share + 0.5 * (inside as f32 / clothes as f32) } else { share };
+        });
+    }
+}
+
+/// Smooths a histogram in place: the colours between those seen count too. Beyond its ends it goes on as in a mirror. What is not zero
+/// lies in the range that is returned.
+fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
+    work.clear();
+    work.resize(values.len(), 0.0);
+    let luma = luma_kernel();
+    let [far, near, here] = kernel(CHROMA_SPREAD).map(|share| share as f32);
+    let mirrored = |place: usize, shift: isize| {
+        let place = place as isize + shift;
+        let last = CHROMA_BINS as isize - 1;
+        (if place < 0 {
+            -1 - place
+        } else if place > last {
+            2 * last + 1 - place
+        } else {
+            place
+        }) as usize
+    };
+    // Most colours are seen nowhere: only planes with some, and those around, hold anything.
+    let holds: Vec<bool> = values.chunks_exact(PLANE).map(|plane| plane.iter().any(|value| *value != 0.0)).collect();
+    let first = holds.iter().position(|holds| *holds).unwrap_or(CHROMA_BINS).saturating_sub(SMOOTHED_BINS);
+    let end = holds.iter().rposition(|holds| *holds).map_or(first, |last| (last + 1 + SMOOTHED_BINS).min(CHROMA_BINS));
+    let weighed = |[a, b, c, d, e]: [f32; 5]| far * (a + e) + near * (b + d) + here * c;
+    widest(
+        #[inline(always)]
+        || {
+            let planes = values.chunks_exact_mut(PLANE).zip(work.chunks_exact_mut(PLANE)).zip(&holds);
+            for ((plane, work), _) in planes.filter(|(_, holds)| **holds) {
+                for column in plane.as_chunks_mut::<LUMA_BINS>().0 {
+                    let before = *column;
+                    *column = [0.0; LUMA_BINS];
+                    for (value, kernel) in before.iter().zip(&luma) {
+                        column.iter_mut().zip(kernel).for_each(|(sum, share)| *sum += value * share);
+                    }
+                }
+                let columns = plane.as_chunks::<LUMA_BINS>().0;
+                for (index, work) in work.as_chunks_mut::<LUMA_BINS>().0.iter_mut().enumerate() {
+                    let around = [-2, -1, 0, 1, 2].map(|shift| &columns[mirrored(index, shift)]);
+                    for lane in 0..LUMA_BINS {
+                        work[lane] = weighed(around.map(|column| column[lane]));
+                    }
+                }
+            }
+            for (index, plane) in values.chunks_exact_mut(PLANE).enumerate().take(end).skip(first) {
+                let around = [-2, -1, 0, 1, 2].map(|shift| &work[mirrored(index, shift) * PLANE..][..PLANE]);
+                for (lane, value) in plane.iter_mut().enumerate() {
+                    *value = weighed(around.map(|other| other[lane]));
+                }
+            }
+        },
+    );
+    first * PLANE..end * PLANE
+}
+
+/// Shares of a bin two and one bins away, and of itself, of a Gaussian bell.
+fn kernel(spread: f64) -> [f64; SMOOTHED_BINS + 1] {
+    let bell = [2.0, 1.0, 0.0].map(|away: f64| (-0.5 * (away / spread).powi(2)).exp());
+    bell.map(|value| value / (2.0 * (bell[0] + bell[1]) + bell[2]))
+}
+
+/// Where the share of each bin of luma goes.
+fn luma_kernel() -> [[f32; LUMA_BINS]; LUMA_BINS] {
+    let [far, near, here] = kernel(LUMA_SPREAD);
+    let mut to = [[0.0_f64; LUMA_BINS]; LUMA_BINS];
+    for bin in 0..LUMA_BINS as isize {
+        for (shift, share) in [(-2, far), (-1, near), (0, here), (1, near), (2, far)] {
+            let (from, last) = (bin + shift, LUMA_BINS as isize - 1);
+            let from = if from < 0 {
+                -1 - from
+            } else if from > last {
+                2 * last + 1 - from
+            } else {
+                from
+            };
+            to[from as usize][bin as usize] += share;
+        }
+    }
+    to.map(|row| row.map(|share| share as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chroma::bins;
+
+    #[test]
+    fn smoothing_keeps_the_sum_and_reaches_two_bins() {
+        for place in [0, 5 * PLANE + 3 * LUMA_BINS + 1, BINS - 1] {
+            let mut values = vec![0.0; BINS];
+            values[place] = 1.0;
+            smooth(&mut values, &mut Vec::new());
+            assert!((sum(&values) - 1.0).abs() < 1e-6);
+            let apart = |index: usize, each: usize, count: usize| (index / each % count).abs_diff(place / each % count);
+            for (index, value) in values.iter().enumerate() {
+                let far = apart(index, PLANE, 64).max(apart(index, LUMA_BINS, 64)).max(apart(index, 1, 8));
+                assert!((*value > 0.0) == (far <= SMOOTHED_BINS), "{place}: {index}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_two_places_show_becomes_skin_and_what_one_shows_does_not() {
+        let (skin, shirt, wall) = ([120, 150, 205], [120, 110, 200], [150, 140, 130]);
+        let size = [60, 80];
+        let discs = [[20, 20], [60, 20], [40, 45]].map(|middle| Disc { middle, radius: 6 });
+        let mut mask = vec![0_u8; 60 * 80];
+        discs.iter().zip(1..).for_each(|(disc, value)| disc.fill(&mut mask, size, value));
+        let picture: Vec<[u8; 3]> = mask.iter().map(|value| [wall, skin, skin, shirt][usize::from(*value)]).collect();
+        let (bins, outside): (_, Vec<u8>) = (bins(&picture), mask.iter().map(|value| u8::from(*value == 0)).collect());
+        let lesson = Lesson { bins: &bins, size, inside: &discs, outside: &outside, body: None };
+        let mut colors = SkinColors::default();
+        for _ in 0..8 {
+            assert!(colors.learn(&lesson));
+        }
+        let is = |value: u8| {
+            let place = mask.iter().position(|other| *other == value).unwrap_or(0);
+            colors.table[usize::from(bins[place])]
+        };
+        assert_eq!([0, 1, 3].map(is), [false, true, false]);
+        assert!(!colors.learn(&Lesson { inside: &discs[1..], ..lesson }), "nothing in common");
+        assert!(!colors.learn(&Lesson { inside: &discs[..1], ..lesson }), "one place is not enough");
+    }
+}

@@ -1,0 +1,209 @@
+//! Which of the skin regions that are followed is the head and which a hand.
+
+use crate::skin::assignment::{Costs, assign};
+use crate::skin::blobs::{Blob, Blobs, ONE_HAND};
+
+/// Time over which agreement with the model is averaged, seconds.
+const AGREEMENT: f64 = 0.15;
+/// Pictures a second for which that holds.
+const RATE: f64 = 30.0;
+/// What a region's distance can add to that average at most, shares of the gate: one that is farther is no worse.
+const FARTHEST_GATES: f64 = 2.0;
+/// Cost of keeping a name at the edge of the gate.
+const HELD: f64 = 0.3;
+/// And at most: a region that keeps its name costs less than none.
+const DRIFTED: f64 = 0.75;
+/// Of taking a name from another region: two that were swapped cost more than changing back.
+const TAKEN: f64 = 0.5;
+/// Of having no region.
+const NONE: f64 = 0.8;
+/// A name is given up after this time, seconds, in which the body did not come nearer to it than so many gates, or in which it lay on
+/// another limb.
+const DOUBT: f64 = 0.25;
+/// See [`DOUBT`], shares of the gate.
+const DOUBTED_APART: f64 = 1.25;
+/// Pictures farther apart than this count as this, seconds: doubt needs several.
+const LONGEST: f64 = 0.1;
+/// Pictures in which a region was seen before it may be named from afar.
+const OLD_ENOUGH: usize = 3;
+/// Another region this near, shares of the gate, makes a new name doubtful, however near the first.
+const RIVAL: f64 = 0.5;
+
+/// How regions get names.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rules {
+    /// A new region farther than this from where the site is expected is not it, metres.
+    pub gate: f64,
+    /// Of the gate while its site is not seen, metres a second.
+    pub growth: f64,
+    /// A new name needs its second-best candidate this many times as far as the first.
+    pub ambiguity: f64,
+}
+
+/// A site, and what it could be.
+#[derive(Clone, Debug)]
+pub(super) struct Choice {
+    /// Its number.
+    pub site: usize,
+    /// How wide its gate gets, metres.
+    pub widest: f64,
+    /// From each blob, metres.
+    pub distance: Vec<f64>,
+    /// Of each blob: 0 it cannot be the site, 1 only near where it is expected, 2 anywhere.
+    pub allowed: Vec<u8>,
+    /// Of each blob whether it is on another part of the body, as far as that is where it is thought to be.
+    pub elsewhere: Vec<bool>,
+}
+
+impl Blobs {
+    /// Which of the blobs seen in this picture, the first ones, each site is: pairs of a choice's and a blob's number.
+    pub(super) fn name(&mut self, choices: &mut [Choice], rules: &Rules, stamp: f64) -> Vec<(usize, usize)> {
+        let count = choices.first().map_or(0, |choice| choice.distance.len());
+        let elapsed = (stamp - self.stamp).clamp(0.0, LONGEST);
+        self.stamp = stamp;
+        for choice in choices.iter_mut() {
+            for (column, blob) in self.items[..count].iter_mut().enumerate() {
+                blob.waver(choice, column, rules.gate, elapsed);
+                if blob.doubt[choice.site] > DOUBT {
+                    choice.allowed[column] = 0;
+                }
+            }
+        }
+        let owner = |choice: &Choice| {
+            let mut blobs = self.items[..count].iter().zip(&choice.allowed);
+            blobs.any(|(blob, allowed)| blob.label == Some(choice.site) && *allowed > 0)
+        };
+        let owners: Vec<usize> = choices.iter().filter(|choice| owner(choice)).map(|choice| choice.site).collect();
+        let mut cost = Costs::filled(choices.len(), count, f64::INFINITY);
+        for (row, choice) in choices.iter().enumerate() {
+            let missed = &mut self.missed[choice.site];
+            *missed = if missed.is_nan() { stamp } else { *missed };
+            let reach = rules.gate.max((rules.gate + rules.growth * (stamp - *missed)).min(choice.widest));
+            for column in 0..count {
+                self.items[column].agree(choice.site, choice.distance[column], rules.gate);
+                if let Some(value) = price(&self.items[..count], choice, column, &owners, (rules, reach)) {
+                    cost.set(row, column, value.sqrt());
+                }
+            }
+        }
+        let named = assign(&cost, 1.0, Some(NONE));
+        for blob in &mut self.items {
+            let renamed = blob.label.is_some_and(|label| named.iter().any(|(row, _)| choices[*row].site == label));
+            if renamed || blob.stamp == stamp {
+                blob.label = None;
+            }
+        }
+        for (row, column) in &named {
+            self.items[*column].label = Some(choices[*row].site);
+            self.missed[choices[*row].site] = stamp;
+        }
+        named
+    }
+}
+
+impl Blob {
+    /// How long it has spoken against being a site: on another limb, or its name without the body going there.
+    fn waver(&mut self, choice: &Choice, column: usize, gate: f64, elapsed: f64) {
+        let named = self.label == Some(choice.site) && self.sight.deep;
+        let against = choice.elsewhere[column] || (named && choice.distance[column] > DOUBTED_APART * gate);
+        let doubt = &mut self.doubt[choice.site];
+        *doubt = (*doubt + if against { elapsed } else { -elapsed }).clamp(0.0, 2.0 * DOUBT);
+    }
+
+    /// Takes a distance from a site into the average.
+    fn agree(&mut self, site: usize, distance: f64, gate: f64) {
+        let sample = (distance / gate).min(FARTHEST_GATES).powi(2);
+        let share = if self.count == 1 { 1.0 } else { 1.0 - (-1.0 / (RATE * AGREEMENT)).exp() };
+        let far = &mut self.far[site];
+        *far = (1.0 - share) * if far.is_nan() { sample } else { *far } + share * sample;
+    }
+}
+
+/// What it costs that a blob is a site; none where it cannot be.
+fn price(
+    blobs: &[Blob],
+    choice: &Choice,
+    column: usize,
+    owners: &[usize],
+    (rules, reach): (&Rules, f64),
+) -> Option<f64> {
+    let able = |column: usize| {
+        let (near, allowed) = (choice.distance[column], choice.allowed[column]);
+        let far = near < reach && allowed > 1 && blobs[column].count >= OLD_ENOUGH;
+        allowed > 0 && !choice.elsewhere[column] && (near < rules.gate || far)
+    };
+    let (blob, near) = (&blobs[column], choice.distance[column]);
+    let far = blob.far[choice.site];
+    if blob.label == Some(choice.site) && choice.allowed[column] > 0 {
+        return Some((HELD * far).min(DRIFTED));
+    }
+    if !able(column) {
+        return None;
+    }
+    if owners.contains(&choice.site) || blob.label.is_some_and(|label| owners.contains(&label)) {
+        return (blob.count >= OLD_ENOUGH && near < rules.gate).then_some(TAKEN + far);
+    }
+    let rival = |other: &usize| {
+        able(*other) && blobs[*other].label.is_none() && blobs[*other].sight.place.distance(blob.sight.place) > ONE_HAND
+    };
+    let rivals = (0..blobs.len()).filter(rival).map(|other| choice.distance[other]);
+    let clear = rivals.fold(f64::INFINITY, f64::min) >= (rules.ambiguity * near).max(RIVAL * rules.gate);
+    clear.then(|| DRIFTED * (near / reach).powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::skin::blobs::Sight;
+    use voodoo_core::math::Vec3;
+
+    const RULES: Rules = Rules { gate: 0.12, growth: 1.0, ambiguity: 1.5 };
+
+    fn sight(x: f64) -> Sight {
+        let place = Vec3::new(x, 0.0, 2.0);
+        Sight { direction: Vec3::Z, place, deep: true, hand: true, region: (100.0 * x) as i32, still: false }
+    }
+
+    fn choice(site: usize, distance: &[f64], allowed: u8) -> Choice {
+        let count = distance.len();
+        let (distance, allowed) = (distance.to_vec(), vec![allowed; count]);
+        Choice { site, widest: 0.8, distance, allowed, elsewhere: vec![false; count] }
+    }
+
+    #[test]
+    fn a_name_is_given_where_one_region_is_nearest_and_kept_while_the_body_falls_behind() {
+        let mut blobs = Blobs::new(2);
+        blobs.follow(&[sight(0.0), sight(0.5)], 0.0);
+        let mut near = [choice(0, &[0.02, 0.5], 1), choice(1, &[0.5, 0.03], 1)];
+        assert_eq!(blobs.name(&mut near, &RULES, 0.0), [(0, 0), (1, 1)]);
+        blobs.follow(&[sight(0.1), sight(0.5)], 0.033);
+        let mut behind = [choice(0, &[0.13, 0.5], 1), choice(1, &[0.4, 0.03], 1)];
+        assert_eq!(blobs.name(&mut behind, &RULES, 0.033), [(0, 0), (1, 1)]);
+        for step in 2..20 {
+            let stamp = 0.033 * f64::from(step);
+            blobs.follow(&[sight(0.1), sight(0.5)], stamp);
+            let mut off = [choice(0, &[0.2, 0.5], 1), choice(1, &[0.4, 0.03], 1)];
+            let named = blobs.name(&mut off, &RULES, stamp);
+            assert_eq!(named.len() == 2, step < 9, "{step}: in doubt for a quarter of a second");
+        }
+    }
+
+    #[test]
+    fn two_that_could_be_it_are_none() {
+        let mut blobs = Blobs::new(1);
+        blobs.follow(&[sight(0.0), sight(0.15)], 0.0);
+        assert_eq!(blobs.name(&mut [choice(0, &[0.07, 0.08], 1)], &RULES, 0.0), []);
+        assert_eq!(blobs.name(&mut [choice(0, &[0.03, 0.11], 1)], &RULES, 0.01), [(0, 0)]);
+    }
+
+    #[test]
+    fn from_afar_only_an_old_region_is_named_and_only_after_a_while() {
+        let mut blobs = Blobs::new(1);
+        for step in 0..12 {
+            let stamp = 0.033 * f64::from(step);
+            blobs.follow(&[sight(0.3)], stamp);
+            let named = blobs.name(&mut [choice(0, &[0.3], 2)], &RULES, stamp);
+            assert_eq!(named.len() == 1, step >= 6, "{step}");
+        }
+    }
+}
