@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-import voodoo._core as _core
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo.sensors.body_view import BodyView, body_view
 from voodoo.sensors.skin.regions import candidates
@@ -36,15 +35,6 @@ def test_a_hand_ends_where_a_table_behind_it_begins(gap):
     hand = next(item for item in found if regions[105, 105] == item.region)
     assert regions[125, 130] not in (0, hand.region)
     assert np.linalg.norm(np.subtract(hand.pixel, (105.5, 110.0))) < 3.0
-
-
-def test_what_a_shadow_parts_is_one_hand_and_arms_stay_apart():
-    mask = np.zeros((240, 320), bool)
-    mask[100:108, 100:108] = mask[110:118, 100:108] = True  # palm and fingers
-    mask[100:150, 200:208] = mask[100:150, 210:218] = True  # two forearms
-    _, regions = candidates(_core.joined_mask(mask, longest=3.0 * 5.4), palm_px=5.4)
-    assert regions[104, 104] == regions[114, 104] != 0
-    assert regions[120, 204] != regions[120, 214]
 
 
 def test_a_ring_across_a_hand_does_not_move_it_to_its_fingers():

@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+import voodoo
+
 HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "rosbags", "pydantic", "tomlkit", "rerun", "rich", "voodoo._core")
 TYPERS_OWN = "pydantic"
 """Typer checks the options of a command with it, even for its help."""
@@ -44,3 +46,15 @@ def test_help_and_version_answer_in_a_fifth_of_a_second(words):
         if taken[-1] < LIMIT_S:
             return
     pytest.fail(f"{' '.join(words)}: {min(taken):.2f} s at best")
+
+
+def test_attributes_of_the_package_are_imported_when_they_are_asked_for():
+    code = (
+        "import sys, voodoo\n"
+        "assert 'numpy' not in sys.modules and 'voodoo.recordings.loaders' not in sys.modules\n"
+        "print(voodoo.recordings.open_recording is voodoo.open_recording, voodoo.ik.Chain.__name__)\n"
+        "try:\n    voodoo.nothing\nexcept AttributeError as error:\n    print(error)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "True Chain\nmodule 'voodoo' has no attribute 'nothing'\n"
+    assert set(voodoo.__all__) <= set(dir(voodoo))

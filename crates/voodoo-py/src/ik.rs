@@ -22,6 +22,7 @@ type SegmentParts = (String, String, f64);
 /// steps, tolerance, still, gain, caution, largest turn
 type OptionParts = (usize, f64, f64, f64, f64, f64);
 
+#[doc = stub!("Chain")]
 #[pyclass(name = "Chain", module = "voodoo._core", frozen)]
 pub struct PyChain {
     body: Body,

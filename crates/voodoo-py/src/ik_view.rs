@@ -7,6 +7,7 @@ use voodoo_core::math::Pose;
 use crate::arrays::pose;
 use crate::errors::exception;
 
+#[doc = stub!("View")]
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
 pub struct PyView {
     pixels: Vec<[f32; 2]>,

@@ -19,6 +19,7 @@ type Seen = ((f64, f64), f64);
 type Shares = (String, Vec<(usize, f64)>, f64, f64);
 type Observed<'py> = (Vec<PySiteRay>, Vec<(String, Bound<'py, PyArray1<f64>>, f64)>, Vec<String>, Vec<String>);
 
+#[doc = stub!("KeypointLayout")]
 #[pyclass(name = "KeypointLayout", module = "voodoo._core", frozen)]
 pub struct PyKeypointLayout(Vec<Part>);
 
@@ -123,7 +124,7 @@ impl PyKeypointLayout {
     }
 }
 
-/// Points of a sensor, or in the world, that go on with the limb that they lie on, as `distances` tells.
+#[doc = stub!("carried")]
 #[pyfunction]
 #[pyo3(signature = (points, poses, before, *, interval, elapsed, near, share, max_speed, distances, world_from_sensor=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]

@@ -1,15 +1,18 @@
 //! Python bindings of voodoo-core: conversions and error translation, no method of their own.
-#![allow(
-    missing_docs,
-    reason = "the documentation of the Python side stands in _core.pyi, that of what voodoo exports here, too: a test compares"
-)]
+#![allow(missing_docs, reason = "the documentation of the Python side is that of _core.pyi")]
+
+/// The docstring that a class, a member of one or a function has in `_core.pyi`; see build.rs.
+macro_rules! stub {
+    ($name:literal) => {
+        include_str!(concat!(env!("OUT_DIR"), "/", $name))
+    };
+}
 
 mod arguments;
 mod arrays;
 mod body;
 mod body_view;
 mod borrowed;
-mod chroma;
 mod config;
 mod detect;
 mod errors;
@@ -35,8 +38,6 @@ mod _core {
     #[pymodule_export]
     use super::body_view::{PyBodyView, PyStillDepth, body_view};
     #[pymodule_export]
-    use super::chroma::{color_bins, joined_mask, mask_regions, skin_mask};
-    #[pymodule_export]
     use super::config::config_fields;
     #[pymodule_export]
     use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
@@ -53,7 +54,7 @@ mod _core {
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
-    use super::registration::{nearest_surface, points_within, shown};
+    use super::registration::nearest_surface;
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]

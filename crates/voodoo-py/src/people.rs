@@ -20,6 +20,7 @@ use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::tracker::{places, site_positions};
 
+#[doc = stub!("People")]
 #[pyclass(name = "People", module = "voodoo._core")]
 pub struct PyPeople {
     people: People,

@@ -10,7 +10,7 @@ use crate::errors::{IntoPy, wrong_argument};
 
 type Images<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i16>>);
 
-/// Depth (metres, 0: nothing) and limb (-1: none) of every pixel; releases the GIL.
+#[doc = stub!("render_depth")]
 #[pyfunction]
 #[pyo3(signature = (body, world_from_limb, *, width, height, intrinsics, rays=None, world_from_sensor=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]

@@ -29,6 +29,7 @@ pub fn places_of<'a>(places: &Bound<'_, PyAny>, sites: impl Iterator<Item = &'a 
         .collect()
 }
 
+#[doc = stub!("SiteMotion")]
 #[pyclass(name = "SiteMotion", module = "voodoo._core")]
 pub struct PySiteMotion {
     motion: SiteMotion,
@@ -85,6 +86,7 @@ impl PySiteMotion {
     }
 }
 
+#[doc = stub!("SiteGate")]
 #[pyclass(name = "SiteGate", module = "voodoo._core")]
 pub struct PySiteGate(pub SiteGate);
 
@@ -106,25 +108,9 @@ impl PySiteGate {
     fn accepts(&mut self, site: &str, distance: f64, stamp: f64, source: &str) -> bool {
         self.0.accepts(site, distance, stamp, source)
     }
-
-    #[getter]
-    fn accepted(&self) -> Vec<(&str, &str, f64)> {
-        self.0.accepted().collect()
-    }
 }
 
-/// A site was seen on a ray.
-///
-/// Args:
-///     site: its name.
-///     origin: focal point (3,) in the world [m].
-///     direction: (3,) unit vector in the world.
-///     sigma: standard deviation across the ray at the site [m].
-///     source: name for `Estimate.sources`.
-///     trust: factor of its weight, in [0, 1].
-///     bias: it may always be this far off [m]; see `Frame.add_position`.
-///     place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
-///     place_sigma: standard deviation of `place` along the ray [m].
+#[doc = stub!("SiteRay")]
 #[pyclass(name = "SiteRay", module = "voodoo._core", frozen)]
 pub struct PySiteRay(pub SiteRay);
 
@@ -149,68 +135,68 @@ impl PySiteRay {
         Ok(Self(SiteRay { site, origin, direction, sigma, source, trust, bias, place, place_sigma }))
     }
 
-    /// Its name.
+    #[doc = stub!("SiteRay.site")]
     #[getter]
     fn site(&self) -> &str {
         &self.0.site
     }
 
-    /// Focal point (3,) in the world [m].
+    #[doc = stub!("SiteRay.origin")]
     #[getter]
     fn origin<'py>(&self, py: Python<'py>) -> Row<'py> {
         row(py, self.0.origin)
     }
 
-    /// (3,) unit vector in the world.
+    #[doc = stub!("SiteRay.direction")]
     #[getter]
     fn direction<'py>(&self, py: Python<'py>) -> Row<'py> {
         row(py, self.0.direction)
     }
 
-    /// Standard deviation across the ray at the site [m].
+    #[doc = stub!("SiteRay.sigma")]
     #[getter]
     fn sigma(&self) -> f64 {
         self.0.sigma
     }
 
-    /// Name for `Estimate.sources`.
+    #[doc = stub!("SiteRay.source")]
     #[getter]
     fn source(&self) -> &str {
         &self.0.source
     }
 
-    /// Factor of its weight, in [0, 1].
+    #[doc = stub!("SiteRay.trust")]
     #[getter]
     fn trust(&self) -> f64 {
         self.0.trust
     }
 
-    /// It may always be this far off [m].
+    #[doc = stub!("SiteRay.bias")]
     #[getter]
     fn bias(&self) -> f64 {
         self.0.bias
     }
 
-    /// (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
+    #[doc = stub!("SiteRay.place")]
     #[getter]
     fn place<'py>(&self, py: Python<'py>) -> Option<Row<'py>> {
         self.0.place.map(|place| row(py, place))
     }
 
-    /// Standard deviation of `place` along the ray [m].
+    #[doc = stub!("SiteRay.place_sigma")]
     #[getter]
     fn place_sigma(&self) -> f64 {
         self.0.place_sigma
     }
 
-    /// The ray of a site that has gone on by (3,) [m] since it was seen.
+    #[doc = stub!("SiteRay.moved")]
     fn moved(&self, shift: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (shift, ray) = (vector("shift", shift)?, &self.0);
         let place = ray.place.map(|place| place + shift);
         Ok(Self(SiteRay { origin: ray.origin + shift, place, ..ray.clone() }))
     }
 
-    /// The ray with another trust.
+    #[doc = stub!("SiteRay.trusted")]
     fn trusted(&self, trust: f64) -> Self {
         Self(SiteRay { trust, ..self.0.clone() })
     }

@@ -29,7 +29,7 @@ fn told(candidate: &Candidate) -> Place {
     ((u, v), candidate.region, candidate.area, candidate.hand)
 }
 
-/// Where in a mask a head or a hand may be, and the number of its region in each pixel.
+#[doc = stub!("skin_candidates")]
 #[pyfunction]
 pub fn skin_candidates<'py>(
     py: Python<'py>,
@@ -85,6 +85,7 @@ fn image_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<(&'a [[u8; 3]],
     Ok((image.as_slice()?.as_chunks().0, [size[0], size[1]]))
 }
 
+#[doc = stub!("SkinTeacher")]
 #[pyclass(name = "SkinTeacher", module = "voodoo._core")]
 #[derive(Default)]
 pub struct PySkinTeacher(Teacher);
@@ -139,6 +140,7 @@ impl PySkinTeacher {
     }
 }
 
+#[doc = stub!("SkinCue")]
 #[pyclass(name = "SkinCue", module = "voodoo._core")]
 pub struct PySkinCue {
     cue: SkinCue,

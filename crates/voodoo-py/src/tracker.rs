@@ -19,6 +19,7 @@ use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::shape::PyShape;
 
+#[doc = stub!("Tracker")]
 #[pyclass(name = "Tracker", module = "voodoo._core")]
 pub struct PyTracker {
     tracker: Tracker,

@@ -112,11 +112,6 @@ impl StillDepth {
         self.last.push_back(Arc::new(z));
         Ok(found)
     }
-
-    /// The farthest that was seen in each pixel, metres.
-    pub fn farthest(&self) -> &[f32] {
-        &self.farthest
-    }
 }
 
 /// A depth camera beside a colour camera, and where the body is expected.
@@ -298,9 +293,37 @@ mod tests {
         hand[11] = f32::NAN;
         let (still, before) = scene.see(hand, [3, 4], &LEVEL, [0..3, 0..4]).unwrap().unwrap();
         assert_eq!((still[5], before[5], still[0]), (false, true, true));
-        assert!(scene.farthest()[11].is_nan() && twin.farthest() == [3.0; 12]);
+        assert!(scene.farthest[11].is_nan() && *twin.farthest == [3.0; 12]);
         let moved = [[1.0, 0.0, 0.0, 0.01], LEVEL[1], LEVEL[2], LEVEL[3]];
         assert!(scene.see(vec![3.0; 12], [3, 4], &moved, [0..3, 0..4]).unwrap().is_none());
+    }
+
+    #[test]
+    fn noise_is_not_before_the_scene_but_a_hand_that_came_is_and_stays_so() {
+        let mut scene = StillDepth::default();
+        let (size, hand) =
+            ([60, 80], |index: usize| (20..30).contains(&(index / 80)) && (30..40).contains(&(index % 80)));
+        let mut found = None;
+        for step in 0..20_u32 {
+            // Of three hundredths of a metre to either side, another in every pixel and picture.
+            let noise =
+                |index: usize| (step * 4800 + index as u32).wrapping_mul(2_654_435_761) as f32 / u32::MAX as f32;
+            let depth = |index: usize| {
+                if step >= 8 && hand(index) { 2.5 } else { 3.0 + 0.06 * (noise(index) - 0.5) }
+            };
+            found = scene.see((0..4800).map(depth).collect(), size, &LEVEL, [0..60, 0..80]).unwrap();
+            assert_eq!(found.is_some(), step as usize >= STAYS_PICTURES);
+        }
+        let (still, before) = found.unwrap();
+        let within = |index: usize, margin: usize| {
+            let (row, column) = (index / 80, index % 80);
+            (20 + margin..30 - margin).contains(&row) && (30 + margin..40 - margin).contains(&column)
+        };
+        let around = |index: usize| (19..31).contains(&(index / 80)) && (29..41).contains(&(index % 80));
+        assert!((0..4800).filter(|index| within(*index, 1)).all(|index| before[index] && !still[index]));
+        let outside: Vec<usize> = (0..4800).filter(|index| !around(*index)).collect();
+        assert!(outside.iter().all(|index| !before[*index]));
+        assert!(20 * outside.iter().filter(|index| !still[**index]).count() < outside.len());
     }
 
     #[test]

@@ -141,3 +141,89 @@ fn gate<'a>(
         *inside = passes;
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    const LOW: [f64; 3] = [-0.8, -0.6, 1.0];
+    const HIGH: [f64; 3] = [0.7, 0.9, 2.4];
+    const CAMERA: [usize; 2] = [48, 64];
+
+    /// A turn about z, and a shift.
+    fn pose(angle: f64, shift: [f64; 3]) -> [[f64; 4]; 4] {
+        let (sin, cos) = angle.sin_cos();
+        [[cos, -sin, 0.0, shift[0]], [sin, cos, 0.0, shift[1]], [0.0, 0.0, 1.0, shift[2]], [0.0, 0.0, 0.0, 1.0]]
+    }
+
+    fn moved(pose: &[[f64; 4]; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| pose[axis][0] * x + pose[axis][1] * y + pose[axis][2] * z + pose[axis][3])
+    }
+
+    fn rays() -> Vec<[f32; 2]> {
+        let ray = |index: usize| [(index % 64) as f32 / 50.0 - 0.63, (index / 64) as f32 / 52.0 - 0.45];
+        (0..48 * 64).map(ray).collect()
+    }
+
+    /// Depths from 0.5 to 4 m, some of them no return.
+    fn noisy(count: usize) -> Vec<f32> {
+        let depth =
+            |index: usize| 0.5 + 3.5 * ((index as u32).wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let mut depths: Vec<f32> = (0..count).map(|index| if index % 11 == 3 { 0.0 } else { depth(index) }).collect();
+        [depths[70], depths[71], depths[72]] = [f32::NAN, f32::INFINITY, -1.0];
+        depths
+    }
+
+    #[test]
+    fn the_points_are_those_in_the_box_seen_from_the_other_camera() {
+        let rays = rays();
+        let (to_world, to_other) = (pose(0.3, [0.1, 0.0, -0.2]), pose(-0.1, [0.05, 0.02, 0.01]));
+        for step in [1, 3] {
+            let size = CAMERA.map(|pixels| pixels.div_ceil(step));
+            let depth = noisy(size[0] * size[1]);
+            let (rows, columns) = (2..size[0] - 1, 1..size[1] - 3);
+            let window = Window { depth: &depth, size, rays: &rays, camera: CAMERA, step, rows, columns };
+            let (points, pixels) = window.within(LOW, HIGH, &to_world, &to_other).unwrap();
+            let mut expected = Vec::new();
+            for row in window.rows.clone() {
+                for column in window.columns.clone() {
+                    let z = depth[row * size[1] + column];
+                    let ray = rays[(row * 64 + column) * step];
+                    let place = [ray[0] * z, ray[1] * z, z].map(f64::from);
+                    let world = moved(&to_world, place);
+                    if z.is_finite()
+                        && z > 0.0
+                        && (0..3).all(|axis| LOW[axis] < world[axis] && world[axis] < HIGH[axis])
+                    {
+                        expected.push((row * size[1] + column, moved(&to_other, place)));
+                    }
+                }
+            }
+            assert!(expected.len() > 20 && 2 * expected.len() < depth.len());
+            assert!(pixels.iter().map(|pixel| *pixel as usize).eq(expected.iter().map(|(pixel, _)| *pixel)));
+            for (point, (_, place)) in points.iter().zip(&expected) {
+                assert!((0..3).all(|axis| (point[axis] - place[axis]).abs() < 1e-6), "{point:?} {place:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_that_does_not_fit_is_refused() {
+        let (rays, depth, level) = (rays(), noisy(48 * 64), pose(0.0, [0.0; 3]));
+        let whole =
+            Window { depth: &depth, size: CAMERA, rays: &rays, camera: CAMERA, step: 1, rows: 0..48, columns: 0..64 };
+        let look = |window: Window| window.within(LOW, HIGH, &level, &level).map_err(|error| error.to_string());
+        assert!(look(whole.clone()).is_ok());
+        for wrong in [
+            Window { rows: 0..49, ..whole.clone() },
+            Window { columns: 0..65, ..whole.clone() },
+            Window { step: 2, ..whole.clone() },
+            Window { step: 0, ..whole.clone() },
+            Window { depth: &depth[1..], ..whole.clone() },
+            Window { rays: &rays[1..], ..whole.clone() },
+        ] {
+            assert!(look(wrong).unwrap_err().contains("window: expected"));
+        }
+    }
+}
