@@ -35,6 +35,7 @@ __all__ = [
     "color_bins",
     "config_fields",
     "joined_mask",
+    "linear_sum_assignment",
     "mask_regions",
     "nearest_surface",
     "person_candidates",
@@ -197,6 +198,9 @@ def nearest_surface(
     Raises:
         MeasurementError: other shapes.
     """
+
+def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Pairs (row, column) of finite costs (N, M) with the least sum, every row or every column once, by rows."""
 
 def skin_candidates(
     mask: npt.NDArray[np.bool_], palm_px: float

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::math::Vec3;
+use voodoo_core::math::{CostTable, Vec3};
 use voodoo_sensors::body_view::Matrix;
 use voodoo_sensors::carried::{Carrying, in_sensor, in_world};
 use voodoo_sensors::eye::Eye;
@@ -121,6 +121,14 @@ impl PyKeypointLayout {
     fn places(&self, places: &Bound<'_, PyAny>) -> PyResult<Vec<Option<Vec3>>> {
         places_of(places, self.0.iter().map(|part| &*part.site))
     }
+}
+
+/// The pairs (row, column) of a table of finite costs with the least sum.
+#[pyfunction]
+pub fn linear_sum_assignment(costs: PyReadonlyArray2<'_, f64>) -> Vec<(usize, usize)> {
+    let costs = costs.as_array();
+    let table = CostTable::from_fn(costs.nrows(), costs.ncols(), |row, column| costs[[row, column]]);
+    voodoo_core::math::linear_sum_assignment(&table)
 }
 
 /// Points of a sensor, or in the world, that go on with the limb that they lie on, as `distances` tells.

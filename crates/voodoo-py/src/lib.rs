@@ -49,7 +49,7 @@ mod _core {
     #[pymodule_export]
     use super::ik_view::PyView;
     #[pymodule_export]
-    use super::keypoints::{PyKeypointLayout, carried};
+    use super::keypoints::{PyKeypointLayout, carried, linear_sum_assignment};
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
