@@ -355,7 +355,7 @@ class SkinCue:
     def assigned(self) -> list[tuple[int, int]]: ...
     @property
     def followed(self) -> list[tuple[int | None, int, float, list[float], list[float], list[float]]]: ...
-    def look(
+    def observe(
         self,
         teacher: SkinTeacher,
         image: npt.NDArray[np.uint8],
@@ -369,12 +369,8 @@ class SkinCue:
         settled: bool,
         arm_lost: Sequence[bool],
         upper_arm_visible: Sequence[bool],
-    ) -> npt.NDArray[np.float64] | None: ...
-    def name(
-        self,
-        limbs: Sequence[str],
-        away: npt.NDArray[np.float32],
-        strangers: npt.NDArray[np.float32] | None = None,
+        tracker: Tracker | tuple[People, int] | None,
+        others: Sequence[Tracker | tuple[People, int]],
     ) -> list[tuple[int, npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64] | None, float]]: ...
 
 @final

@@ -189,6 +189,11 @@ class Followed:
         self._number = number
 
     @property
+    def _core(self) -> tuple[_core.People, int]:
+        """What the compiled core knows them by."""
+        return self._people._core, self._number
+
+    @property
     def body(self) -> Body:
         """The body in their sizes."""
         return self._people.body(self._number)

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
 from voodoo.measurements import ColorImage
-from voodoo.people import Followed
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
-from voodoo.sensors.pixels import FloatArray
-from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
+from voodoo.sensors.skin.tracker import SkinTracker
 
 SKIN = (80, 255, 255)
 """Colour in overlays, BGR."""
@@ -43,7 +39,7 @@ class SkinAdapter(Adapter[ColorImage]):
         then = context.predictor.predict(item.stamp)
         view = _body_view(item, context)
         sites = skin.settings.sites if view is not None else ()
-        tracker, status = context.tracker, context.estimate.limb_status
+        status = context.estimate.limb_status
         rays = skin.observe(
             item.image,
             item.camera,
@@ -51,8 +47,8 @@ class SkinAdapter(Adapter[ColorImage]):
             then,
             stamp=item.stamp,
             body=view,
-            surface=lambda places: LimbDistances(status, tracker.limb_distances(places)),
-            strangers=partial(_distance, context.others) if context.others else None,
+            tracker=context.tracker,
+            others=context.others,
             arm_lost=_hands(status, sites, "forearm", measured=False),
             upper_arm_visible=_hands(status, sites, "upperarm", measured=True),
             head_visible=_heads(status, sites),
@@ -127,8 +123,3 @@ def _heads(status: Mapping[str, str], sites: Iterable[str]) -> set[str]:
     """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
     measured = status.get("head") == "measured"
     return {site for site in sites if measured and site.startswith("head")}
-
-
-def _distance(others: Sequence[Followed], places: FloatArray) -> npt.NDArray[np.float32]:
-    """Of places from the nearest of several bodies."""
-    return np.asarray(np.min([other.distance(places) for other in others], axis=0))
