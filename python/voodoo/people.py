@@ -210,6 +210,10 @@ class Followed:
             raise BodyError(f"person: expected one of those who are there, found {self._number}")
         return found
 
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+        """See Tracker.predict."""
+        return _core.expected_sites(self._core, stamp)
+
     def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """See Tracker.limb_distances."""
         found = self._people._core.limb_distances(self._number, points)

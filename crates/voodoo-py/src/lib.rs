@@ -59,7 +59,7 @@ mod _core {
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
     #[pymodule_export]
-    use super::sites::{PySiteGate, PySiteMotion, PySiteRay};
+    use super::sites::{PySiteGate, PySiteRay, expected_sites};
     #[pymodule_export]
     use super::skin::{PySkinCue, PySkinTeacher, skin_candidates};
     #[pymodule_export]

@@ -12,6 +12,7 @@ from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
+from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.skin.tracker import SkinTracker
 
 SKIN = (80, 255, 255)
@@ -36,8 +37,8 @@ class SkinAdapter(Adapter[ColorImage]):
         """As rays, moved from the picture's time to the frame's."""
         skin = context.memory.get(self.kind, item.sensor, lambda: SkinTracker(context.settings.skin))
         # The picture is older or newer than the frame: the ray is moved along with its site.
-        then = context.predictor.predict(item.stamp)
-        view = _body_view(item, context)
+        then = context.tracker.predict(item.stamp)
+        view = _body_view(item, context, then)
         sites = skin.settings.sites if view is not None else ()
         status = context.estimate.limb_status
         rays = skin.observe(
@@ -95,7 +96,7 @@ class SkinAdapter(Adapter[ColorImage]):
             log.send(f"{path}/picture/skin", rr.Points2D(places, radii=3.0, colors=(0, 255, 255)))
 
 
-def _body_view(item: ColorImage, context: Context) -> BodyView | None:
+def _body_view(item: ColorImage, context: Context, predicted: Mapping[str, FloatArray]) -> BodyView | None:
     """What the frame's first depth camera sees of the body, in this picture; None without one."""
     depth = next(iter(context.depth_images), None)
     if depth is None:
@@ -107,7 +108,7 @@ def _body_view(item: ColorImage, context: Context) -> BodyView | None:
         metres_per_unit=depth.metres_per_unit,
         color_camera=item.camera,
         world_from_color=item.root_from_sensor,
-        joints=context.predictor.positions(item.stamp),
+        joints=list(predicted.values()),
         step=max(depth.camera.width // 200, 1),
         scene=context.memory.get(SCENE, depth.sensor, StillDepth),
     )
