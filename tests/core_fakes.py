@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+import voodoo
 from voodoo.errors import VoodooError
 from voodoo.model.camera import Camera
 from voodoo.model.projection import CameraView, body_mask
@@ -145,6 +146,8 @@ class Tracker:
     Without a reset it finds the person in frame `found_at`, and in frame `gone_at` the person is gone.
     """
 
+    _core = voodoo.Tracker(voodoo.Body.human())._core
+    """Of a body that has no pose: nothing is known of its motion."""
     reference = None
     offset = (0.0, 0.0, 0.0)
     found_at = None
@@ -189,6 +192,10 @@ class Tracker:
             joints = {name: position + np.asarray(self.offset) for name, position in joints.items()}
         self.body, self.estimate = pose(joints, frame.stamp)
         return self.estimate
+
+    def predict(self, stamp):
+        """Everybody stays where they are."""
+        return dict(self.estimate.joints)
 
     def distance(self, points):
         """Signed distance to cylinders of mean girth without ends: enough to tell near from far."""

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 import voodoo
+from scene import rest_pose, turn
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo import MeasurementError
 from voodoo.sensors.body_view import BodyView
 from voodoo.sensors.pixels import in_sensor, ray_distance
 from voodoo.sensors.skin.regions import candidates
 from voodoo.sensors.skin.settings import SkinSettings
-from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
+from voodoo.sensors.skin.tracker import SkinTracker
 
 
 def test_hands_and_face_are_found_and_named():
@@ -85,7 +86,12 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
     grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
     body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
     found = {}
-    for outside in (0.0, 0.2):
+    for aside in (at(far, Z)[1], -0.1):  # where the body stands: at the far place, and away from it
+        tracker = voodoo.Tracker(voodoo.Body.human(height=1.78))
+        upright = turn((0.0, 0.0, 1.0), -np.pi / 2)
+        root = np.eye(4)
+        root[:3, :3], root[:3, 3] = upright, (Z, aside, 1.0)
+        tracker.reset_pose({limb: root @ pose for limb, pose in rest_pose(tracker.body).items()})
         skin = SkinTracker()
         learnt(skin)
         joints = Pose(head, left, right).joints
@@ -98,11 +104,12 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
                 POSE,
                 joints,
                 body=body,
-                surface=lambda places, outside=outside: LimbDistances(("thorax",), np.full((1, len(places)), outside)),
+                tracker=tracker,
             )
-        found[outside] = {ray.site: ray for ray in rays}
-    assert set(found[0.0]) == {"head_center", "r_hand"}
-    place = found[0.2]["l_hand"].place  # behind the surface that the depth camera saw
+        explained = bool(tracker.distance(at(far, Z)[None])[0] < 0.0)
+        found[explained] = {ray.site: ray for ray in rays}
+    assert set(found[True]) == {"head_center", "r_hand"}
+    place = found[False]["l_hand"].place  # behind the surface that the depth camera saw
     assert np.linalg.norm(place - at(far, Z)) == pytest.approx(0.04, abs=0.02)
 
 

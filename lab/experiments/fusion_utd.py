@@ -16,7 +16,7 @@ from voodoo.evaluation.metrics import JOINTS, joint_errors
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.recordings import open_recording
 from voodoo.recordings.utd_mhad import CAMERA
-from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
 from voodoo.sensors.pixels import world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
@@ -44,13 +44,12 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth",), depth_filter=None))
     chance = np.random.default_rng(11)
-    gate, predictor = SiteGate(), SitePredictor()
-    predictor.update(float("nan"), tracker.estimate.joint_names, tracker.estimate.joint_positions)
+    gate = SiteGate()
     noise, model = PixelNoise(pixels=NOISE_PX), SensorModel()
     found = np.empty((len(recording), len(reference.names), 3))
     for index, recorded in enumerate(recording):
         frame = front_end.frame(recorded)
-        predicted = predictor.predict(recorded.stamp)
+        predicted = tracker.predict(recorded.stamp)
         places = reference.positions[max(index - LAG, 0), [reference.names.index(site) for site in SITES]]
         pixels = CAMERA.project(places) + chance.normal(0.0, NOISE_PX, (len(SITES), 2))
         wrong = chance.random(len(SITES)) < WRONG
@@ -72,7 +71,6 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
             ]
             add_rays(frame, seen, model=model)
         estimate = tracker.step(frame)
-        predictor.update(recorded.stamp, estimate.joint_names, estimate.joint_positions)
         found[index] = [estimate.joints.get(name, np.full(3, np.nan)) for name in reference.names]
     errors = joint_errors(found, reference.positions, lag=LAG)
     return {

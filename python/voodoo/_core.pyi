@@ -20,7 +20,6 @@ __all__ = [
     "People",
     "PersonCandidate",
     "SiteGate",
-    "SiteMotion",
     "SiteRay",
     "SkinCue",
     "SkinTeacher",
@@ -33,6 +32,8 @@ __all__ = [
     "body_view",
     "carried",
     "config_fields",
+    "expected_sites",
+    "linear_sum_assignment",
     "nearest_surface",
     "person_candidates",
     "render_depth",
@@ -85,6 +86,9 @@ def nearest_surface(
     Raises:
         MeasurementError: other shapes.
     """
+
+def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Pairs (row, column) of finite costs (N, M) with the least sum, every row or every column once, by rows."""
 
 def skin_candidates(
     mask: npt.NDArray[np.bool_], palm_px: float
@@ -222,7 +226,7 @@ class SkinCue:
     def assigned(self) -> list[tuple[int, int]]: ...
     @property
     def followed(self) -> list[tuple[int | None, int, float, list[float], list[float], list[float]]]: ...
-    def look(
+    def observe(
         self,
         teacher: SkinTeacher,
         image: npt.NDArray[np.uint8],
@@ -236,12 +240,8 @@ class SkinCue:
         settled: bool,
         arm_lost: Sequence[bool],
         upper_arm_visible: Sequence[bool],
-    ) -> npt.NDArray[np.float64] | None: ...
-    def name(
-        self,
-        limbs: Sequence[str],
-        away: npt.NDArray[np.float32],
-        strangers: npt.NDArray[np.float32] | None = None,
+        tracker: Tracker | tuple[People, int] | None,
+        others: Sequence[Tracker | tuple[People, int]],
     ) -> list[tuple[int, npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64] | None, float]]: ...
 
 @final
@@ -280,17 +280,6 @@ class KeypointLayout:
         surface: Callable[[tuple[float, float]], float | None] | None,
         before: Mapping[str, float] | None,
     ) -> tuple[list[SiteRay], list[tuple[str, npt.NDArray[np.float64], float]], list[str], list[str]]: ...
-
-@final
-class SiteMotion:
-    """Where sites will be; see voodoo.sensors.gating.SitePredictor."""
-
-    def __new__(cls, *, share: float, max_speed: float) -> SiteMotion: ...
-    def __copy__(self) -> SiteMotion: ...
-    def __len__(self) -> int: ...
-    def update(self, stamp: float, names: tuple[str, ...], positions: npt.NDArray[np.float64]) -> None: ...
-    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]: ...
-    def positions(self, stamp: float) -> npt.NDArray[np.float64]: ...
 
 @final
 class SiteGate:
@@ -362,31 +351,26 @@ class SiteRay:
         """The ray with another trust."""
 
 def carried(
-    points: npt.NDArray[np.float64],
-    poses: npt.NDArray[np.float64],
-    before: npt.NDArray[np.float64],
+    points: _Points,
+    tracker: Tracker | tuple[People, int],
     *,
-    interval: float,
     elapsed: float,
-    near: float,
-    share: float,
-    max_speed: float,
-    distances: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float32]],
     world_from_sensor: npt.NDArray[np.float64] | None = None,
-) -> npt.NDArray[np.float64]:
-    """Points (N, 3) that go on with the limb they lie on; see voodoo.sensors.motion.
+) -> npt.NDArray[np.float64] | None:
+    """Where points (N, 3) are that were measured some time before the next frame, those on a limb moved on with it.
 
     Args:
         points: (N, 3) [m].
-        poses, before: (L, 4, 4) of the limbs.
-        interval: time between them [s].
-        elapsed: for so long points go on [s].
-        near: points farther than this from every limb stay [m].
-        share: of the limbs' velocity that is believed.
-        max_speed: points of a limb that is faster stay [m/s].
-        distances: of places (N, 3) from each limb, (L, N) [m].
+        tracker: who follows the body.
+        elapsed: time from the measurement to the frame [s].
         world_from_sensor: pose of the sensor in whose frame the points are; None: they are in the world.
+
+    Returns:
+        (N, 3), or None where nothing moves: too little time has passed, or the body's motion is not known.
     """
+
+def expected_sites(tracker: Tracker | tuple[People, int], stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+    """Site name -> (3,) where it is expected at a time [m]; see voodoo.Tracker.predict."""
 
 def _estimate(
     head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...], spread: tuple[Any, ...] | None = None

@@ -189,6 +189,11 @@ class Followed:
         self._number = number
 
     @property
+    def _core(self) -> tuple[_core.People, int]:
+        """What the compiled core knows them by."""
+        return self._people._core, self._number
+
+    @property
     def body(self) -> Body:
         """The body in their sizes."""
         return self._people.body(self._number)
@@ -204,6 +209,10 @@ class Followed:
         if found is None:
             raise BodyError(f"person: expected one of those who are there, found {self._number}")
         return found
+
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+        """See Tracker.predict."""
+        return _core.expected_sites(self._core, stamp)
 
     def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """See Tracker.limb_distances."""

@@ -175,6 +175,16 @@ class Tracker:
     def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.NDArray[np.float64]] | None:
         return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
 
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+        """Site name -> (3,) where it is expected at `stamp` [s], before or after the last frame [m].
+
+        The last estimate moved on by the share of its motion that is expected to go on, `Config.prediction`.
+
+        Raises:
+            MeasurementError: no pose yet.
+        """
+        return _core.expected_sites(self._core, stamp)
+
     def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside.
 

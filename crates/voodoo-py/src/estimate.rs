@@ -11,7 +11,7 @@ use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
 use voodoo_core::uncertainty::Covariances;
 
-use crate::arrays::{frozen, matrix};
+use crate::arrays::frozen;
 use crate::errors::exception;
 
 /// The names that the numbers of an estimate belong to; shared by all estimates of one body.
@@ -232,7 +232,11 @@ impl PyEstimate {
     #[getter]
     fn limb_poses<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let poses = &self.estimate.world_from_limb;
-        frozen(py, poses.iter().flat_map(|pose| matrix(pose).into_iter().flatten()).collect(), &[poses.len(), 4, 4])
+        frozen(
+            py,
+            poses.iter().flat_map(|pose| voodoo_core::math::matrix(pose).into_iter().flatten()).collect(),
+            &[poses.len(), 4, 4],
+        )
     }
 
     #[doc = stub!("Estimate.joints")]

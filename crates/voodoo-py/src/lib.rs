@@ -50,7 +50,7 @@ mod _core {
     #[pymodule_export]
     use super::ik_view::PyView;
     #[pymodule_export]
-    use super::keypoints::{PyKeypointLayout, carried};
+    use super::keypoints::{PyKeypointLayout, carried, linear_sum_assignment};
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
@@ -60,7 +60,7 @@ mod _core {
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
     #[pymodule_export]
-    use super::sites::{PySiteGate, PySiteMotion, PySiteRay};
+    use super::sites::{PySiteGate, PySiteRay, expected_sites};
     #[pymodule_export]
     use super::skin::{PySkinCue, PySkinTeacher, skin_candidates};
     #[pymodule_export]

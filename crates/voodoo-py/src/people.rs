@@ -9,22 +9,46 @@ use pyo3::types::PyDict;
 use voodoo_core::math::{Aabb, Vec3};
 use voodoo_core::observation::frame::{Cloud, PositionRelation, RayRelation};
 use voodoo_core::people::Options;
-use voodoo_core::{Frame, People};
+use voodoo_core::{Frame, People, Tracker};
 
 use crate::arrays::PointArray;
 use crate::body::PyBody;
 use crate::borrowed::Borrowed;
 use crate::config::config;
-use crate::errors::IntoPy;
+use crate::errors::{IntoPy, exception};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
-use crate::tracker::{places, site_positions};
+use crate::tracker::{PyTracker, places, site_positions};
 
 #[doc = stub!("People")]
 #[pyclass(name = "People", module = "voodoo._core")]
 pub struct PyPeople {
     people: People,
     names: Arc<Names>,
+}
+
+/// A tracker, or one of several persons by number.
+#[derive(FromPyObject)]
+pub enum TrackedBody<'py> {
+    Alone(PyRef<'py, PyTracker>),
+    Person(PyRef<'py, PyPeople>, usize),
+}
+
+impl TrackedBody<'_> {
+    /// Who follows the body.
+    pub fn tracker(&self) -> PyResult<&Tracker> {
+        match self {
+            Self::Alone(tracker) => Ok(&tracker.tracker),
+            Self::Person(people, id) => {
+                let found = people.people.there().find(|(there, _)| there == id);
+                let missing = || {
+                    let text = format!("person: expected one of those who are there, found {id}");
+                    exception(people.py(), "BodyError", text)
+                };
+                found.map(|(_, tracker)| tracker).ok_or_else(missing)
+            }
+        }
+    }
 }
 
 #[pymethods]

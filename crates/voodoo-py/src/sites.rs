@@ -1,13 +1,14 @@
-//! Named sites: where they will be, gates around them, and rays on which they were seen.
+//! Named sites: where they are expected, gates around them, and rays on which they were seen.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::sites::{SiteGate, SiteMotion, SiteRay};
+use voodoo_core::observation::sites::{SiteGate, SiteRay};
 
-use crate::arrays::{rows, vector};
-use crate::errors::exception;
+use crate::arrays::vector;
+use crate::errors::IntoPy;
+use crate::people::TrackedBody;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -29,61 +30,16 @@ pub fn places_of<'a>(places: &Bound<'_, PyAny>, sites: impl Iterator<Item = &'a 
         .collect()
 }
 
-#[doc = stub!("SiteMotion")]
-#[pyclass(name = "SiteMotion", module = "voodoo._core")]
-pub struct PySiteMotion {
-    motion: SiteMotion,
-    /// Names of the sites, as they came.
-    names: Option<Py<PyTuple>>,
-}
-
-#[pymethods]
-impl PySiteMotion {
-    #[new]
-    #[pyo3(signature = (*, share, max_speed))]
-    fn new(share: f64, max_speed: f64) -> Self {
-        Self { motion: SiteMotion::new(share, max_speed), names: None }
+#[doc = stub!("expected_sites")]
+#[pyfunction]
+pub fn expected_sites<'py>(py: Python<'py>, tracker: TrackedBody<'py>, stamp: f64) -> PyResult<Bound<'py, PyDict>> {
+    let tracker = tracker.tracker()?;
+    let places = tracker.expected_sites(stamp).map_err(|error| error.into_py(py))?;
+    let dict = PyDict::new(py);
+    for (site, place) in tracker.body().sites().iter().zip(places) {
+        dict.set_item(&site.name, row(py, place))?;
     }
-
-    fn __copy__(&self, py: Python<'_>) -> Self {
-        Self { motion: self.motion.clone(), names: self.names.as_ref().map(|names| names.clone_ref(py)) }
-    }
-
-    /// Takes up an estimate's named positions.
-    fn update(&mut self, stamp: f64, names: Bound<'_, PyTuple>, positions: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
-        // Estimates of one body have the same tuple.
-        let same = self.names.as_ref().is_some_and(|before| before.is(&names));
-        let known = if same { self.motion.names().clone() } else { names.extract::<Vec<String>>()?.into() };
-        let places = rows("positions", &positions)?;
-        if known.len() != places.len() {
-            let text = format!("positions: expected one of each of {} names, found {}", known.len(), places.len());
-            return Err(exception(names.py(), "MeasurementError", text));
-        }
-        self.motion.update(stamp, known, places.to_vec());
-        self.names = Some(names.unbind());
-        Ok(())
-    }
-
-    /// Name of every site and where it will be.
-    fn predict<'py>(&self, py: Python<'py>, stamp: f64) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        if let Some(names) = &self.names {
-            for (name, place) in names.bind(py).iter().zip(self.motion.at(stamp)) {
-                dict.set_item(name, PyArray1::from_slice(py, &place))?;
-            }
-        }
-        Ok(dict)
-    }
-
-    /// The same of all sites as rows.
-    fn positions<'py>(&self, py: Python<'py>, stamp: f64) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let places = self.motion.at(stamp);
-        PyArray1::from_slice(py, places.as_flattened()).reshape([places.len(), 3])
-    }
-
-    fn __len__(&self) -> usize {
-        self.motion.names().len()
-    }
+    Ok(dict)
 }
 
 #[doc = stub!("SiteGate")]

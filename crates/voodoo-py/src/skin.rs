@@ -2,21 +2,21 @@
 
 use std::sync::Arc;
 
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use voodoo_core::error::TrackError;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::chroma::{CHROMA_BINS, LUMA_BINS};
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::skin::candidates::{Candidate, candidates};
-use voodoo_sensors::skin::cue::{Look, SkinCue, SkinSettings};
-use voodoo_sensors::skin::rules::{Expected, LimbDistances};
+use voodoo_sensors::skin::cue::{SkinCue, SkinInput, SkinSettings, Undistort};
+use voodoo_sensors::skin::rules::Expected;
 use voodoo_sensors::skin::teacher::{Pace, Shown, Teacher};
 
 use crate::arrays::rows;
 use crate::body_view::{PyBodyView, rows_of};
 use crate::errors::{IntoPy, exception};
+use crate::people::TrackedBody;
 use crate::sites::places_of;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -187,7 +187,7 @@ impl PySkinCue {
 
     #[getter]
     fn candidates(&self) -> Vec<Place> {
-        self.cue.candidates().iter().map(told).collect()
+        self.cue.candidates.iter().map(told).collect()
     }
 
     #[getter]
@@ -207,10 +207,11 @@ impl PySkinCue {
             .collect()
     }
 
-    /// Looks for regions of skin and follows them; where their candidates are, none without any.
-    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, intrinsics, lens, body, settled, arm_lost, upper_arm_visible))]
+    /// Finds regions of skin in a picture, follows and names them: of each site that was found its number, a point and the direction
+    /// of its ray, its place, and its expected depth.
+    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, intrinsics, lens, body, settled, arm_lost, upper_arm_visible, tracker, others))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
-    fn look<'py>(
+    fn observe<'py>(
         &mut self,
         py: Python<'py>,
         teacher: &PySkinTeacher,
@@ -219,13 +220,14 @@ impl PySkinCue {
         stamp: f64,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
         intrinsics: [f64; 4],
-        lens: Option<&Bound<'py, PyAny>>,
+        lens: Option<Py<PyAny>>,
         body: Option<&PyBodyView>,
         settled: bool,
         arm_lost: Vec<bool>,
         upper_arm_visible: Vec<bool>,
-    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let eye = eye(&world_from_sensor, intrinsics)?;
+        tracker: Option<TrackedBody<'py>>,
+        others: Vec<TrackedBody<'py>>,
+    ) -> PyResult<Vec<Ray<'py>>> {
         let count = self.arms.len();
         if arm_lost.len() != count || upper_arm_visible.len() != count {
             let found = [arm_lost.len(), upper_arm_visible.len()];
@@ -235,63 +237,42 @@ impl PySkinCue {
                 format!("arms: expected {count} marks each, found {found:?}"),
             ));
         }
-        let known = |place: &Vec3| !place.is_nan();
         let mut expected = Vec::new();
         for (site, names) in self.arms.iter().enumerate() {
             let places = places_of(predicted, names.iter().map(String::as_str))?;
-            let [here, shoulder, elbow, hand] = [0, 1, 2, 3].map(|index| places[index].filter(known));
-            let Some(here) = here else { continue };
-            let inside = eye.in_sensor(here);
-            if inside.is_finite() && inside.z > 0.1 {
-                expected.push(Expected {
-                    site,
-                    head: self.cue.settings.is_head(site),
-                    place: here,
-                    depth: inside.z,
-                    arm: [shoulder, elbow, hand],
-                    arm_lost: arm_lost[site],
-                    upper_arm_visible: upper_arm_visible[site],
-                });
-            }
+            let [here, shoulder, elbow, hand] = [0, 1, 2, 3].map(|index| places[index].filter(|place| !place.is_nan()));
+            let Some(place) = here else { continue };
+            expected.push(Expected {
+                site,
+                head: self.cue.settings.is_head(site),
+                place,
+                arm: [shoulder, elbow, hand],
+                arm_lost: arm_lost[site],
+                upper_arm_visible: upper_arm_visible[site],
+            });
         }
         let (image, size) = image_of(&image)?;
-        let look = Look {
+        let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
+        let look_through = |lens: &Py<PyAny>, pixels: &[[f64; 2]]| {
+            let found = Python::attach(|py| pairs(lens.bind(py), pixels));
+            found.map_err(|error| TrackError::measurement("lens", "two numbers for each pixel", error.to_string()))
+        };
+        let undistort = lens.as_ref().map(|lens| move |pixels: &[[f64; 2]]| look_through(lens, pixels));
+        let input = SkinInput {
             image,
             size,
             stamp,
-            focal: eye.focal(),
+            eye: eye(&world_from_sensor, intrinsics)?,
+            undistort: undistort.as_ref().map(|undistort| undistort as &Undistort),
             body: body.map(|body| &body.0),
             teacher: &teacher.0,
-            expected: &expected,
             settled,
+            expected: &expected,
+            tracker: tracker.as_ref().map(TrackedBody::tracker).transpose()?,
+            others: &others,
         };
-        py.detach(|| self.cue.look(&look)).map_err(|error| error.into_py(py))?;
-        if self.cue.candidates().is_empty() {
-            return Ok(None);
-        }
-        let pixels: Vec<[f64; 2]> = self.cue.candidates().iter().map(|item| item.pixel).collect();
-        let flat = match lens {
-            Some(lens) => pairs(lens, &pixels)?,
-            None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),
-        };
-        let directions: Vec<Vec3> = flat.into_iter().map(|xy| eye.direction(xy)).collect();
-        let sights = self.cue.place(&directions, eye.origin(), eye.axis()).map_err(|error| error.into_py(py))?;
-        let places = sights.iter().flat_map(|sight| sight.place.to_array()).collect();
-        PyArray1::from_vec(py, places).reshape([sights.len(), 3]).map(Some)
-    }
-
-    /// Which candidate each site is: its number, a point and the direction of its ray, its place, and its expected depth.
-    #[pyo3(signature = (limbs, away, strangers=None))]
-    fn name<'py>(
-        &mut self,
-        py: Python<'py>,
-        limbs: Vec<String>,
-        away: PyReadonlyArray2<'py, f32>,
-        strangers: Option<PyReadonlyArray1<'py, f32>>,
-    ) -> PyResult<Vec<Ray<'py>>> {
-        let limbs = LimbDistances { names: limbs, away: away.as_slice()?.to_vec() };
-        let strangers = strangers.as_ref().map(|away| away.as_slice()).transpose()?;
-        let found = self.cue.name(&limbs, strangers).map_err(|error| error.into_py(py))?;
+        let cue = &mut self.cue;
+        let found = py.detach(|| cue.observe(&input)).map_err(|error| error.into_py(py))?;
         let row = |place: Vec3| PyArray1::from_slice(py, &place.to_array());
         let told = found.iter();
         Ok(told

@@ -22,7 +22,7 @@ use crate::shape::PyShape;
 #[doc = stub!("Tracker")]
 #[pyclass(name = "Tracker", module = "voodoo._core")]
 pub struct PyTracker {
-    tracker: Tracker,
+    pub tracker: Tracker,
     names: Arc<Names>,
     sources: Vec<String>,
     /// Names of the cameras of colour pictures, in the order of their numbers.

@@ -188,6 +188,14 @@ pub fn is_rigid(pose: &Pose) -> bool {
     is_place(pose.translation) && pose.rotation.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6
 }
 
+/// A pose as the rows of a 4x4 matrix.
+pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
+    let rows = Mat3::from_quat(pose.rotation).transpose().to_cols_array_2d();
+    let t = pose.translation;
+    let row = |index: usize, shift: f64| [rows[index][0], rows[index][1], rows[index][2], shift];
+    [row(0, t.x), row(1, t.y), row(2, t.z), [0.0, 0.0, 0.0, 1.0]]
+}
+
 /// Single-precision points as a structure of arrays, the layout the SIMD kernels read. Metres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {

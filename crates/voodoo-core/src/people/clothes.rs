@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
-use crate::visibility::ALONG_LIMB;
+use crate::visibility::surface::surface_rows;
 
 /// Limbs that show what is worn above the waist, and below it, by what their names hold.
 const WORN: [&[&str]; 2] = [&["thorax", "upperarm", "torso"], &["thigh", "calf"]];
@@ -49,9 +49,8 @@ impl Clothes {
                 }
                 for (number, image) in frame.images.iter().enumerate() {
                     let camera_from_limb = image.world_from_sensor.inverse() * *pose;
-                    for t in ALONG_LIMB {
-                        let Some(facing) = limb.shape.section(t).facing(&camera_from_limb) else { continue };
-                        for place in ACROSS.map(|s| camera_from_limb * facing.point(s)) {
+                    for row in surface_rows(&limb.shape, &camera_from_limb) {
+                        for place in row.points(ACROSS) {
                             let Some(point) = surface(image, place, |pixel| own(number, pixel)) else { continue };
                             let world = image.world_from_sensor * point;
                             if let Some(color) = frame.colors.iter().find_map(|picture| color_at(picture, world)) {
