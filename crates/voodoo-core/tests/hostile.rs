@@ -265,7 +265,7 @@ fn hostile_input_is_refused_or_answered_in_finite_numbers() {
     let standing = scene::standing(&body);
     let good = scene::surface_points(&body, &standing, 400, 0.01, &mut scene::Noise(1));
     let started = || {
-        let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+        let mut tracker = crate::tracker(body.clone(), Config::default()).unwrap();
         tracker.reset_pose(&standing).unwrap();
         tracker
     };

@@ -1,6 +1,7 @@
 //! What is refused, and that a refusal leaves no trace.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+use crate::detection::Fixed;
 use crate::scene;
 use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
 use voodoo_core::config::{RawValue, Value};
@@ -130,14 +131,17 @@ fn bad_sites_and_floors_are_refused() {
 #[test]
 fn a_tracker_without_a_pose_searches_and_refuses_every_frame_of_a_body_that_no_detector_knows() {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
-    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    let new = || Tracker::new(body.clone(), Config::default()).unwrap();
+    let mut tracker = new().with_detector(Box::new(Fixed::of(&["l_hip", "r_hip", "l_shoulder", "nose"])));
     let estimate = tracker.step(&Frame::empty(0.0)).unwrap();
     assert_eq!((estimate.status, estimate.stamp, estimate.sites.len()), (Status::Searching, 0.0, 0));
     assert!(matches!(tracker.step(&Frame::empty(0.0)), Err(TrackError::TimeBackwards { .. })));
-    let sites = body.sites().iter().filter(|site| site.name != "l_hand").cloned().collect();
-    let unknown = Body::new("unknown", body.limbs().to_vec(), sites).unwrap();
-    let mut tracker = Tracker::new(unknown, Config::default()).unwrap();
-    assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+    let two = Fixed::of(&["l_hip", "r_hip", "nose"]);
+    for mut tracker in [new(), new().with_detector(Box::new(two))] {
+        assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+        assert!(tracker.estimate().stamp.is_nan());
+    }
+    let tracker = new();
     // No residual of zero before anything was measured.
     assert!(tracker.estimate().stamp.is_nan() && tracker.estimate().mean_squared_distance.is_nan());
 }

@@ -6,12 +6,13 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::body::HumanModel;
-use voodoo_core::detect::crop::SIZE;
-use voodoo_core::detect::segmentation::Segmentation;
-use voodoo_core::detect::{Detection, Detector, JOINTS, LENGTHS, Surroundings, Wanted};
+use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::observation::frame::{DepthImage, DepthPixels, Ground};
 use voodoo_core::{Body, Frame};
+use voodoo_detect::crop::SIZE;
+use voodoo_detect::segmentation::Segmentation;
+use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
 use crate::arrays::{contiguous, vector};
 use crate::errors::{IntoPy, exception, wrong_argument};
@@ -19,7 +20,7 @@ use crate::frame::PyFrame;
 
 #[doc = stub!("Detector")]
 #[pyclass(name = "Detector", module = "voodoo")]
-pub struct PyDetector(Detector);
+pub struct PyDetector(pub Detector);
 
 #[pymethods]
 impl PyDetector {
@@ -28,7 +29,7 @@ impl PyDetector {
     fn new(py: Python<'_>, weights: Option<PathBuf>) -> PyResult<Self> {
         let refused = |message: String| exception(py, "MeasurementError", message);
         let detector = match weights {
-            None => Detector::new().map_err(|error| error.to_string()),
+            None => Ok(Detector::new()),
             Some(path) => std::fs::read(&path)
                 .map_err(|error| format!("{}: expected a readable file, found {error}", path.display()))
                 .and_then(|bytes| {
@@ -56,20 +57,19 @@ impl PyDetector {
             None => None,
         };
         let detector = &mut self.0;
-        let mut found = py.detach(|| {
-            let mut found = Vec::new();
+        let found = py.detach(|| {
+            let mut found: Vec<PyDetection> = Vec::new();
             for image in &images {
                 let around =
                     Surroundings { ground: input.ground, up, excluded: input.excluded, ..Surroundings::default() };
-                for detection in detector.detect(image, &around, Wanted::All).to_vec() {
-                    let mut pixels = Vec::new();
-                    detector.mask(&detection, &mut pixels);
+                for detection in detector.detect(image, &around, DetectionQuery::All)? {
                     let source = frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
-                    found.push(PyDetection { detection, pixels, size: [image.height, image.width], source });
+                    found.push(PyDetection { detection, size: [image.height, image.width], source });
                 }
             }
-            found
+            Ok::<_, DetectError>(found)
         });
+        let mut found = found.map_err(|error| exception(py, "MeasurementError", error.to_string()))?;
         found.sort_by(|a, b| b.detection.person.total_cmp(&a.detection.person));
         Ok(found)
     }
@@ -83,7 +83,6 @@ impl PyDetector {
 #[pyclass(name = "Detection", module = "voodoo", frozen)]
 pub struct PyDetection {
     detection: Detection,
-    pixels: Vec<usize>,
     size: [usize; 2],
     source: String,
 }
@@ -97,10 +96,10 @@ impl PyDetection {
     fn of_joints<'py, T: IntoPyObject<'py>>(
         &self,
         py: Python<'py>,
-        value: impl Fn(&voodoo_core::detect::DetectedJoint) -> T,
+        value: impl Fn(&DetectedJoint) -> T,
     ) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (name, joint) in JOINTS.iter().zip(&self.detection.joints) {
+        for (name, joint) in JOINTS.iter().zip(self.detection.joints.iter().flatten()) {
             dict.set_item(name, value(joint))?;
         }
         Ok(dict)
@@ -156,7 +155,7 @@ impl PyDetection {
     #[doc = stub!("Detection.facing")]
     #[getter]
     fn facing(&self) -> f64 {
-        probability(self.detection.facing)
+        probability(self.detection.facing.unwrap_or(0.0))
     }
 
     #[doc = stub!("Detection.confidence")]
@@ -175,13 +174,19 @@ impl PyDetection {
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         let mut mask = vec![false; self.size[0] * self.size[1]];
-        self.pixels.iter().for_each(|pixel| mask[*pixel] = true);
+        self.detection.pixels.iter().for_each(|pixel| mask[*pixel] = true);
         PyArray1::from_vec(py, mask).reshape(self.size)
+    }
+
+    /// The floor as the image shows it, or as the frame gave it: unit normal (3,) upwards and height along it [m]; or None.
+    #[getter]
+    fn floor(&self) -> Option<([f64; 3], f64)> {
+        self.detection.floor.map(|floor| (floor.normal.to_array(), floor.offset))
     }
 
     fn __repr__(&self) -> String {
         let Detection { joints, .. } = &self.detection;
-        let at = joints.get(2).map_or([f64::NAN; 3], |root| root.position.to_array());
+        let at = joints.get(2).copied().flatten().map_or([f64::NAN; 3], |root| root.position.to_array());
         format!(
             "Detection(source={:?}, confidence={:.2}, facing={:.2}, stature={:.2}, humanoid_root=({:.2}, {:.2}, {:.2}))",
             self.source,

@@ -14,7 +14,9 @@ mod body;
 mod body_view;
 mod borrowed;
 mod config;
+#[cfg(feature = "detect")]
 mod detect;
+mod detector;
 mod errors;
 mod estimate;
 mod frame;
@@ -39,6 +41,7 @@ mod _core {
     use super::body_view::{PyBodyView, PyStillDepth, body_view};
     #[pymodule_export]
     use super::config::config_fields;
+    #[cfg(feature = "detect")]
     #[pymodule_export]
     use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
     #[pymodule_export]

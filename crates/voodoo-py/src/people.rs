@@ -15,6 +15,7 @@ use crate::arrays::PointArray;
 use crate::body::PyBody;
 use crate::borrowed::Borrowed;
 use crate::config::config;
+use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
@@ -25,6 +26,8 @@ use crate::tracker::{PyTracker, places, site_positions};
 pub struct PyPeople {
     people: People,
     names: Arc<Names>,
+    /// Steps in which a detector failed.
+    detector_failures: usize,
 }
 
 /// A tracker, or one of several persons by number.
@@ -54,10 +57,11 @@ impl TrackedBody<'_> {
 #[pymethods]
 impl PyPeople {
     #[new]
-    #[pyo3(signature = (body, values, *, limit, nearest, forget_after, region))]
+    #[pyo3(signature = (body, values, detector, *, limit, nearest, forget_after, region))]
     fn new(
         body: &PyBody,
         values: &Bound<'_, PyDict>,
+        detector: &Bound<'_, PyAny>,
         limit: Option<usize>,
         nearest: bool,
         forget_after: f64,
@@ -65,10 +69,13 @@ impl PyPeople {
     ) -> PyResult<Self> {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
         let options = Options { limit, nearest, forget_after, region, only: None };
-        let people =
+        let mut people =
             People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
+        if let Some(found) = self::detector(detector)? {
+            people = people.with_detector(found);
+        }
         let names = Arc::new(Names::of(people.prototype()));
-        Ok(Self { people, names })
+        Ok(Self { people, names, detector_failures: 0 })
     }
 
     /// One frame, and what was measured of some persons alone; releases the GIL. Number and estimate of everybody who is there.
@@ -102,6 +109,8 @@ impl PyPeople {
             own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
         let people = &mut self.people;
         py.detach(|| people.step(&input, &frames)).map_err(|error| error.into_py(py))?;
+        self.detector_failures += usize::from(people.detector_error().is_some());
+        warn_of_detector(py, self.people.detector_error())?;
         let found = self.people.there().map(|(id, tracker)| {
             let (estimate, names) = (tracker.estimate().clone(), self.names.clone());
             let own = own.iter().filter(|(of, _)| *of == id).flat_map(|(_, own)| &own.sources);
@@ -109,6 +118,11 @@ impl PyPeople {
             (id, PyEstimate { estimate, names, sources })
         });
         Ok(found.collect())
+    }
+
+    #[getter]
+    fn detector_failures(&self) -> usize {
+        self.detector_failures
     }
 
     /// Somebody is where these positions say; their number.

@@ -14,6 +14,7 @@ use crate::arrays::{PointArray, limb_poses, vector};
 use crate::body::{JointParts, PyBody, joint};
 use crate::borrowed::{ColorArray, ColorView};
 use crate::config::config;
+use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
@@ -27,6 +28,8 @@ pub struct PyTracker {
     sources: Vec<String>,
     /// Names of the cameras of colour pictures, in the order of their numbers.
     cameras: Vec<String>,
+    /// Steps in which the detector failed.
+    detector_failures: usize,
 }
 
 /// Named positions with the indices of their sites.
@@ -94,10 +97,13 @@ impl PyTracker {
 #[pymethods]
 impl PyTracker {
     #[new]
-    fn new(body: &PyBody, values: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
+    fn new(body: &PyBody, values: &Bound<'_, PyDict>, detector: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
+        if let Some(found) = self::detector(detector)? {
+            tracker = tracker.with_detector(found);
+        }
         let names = Arc::new(Names::of(tracker.body()));
-        Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new() })
+        Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new(), detector_failures: 0 })
     }
 
     fn _body(&self) -> PyBody {
@@ -126,6 +132,17 @@ impl PyTracker {
         Ok(self.snapshot())
     }
 
+    /// Whether somebody is looked for while there is no pose.
+    #[getter]
+    fn can_search(&self) -> bool {
+        self.tracker.can_search()
+    }
+
+    #[getter]
+    fn detector_failures(&self) -> usize {
+        self.detector_failures
+    }
+
     /// One frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = frame.borrow_for(py, self.tracker.body())?;
@@ -145,6 +162,8 @@ impl PyTracker {
         let tracker = &mut self.tracker;
         py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
         self.sources.clone_from(&frame.sources);
+        self.detector_failures += usize::from(self.tracker.detector_error().is_some());
+        warn_of_detector(py, self.tracker.detector_error())?;
         Ok(self.snapshot())
     }
 

@@ -1,28 +1,27 @@
 //! The arm or leg ends where a detector sees its wrist or ankle.
 
 use super::{Pool, Propose, SWIVELS};
-use crate::detect::Detection;
+use crate::detect::Detected;
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Vec3;
 
 /// What a detector says of this frame, if it looked.
 #[derive(Debug)]
-pub(in crate::hypotheses) struct DetectedEnd<'a>(pub(in crate::hypotheses) Option<&'a Detection>);
+pub(in crate::hypotheses) struct DetectedEnd<'a>(pub(in crate::hypotheses) Option<Detected<'a>>);
 
 impl DetectedEnd<'_> {
     /// Where the end is seen, world frame: the hand's middle, or as far from the ankle as it is now.
     fn end(&self, at: Extremity) -> Option<Vec3> {
         let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
-        let detection = self.0?;
+        let detected = self.0?;
         let last = chain.ends.first()?;
         let joint = body.limbs()[*last].parent.as_ref().map(|(_, joint)| joint)?;
-        let on_end = body.sites().iter().filter(|site| site.limb == *last && site.name != joint.name);
-        if let Some(seen) = on_end.filter_map(|site| detection.joint(&site.name)).next() {
+        if let Some(seen) = detected.on_limb(*last) {
             return Some(seen.position);
         }
         let beyond = chain.end(poses) - poses[*last] * joint.limb_from_joint.translation;
-        Some(detection.joint(&joint.name)?.position + beyond)
+        Some(detected.hangs_by(*last)?.position + beyond)
     }
 }
 

@@ -8,6 +8,7 @@ use voodoo_core::observation::frame::Frame;
 use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 use voodoo_core::people::Options;
 use voodoo_core::{Body, Config, People, Status};
+use voodoo_detect::Detector;
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 120.0 };
 const RATE: f64 = 15.0;
@@ -49,7 +50,8 @@ fn crossing() -> (Vec<Vec<u16>>, Vec<[Vec3; 2]>) {
 }
 
 fn people(options: Options, threads: usize) -> People {
-    People::new(body(1.75), Config { threads, ..Config::default() }, options).unwrap()
+    let people = People::new(body(1.75), Config { threads, ..Config::default() }, options).unwrap();
+    people.with_detector(Box::new(Detector::new()))
 }
 
 fn show(people: &mut People, pixels: &[u16], frame: usize) -> Vec<(usize, Status, Vec3)> {
@@ -68,7 +70,8 @@ fn off(root: Vec3, place: Vec3) -> f64 {
 #[test]
 fn two_who_cross_keep_their_numbers_and_the_hidden_one_is_not_dragged_along() {
     let (images, ways) = crossing();
-    let mut people = people(Options::default(), 1);
+    let new = || people(Options::default(), 1);
+    let mut people = new();
     let mut last = Vec::new();
     for (frame, (pixels, [near, far])) in images.iter().zip(&ways).enumerate() {
         last = show(&mut people, pixels, frame);
@@ -83,7 +86,7 @@ fn two_who_cross_keep_their_numbers_and_the_hidden_one_is_not_dragged_along() {
         assert!(last.iter().any(|(_, _, root)| off(*root, place) < 0.15), "{last:?}");
     }
     // Who was nearer at the start is so at the end.
-    let mut again = People::new(body(1.75), Config::default(), Options::default()).unwrap();
+    let mut again = new();
     let start = images[..8].iter().enumerate().map(|(frame, pixels)| show(&mut again, pixels, frame)).last().unwrap();
     for (id, _, root) in &start {
         let was_near = off(*root, ways[7][0]) < off(*root, ways[7][1]);
@@ -184,18 +187,4 @@ fn only_some_are_followed() {
     let two = there(any());
     assert_eq!(two.len(), 2);
     assert_eq!(there(Options { only: Some(vec![1]), ..any() }).iter().map(|one| one.0).collect::<Vec<_>>(), [1]);
-}
-
-#[test]
-fn whose_place_is_told_is_followed_without_a_detector() {
-    let (images, ways) = crossing();
-    let mut people = people(Options::default(), 1);
-    let near = body(1.75);
-    let poses = at(&near, ways[0][0]);
-    let positions: Vec<(usize, Vec3)> =
-        (0..near.sites().len()).map(|site| (site, near.site_position(&poses, site))).collect();
-    assert!(people.add(&positions[..1], true).is_err(), "one position fixes no pose");
-    assert_eq!(people.add(&positions, false).unwrap(), 1);
-    let first = show(&mut people, &images[0], 0);
-    assert!(first[0].0 == 1 && off(first[0].2, ways[0][0]) < 0.1, "{first:?}");
 }

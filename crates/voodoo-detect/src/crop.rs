@@ -1,8 +1,8 @@
 //! The picture that the network sees of a candidate: 96 x 96 pixels about its middle, turned so that up is up.
 
-use super::components::{Candidate, Components, NONE};
-use super::view::View;
-use crate::math::Vec3;
+use crate::components::{Candidate, Components, NONE};
+use crate::view::View;
+use voodoo_core::math::Vec3;
 
 /// Pixels along an edge.
 pub const SIZE: usize = 96;
@@ -24,7 +24,7 @@ pub struct Crop {
 
 impl Crop {
     /// The picture of a candidate; `up` in the camera's frame. `None` if it has no pixels.
-    pub(super) fn of(
+    pub(crate) fn of(
         view: &View,
         parts: &Components,
         candidate: &Candidate,
@@ -88,38 +88,36 @@ fn median(values: &mut [f32]) -> Option<f32> {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::detect::segmentation::Segmentation;
-    use crate::detect::view::Surroundings;
-    use crate::math::{Pose, Quat};
-    use crate::observation::frame::DepthImage;
-    use crate::observation::frame::Frame;
-    use crate::testing::{before_wall, standing, with_frame};
+    use crate::segmentation::Segmentation;
+    use crate::testing::{before_wall, image, standing};
+    use voodoo_core::detect::Surroundings;
+    use voodoo_core::math::{Pose, Quat};
+    use voodoo_core::observation::frame::DepthImage;
 
     #[test]
     fn places_of_the_picture_are_where_the_camera_saw_them() {
-        let (model, poses) = standing();
-        with_frame(&before_wall(&model.body, &poses), 0.0, |frame: &Frame| {
-            for roll in [0.0, 0.6] {
-                let world_from_sensor = Pose::from_parts(Vec3::ZERO, Quat::from_axis_angle(Vec3::Z, roll));
-                let image = DepthImage { world_from_sensor, ..frame.images[0] };
-                let mut segmentation = Segmentation::default();
-                let around = Surroundings { up: Some(-Vec3::Y), ..Surroundings::default() };
-                let candidate = segmentation.find(&image, &around)[0].clone();
-                let crop = segmentation.crop(&candidate).unwrap();
-                assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
-                // Every pixel of the picture that shows the person, back in the camera, lies on a point that was seen.
-                let seen: Vec<Vec3> = segmentation.pixels(&candidate).map(|(_, point)| point).collect();
-                let half = 0.5 * (SIZE as f64 - 1.0);
-                let mut shown = 0;
-                for (index, [depth, mask]) in crop.pixels.iter().enumerate().filter(|(_, pixel)| pixel[1] > 0.0) {
-                    let [column, row] = [index % SIZE, index / SIZE].map(|at| (at as f64 - half) * WIDTH / SIZE as f64);
-                    let place = crop.to_camera(Vec3::new(column, row, DEPTH * f64::from(*depth)));
-                    let nearest = seen.iter().map(|point| point.distance(place)).fold(f64::INFINITY, f64::min);
-                    assert!(nearest < 0.02 && *mask == 1.0, "{nearest}");
-                    shown += 1;
-                }
-                assert!(shown > 300, "{shown}");
+        let (body, poses) = standing();
+        let pixels = before_wall(&body, &poses);
+        for roll in [0.0, 0.6] {
+            let world_from_sensor = Pose::from_parts(Vec3::ZERO, Quat::from_axis_angle(Vec3::Z, roll));
+            let image = DepthImage { world_from_sensor, ..image(&pixels) };
+            let mut segmentation = Segmentation::default();
+            let around = Surroundings { up: Some(-Vec3::Y), ..Surroundings::default() };
+            let candidate = segmentation.find(&image, &around)[0].clone();
+            let crop = segmentation.crop(&candidate).unwrap();
+            assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
+            // Every pixel of the picture that shows the person, back in the camera, lies on a point that was seen.
+            let seen: Vec<Vec3> = segmentation.pixels(&candidate).map(|(_, point)| point).collect();
+            let half = 0.5 * (SIZE as f64 - 1.0);
+            let mut shown = 0;
+            for (index, [depth, mask]) in crop.pixels.iter().enumerate().filter(|(_, pixel)| pixel[1] > 0.0) {
+                let [column, row] = [index % SIZE, index / SIZE].map(|at| (at as f64 - half) * WIDTH / SIZE as f64);
+                let place = crop.to_camera(Vec3::new(column, row, DEPTH * f64::from(*depth)));
+                let nearest = seen.iter().map(|point| point.distance(place)).fold(f64::INFINITY, f64::min);
+                assert!(nearest < 0.02 && *mask == 1.0, "{nearest}");
+                shown += 1;
             }
-        });
+            assert!(shown > 300, "{shown}");
+        }
     }
 }

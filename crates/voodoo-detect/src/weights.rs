@@ -20,28 +20,28 @@ pub struct WeightsError {
 }
 
 impl WeightsError {
-    pub(super) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
+    pub(crate) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
         Self { expected: expected.into(), found: found.into() }
     }
 }
 
 /// A matrix, a row for every output and a column for every input, with its biases and the edge of its kernel.
 #[derive(Debug)]
-pub(super) struct Layer {
-    pub(super) weights: Vec<f32>,
-    pub(super) bias: Vec<f32>,
-    pub(super) kernel: usize,
+pub(crate) struct Layer {
+    pub(crate) weights: Vec<f32>,
+    pub(crate) bias: Vec<f32>,
+    pub(crate) kernel: usize,
 }
 
 /// Named tensors.
 #[derive(Debug, Default)]
-pub(super) struct Weights {
+pub(crate) struct Weights {
     tensors: BTreeMap<String, (Vec<usize>, Vec<f32>)>,
 }
 
 impl Weights {
     /// Reads a file's bytes.
-    pub(super) fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
+    pub(crate) fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
         let mut rest = bytes;
         let first = line(&mut rest)?;
         if first != FIRST_LINE {
@@ -77,7 +77,7 @@ impl Weights {
     }
 
     /// Whether there is a tensor of this name.
-    pub(super) fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.tensors.contains_key(name)
     }
 
@@ -94,7 +94,7 @@ impl Weights {
     }
 
     /// A layer whose weights have so many edges.
-    pub(super) fn layer(&mut self, name: &str, edges: usize) -> Result<Layer, WeightsError> {
+    pub(crate) fn layer(&mut self, name: &str, edges: usize) -> Result<Layer, WeightsError> {
         let (shape, weights) = self.take(&format!("{name}.weight"), edges)?;
         let (_, bias) = self.take(&format!("{name}.bias"), 1)?;
         let square = edges == 2 || shape[1] == shape[2];

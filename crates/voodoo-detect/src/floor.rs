@@ -1,8 +1,8 @@
 //! The floor in a depth image where nobody told it: the plane with the most points that has hardly any below it.
 
-use super::view::View;
-use crate::math::{LANES, Vec3};
-use crate::observation::frame::Ground;
+use crate::view::View;
+use voodoo_core::math::{LANES, Vec3};
+use voodoo_core::observation::frame::Ground;
 
 /// Points that are looked at, about.
 const FLOOR_SAMPLES: usize = 1200;
@@ -62,7 +62,7 @@ impl Lanes {
 
 /// Working memory.
 #[derive(Debug, Default)]
-pub(super) struct FloorFinder {
+pub(crate) struct FloorFinder {
     points: Lanes,
     /// Those on surfaces that face upwards.
     level: Vec<Vec3>,
@@ -71,7 +71,7 @@ pub(super) struct FloorFinder {
 
 impl FloorFinder {
     /// The floor in the camera's frame; `up` is the direction upwards about as it is known there.
-    pub(super) fn find(&mut self, view: &View, up: Vec3) -> Option<Ground> {
+    pub(crate) fn find(&mut self, view: &View, up: Vec3) -> Option<Ground> {
         self.sample(view, up);
         let count = self.points.x.len();
         if self.level.len() < 20 {
@@ -179,8 +179,9 @@ impl Draw {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::detect::view::Surroundings;
-    use crate::testing::image;
+    use voodoo_core::detect::Surroundings;
+    use voodoo_core::math::Pose;
+    use voodoo_core::observation::frame::{DepthImage, DepthPixels};
 
     /// Edge of the image, and its focal length, pixels.
     const EDGE: usize = 120;
@@ -202,7 +203,19 @@ mod tests {
             })
             .collect();
         let mut view = View::default();
-        view.read(&image(&pixels, EDGE, FOCAL), &Surroundings::default());
+        let half = 0.5 * (EDGE as f64 - 1.0);
+        let image = DepthImage {
+            pixels: DepthPixels::F32(&pixels),
+            width: EDGE,
+            height: EDGE,
+            metres_per_unit: 1.0,
+            intrinsics: [FOCAL, FOCAL, half, half],
+            rays: None,
+            world_from_sensor: Pose::IDENTITY,
+            weight: 1.0,
+            source: 0,
+        };
+        view.read(&image, &Surroundings::default());
         FloorFinder::default().find(&view, -Vec3::Y)
     }
 

@@ -2,28 +2,28 @@
 //!
 //! Maps lie channel by channel for every pixel, row by row.
 
-use super::product::Panels;
-use super::weights::{Weights, WeightsError};
-use super::winograd::{KERNEL, Tiles, Winograd};
+use crate::product::Panels;
+use crate::weights::{Weights, WeightsError};
+use crate::winograd::{KERNEL, Tiles, Winograd};
 
 /// A square map of features.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Map {
-    pub(super) edge: usize,
-    pub(super) channels: usize,
-    pub(super) values: Vec<f32>,
+pub(crate) struct Map {
+    pub(crate) edge: usize,
+    pub(crate) channels: usize,
+    pub(crate) values: Vec<f32>,
 }
 
 /// Working memory of convolutions.
 #[derive(Debug, Default)]
-pub(super) struct Working {
+pub(crate) struct Working {
     columns: Vec<f32>,
     tiles: Tiles,
 }
 
 /// A convolution, with what happens to its edge.
 #[derive(Debug)]
-pub(super) struct Convolution {
+pub(crate) struct Convolution {
     products: Products,
     kernel: usize,
     stride: usize,
@@ -41,7 +41,7 @@ enum Products {
 
 impl Convolution {
     /// One of a file; it looks at maps of this `edge`.
-    pub(super) fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
+    pub(crate) fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
         let layer = weights.layer(name, 4)?;
         Ok(Self::of(&layer.weights, &layer.bias, layer.kernel, stride, edge))
     }
@@ -56,14 +56,14 @@ impl Convolution {
         Self { products, kernel, stride, padding: usize::from(kernel > 1) }
     }
 
-    pub(super) fn inputs(&self) -> usize {
+    pub(crate) fn inputs(&self) -> usize {
         match &self.products {
             Products::Whole(panels) => panels.inputs / (self.kernel * self.kernel),
             Products::Tiled(tiled) => tiled.inputs(),
         }
     }
 
-    pub(super) fn outputs(&self) -> usize {
+    pub(crate) fn outputs(&self) -> usize {
         match &self.products {
             Products::Whole(panels) => panels.outputs,
             Products::Tiled(tiled) => tiled.outputs(),
@@ -71,7 +71,7 @@ impl Convolution {
     }
 
     /// The map after it.
-    pub(super) fn apply(&self, map: &Map, out: &mut Map, working: &mut Working, relu: bool) {
+    pub(crate) fn apply(&self, map: &Map, out: &mut Map, working: &mut Working, relu: bool) {
         out.edge = (map.edge + 2 * self.padding - self.kernel) / self.stride + 1;
         out.channels = self.outputs();
         out.values.resize(out.edge * out.edge * out.channels, 0.0);
@@ -112,7 +112,7 @@ impl Convolution {
     }
 }
 
-pub(super) fn rectify(values: &mut [f32]) {
+pub(crate) fn rectify(values: &mut [f32]) {
     values.iter_mut().for_each(|value| *value = value.max(0.0));
 }
 

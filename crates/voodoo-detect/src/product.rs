@@ -2,7 +2,7 @@
 //!
 //! No multiplication is fused with an addition: every processor gives the same bits.
 
-use crate::math::widest;
+use voodoo_core::math::widest;
 
 /// Columns that are worked on together.
 const TOGETHER: usize = 16;
@@ -13,16 +13,16 @@ const FEW_ROWS: usize = 3;
 
 /// Trained weights and biases, columns in groups of `TOGETHER`; missing columns are zeros.
 #[derive(Debug)]
-pub(super) struct Panels {
-    pub(super) inputs: usize,
-    pub(super) outputs: usize,
+pub(crate) struct Panels {
+    pub(crate) inputs: usize,
+    pub(crate) outputs: usize,
     weights: Vec<[f32; TOGETHER]>,
     bias: Vec<[f32; TOGETHER]>,
 }
 
 impl Panels {
     /// Of `weights` for every output, one output after the other, and its `bias`.
-    pub(super) fn of(weights: &[f32], bias: &[f32]) -> Self {
+    pub(crate) fn of(weights: &[f32], bias: &[f32]) -> Self {
         let outputs = bias.len();
         let inputs = weights.len().checked_div(outputs).unwrap_or(0);
         let groups = outputs.div_ceil(TOGETHER);
@@ -40,7 +40,7 @@ impl Panels {
     }
 
     /// For each row of `seen`, `inputs` values, its products with the weights, and the biases: a row of `out`, `outputs` values.
-    pub(super) fn apply(&self, seen: &[f32], out: &mut [f32]) {
+    pub(crate) fn apply(&self, seen: &[f32], out: &mut [f32]) {
         if self.inputs == 0 || self.outputs == 0 {
             return;
         }
@@ -102,7 +102,7 @@ fn store(to: &mut [f32], from: &[f32; TOGETHER]) {
 /// Whether registers hold the sums of a whole group of columns.
 fn wide_registers() -> bool {
     #[cfg(target_arch = "x86_64")]
-    return crate::math::has_avx512();
+    return voodoo_core::math::has_avx512();
     #[cfg(not(target_arch = "x86_64"))]
     return false;
 }

@@ -4,11 +4,11 @@
 //! Every 4 x 4 pixels of the map give 2 x 2 pixels after it. Both are sums of transformed ones; there the convolution is a product
 //! for each of the 16 places, 16 multiplications instead of 36.
 
-use super::product::Panels;
-use crate::math::widest;
+use crate::product::Panels;
+use voodoo_core::math::widest;
 
 /// Edge of the kernel.
-pub(super) const KERNEL: usize = 3;
+pub(crate) const KERNEL: usize = 3;
 /// Edge of what is seen at once.
 const SEEN: usize = 4;
 /// Edge of what that gives.
@@ -20,20 +20,20 @@ const EVERYWHERE: usize = SEEN + 1;
 
 /// A convolution with a kernel of 3 x 3 that keeps the map's even edge.
 #[derive(Debug)]
-pub(super) struct Winograd {
+pub(crate) struct Winograd {
     places: Vec<Panels>,
 }
 
 /// Working memory: all tiles of the map, place by place, before and after the products.
 #[derive(Debug, Default)]
-pub(super) struct Tiles {
+pub(crate) struct Tiles {
     seen: Vec<f32>,
     given: Vec<f32>,
 }
 
 impl Winograd {
     /// Of `weights` (out, ky, kx, in) and biases.
-    pub(super) fn of(weights: &[f32], bias: &[f32]) -> Self {
+    pub(crate) fn of(weights: &[f32], bias: &[f32]) -> Self {
         let none = vec![0.0; bias.len()];
         let inputs = weights.len().checked_div(bias.len() * KERNEL * KERNEL).unwrap_or(0);
         let mut transformed = vec![Vec::new(); PLACES];
@@ -53,16 +53,16 @@ impl Winograd {
         Self { places: transformed.iter().enumerate().map(panels).collect() }
     }
 
-    pub(super) fn inputs(&self) -> usize {
+    pub(crate) fn inputs(&self) -> usize {
         self.places[0].inputs
     }
 
-    pub(super) fn outputs(&self) -> usize {
+    pub(crate) fn outputs(&self) -> usize {
         self.places[0].outputs
     }
 
     /// The map after it, of the same `edge`.
-    pub(super) fn apply(&self, map: &[f32], edge: usize, tiles: &mut Tiles, out: &mut [f32]) {
+    pub(crate) fn apply(&self, map: &[f32], edge: usize, tiles: &mut Tiles, out: &mut [f32]) {
         let (inputs, outputs) = (self.inputs(), self.outputs());
         let count = (edge / GIVEN) * (edge / GIVEN);
         let Tiles { seen, given } = tiles;

@@ -1,9 +1,8 @@
 //! A depth image as the detector looks at it: thinned out, in metres, without what cannot be a person.
 
-use crate::math::{Aabb, Pose, Vec3};
-use crate::observation::background::Background;
-use crate::observation::frame::{DepthImage, Ground};
-use crate::observation::share::NOBODY;
+use voodoo_core::detect::Surroundings;
+use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::observation::frame::{DepthImage, Ground};
 
 /// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 30 wide and 80 high.
 const MOST_PIXELS: usize = 26_000;
@@ -12,41 +11,17 @@ const FLOOR_CLEARANCE: f64 = 0.06;
 /// Depths between which persons are looked for, metres.
 const RANGE: [f32; 2] = [0.4, 12.0];
 
-/// What is known of the place beside the image.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Surroundings<'a> {
-    /// The floor, world frame.
-    pub ground: Option<Ground>,
-    /// Direction upwards where no floor is known, world frame, unit length.
-    pub up: Option<Vec3>,
-    /// Depth of the learnt background at every pixel, metres; empty where none was learnt.
-    pub background: &'a [f32],
-    /// Boxes of the world that hold nobody.
-    pub excluded: &'a [Aabb],
-    /// Who explains each pixel, and who does not matter among them; empty where nobody does.
-    pub owners: &'a [u16],
-    /// Whose pixels may be the person all the same.
-    pub own: Option<u16>,
-}
-
-impl Surroundings<'_> {
-    /// Whether a pixel shows somebody else.
-    fn is_others(&self, index: usize) -> bool {
-        self.owners.get(index).is_some_and(|owner| *owner != NOBODY && Some(*owner) != self.own)
-    }
-}
-
 /// The thinned image. Points are in the camera's optical frame.
 #[derive(Debug, Default)]
-pub(super) struct View {
-    pub(super) width: usize,
-    pub(super) height: usize,
+pub(crate) struct View {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     /// Every so manyth column and row of the image was kept.
-    pub(super) step: usize,
+    pub(crate) step: usize,
     /// Depth, metres; 0: nothing, or nothing that may be a person.
-    pub(super) depth: Vec<f32>,
+    pub(crate) depth: Vec<f32>,
     /// `(x/z, y/z)` of every pixel.
-    pub(super) slopes: Vec<[f32; 2]>,
+    pub(crate) slopes: Vec<[f32; 2]>,
     /// `x/z` of every column where the lens has no distortion.
     across: Vec<f32>,
     /// The image's width, for its pixels' indices.
@@ -56,7 +31,7 @@ pub(super) struct View {
 
 impl View {
     /// Reads an image; what holds nobody is left out but for the floor.
-    pub(super) fn read(&mut self, image: &DepthImage, around: &Surroundings) {
+    pub(crate) fn read(&mut self, image: &DepthImage, around: &Surroundings) {
         let mut step = 1;
         while (image.width.div_ceil(step)) * (image.height.div_ceil(step)) > MOST_PIXELS {
             step += 1;
@@ -74,23 +49,22 @@ impl View {
                 let index = row * image.width + column;
                 let slope = image.rays.map_or([*across, down], |rays| rays[index]);
                 let z = image.pixels.get(index) * image.metres_per_unit as f32;
-                let background = around.background.get(index).is_some_and(|depth| Background::holds(*depth, z));
-                let kept = z > RANGE[0] && z < RANGE[1] && !background && !around.is_others(index);
+                let kept = z > RANGE[0] && z < RANGE[1] && !around.explains(index, z);
                 self.depth.push(if kept { z } else { 0.0 });
                 self.slopes.push(slope);
             }
         }
-        self.exclude(&image.world_from_sensor, around.excluded);
+        self.exclude(&image.world_from_sensor, around);
     }
 
-    fn exclude(&mut self, world_from_camera: &Pose, boxes: &[Aabb]) {
-        if boxes.is_empty() {
+    fn exclude(&mut self, world_from_camera: &Pose, around: &Surroundings) {
+        if around.excluded.is_empty() {
             return;
         }
         for index in 0..self.depth.len() {
             if self.depth[index] > 0.0 {
                 let point = *world_from_camera * self.point(index);
-                if boxes.iter().any(|bounds| bounds.contains(point)) {
+                if around.excludes(point) {
                     self.depth[index] = 0.0;
                 }
             }
@@ -98,13 +72,13 @@ impl View {
     }
 
     /// The point of a pixel, camera frame.
-    pub(super) fn point(&self, index: usize) -> Vec3 {
+    pub(crate) fn point(&self, index: usize) -> Vec3 {
         let (z, [x, y]) = (f64::from(self.depth[index]), self.slopes[index]);
         Vec3::new(z * f64::from(x), z * f64::from(y), z)
     }
 
     /// Leaves out what is on the floor or below it.
-    pub(super) fn remove_floor(&mut self, floor: &Ground) {
+    pub(crate) fn remove_floor(&mut self, floor: &Ground) {
         let normal = floor.normal.to_array().map(|value| value as f32);
         let least = (floor.offset + FLOOR_CLEARANCE) as f32;
         for (z, [x, y]) in self.depth.iter_mut().zip(&self.slopes) {
@@ -115,7 +89,7 @@ impl View {
     }
 
     /// The pixel in whose direction `(x/z, y/z)` lies.
-    pub(super) fn pixel_at(&self, [x, y]: [f32; 2], distorted: bool) -> Option<usize> {
+    pub(crate) fn pixel_at(&self, [x, y]: [f32; 2], distorted: bool) -> Option<usize> {
         let [fx, fy, cx, cy] = self.intrinsics.map(|value| value as f32);
         let (mut column, mut row) = (fx * x + cx, fy * y + cy);
         if distorted {
@@ -143,12 +117,12 @@ impl View {
     }
 
     /// Surface that a pixel covers at a depth of 1 m, square metres.
-    pub(super) fn pixel_area(&self) -> f64 {
+    pub(crate) fn pixel_area(&self) -> f64 {
         (self.step * self.step) as f64 / (self.intrinsics[0] * self.intrinsics[1])
     }
 
     /// The pixels of the image for which one with this index in the image stands.
-    pub(super) fn block(&self, index: usize, into: &mut Vec<usize>) {
+    pub(crate) fn block(&self, index: usize, into: &mut Vec<usize>) {
         let (row, column) = (index / self.columns, index % self.columns);
         for row in row..row + self.step {
             into.extend((column..(column + self.step).min(self.columns)).map(|column| row * self.columns + column));
@@ -156,7 +130,7 @@ impl View {
     }
 
     /// Index in the image of a pixel.
-    pub(super) fn in_image(&self, index: usize) -> usize {
+    pub(crate) fn in_image(&self, index: usize) -> usize {
         (index / self.width) * self.step * self.columns + (index % self.width) * self.step
     }
 }

@@ -1,7 +1,7 @@
 //! What was looked at lately and is nobody: furniture stands still, and somebody who comes in shall not wait for it.
 
-use super::components::Candidate;
-use crate::math::Vec3;
+use crate::components::Candidate;
+use voodoo_core::math::Vec3;
 
 /// What stands within this of a rejected place and shows as much surface, by this factor, is the same thing; metres.
 const SAME_PLACE: f64 = 0.15;
@@ -13,7 +13,7 @@ const NO_NEWS: usize = 5;
 
 /// Places in the camera's frame, the last one last.
 #[derive(Debug, Default)]
-pub(super) struct Rejections {
+pub(crate) struct Rejections {
     looks: usize,
     images: usize,
     places: Vec<Rejected>,
@@ -29,22 +29,22 @@ struct Rejected {
 
 impl Rejections {
     /// Another image comes.
-    pub(super) fn next_image(&mut self) {
+    pub(crate) fn next_image(&mut self) {
         self.images += 1;
     }
 
     /// Whether a candidate was found to be nobody not long ago.
-    pub(super) fn is_old(&self, candidate: &Candidate) -> bool {
+    pub(crate) fn is_old(&self, candidate: &Candidate) -> bool {
         self.places.iter().any(|place| self.images - place.image < NO_NEWS && place.is(candidate))
     }
 
     /// Number of the look at which a candidate was last found to be nobody; 0 for a new one.
-    pub(super) fn last(&self, candidate: &Candidate) -> usize {
+    pub(crate) fn last(&self, candidate: &Candidate) -> usize {
         self.places.iter().filter(|place| place.is(candidate)).map(|place| place.look).max().unwrap_or(0)
     }
 
     /// Notes a look.
-    pub(super) fn note(&mut self, candidate: &Candidate, person: bool) {
+    pub(crate) fn note(&mut self, candidate: &Candidate, person: bool) {
         self.looks += 1;
         self.places.retain(|place| !place.is(candidate));
         if !person {

@@ -1,11 +1,12 @@
 //! From a depth image to pictures of what may be a person.
 
-use super::components::{Candidate, Components, NONE};
-use super::crop::Crop;
-use super::floor::FloorFinder;
-use super::view::{Surroundings, View};
-use crate::math::Vec3;
-use crate::observation::frame::{DepthImage, Ground};
+use crate::components::{Candidate, Components, NONE};
+use crate::crop::Crop;
+use crate::floor::FloorFinder;
+use crate::view::View;
+use voodoo_core::detect::Surroundings;
+use voodoo_core::math::Vec3;
+use voodoo_core::observation::frame::{DepthImage, Ground};
 
 /// Cuts depth images into candidates; keeps its memory between images.
 #[derive(Debug, Default)]

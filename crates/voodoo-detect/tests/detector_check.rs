@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use std::collections::BTreeMap;
-use voodoo_core::detect::crop::SIZE;
-use voodoo_core::detect::network::{Memory, Network};
+use voodoo_detect::crop::SIZE;
+use voodoo_detect::network::{Memory, Network};
 
-const WEIGHTS: &[u8] = include_bytes!("../src/detect/person.weights");
+const WEIGHTS: &[u8] = include_bytes!("../person.weights");
 const VECTORS: &[u8] = include_bytes!("data/detector_check.bin");
 
 /// The named values of the file of vectors.

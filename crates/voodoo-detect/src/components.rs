@@ -1,8 +1,8 @@
 //! What hangs together in a depth image, and which of it may be a person.
 
-use super::view::View;
-use crate::math::{Vec3, widest};
+use crate::view::View;
 use nalgebra::{Matrix3, Vector3};
+use voodoo_core::math::{Vec3, widest};
 
 /// Neighbouring pixels hang together when their depths differ by less than this, metres, and so much of the depth.
 const STEP: [f32; 2] = [0.04, 0.012];
@@ -25,7 +25,7 @@ const PART_SAMPLES: usize = 48;
 /// Parts that are looked at, the largest first.
 const MOST_PARTS: usize = 40;
 /// No label.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// What hangs together; camera frame, metres.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +82,7 @@ impl Part {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// Labels of its parts.
-    pub(super) labels: Vec<u32>,
+    pub(crate) labels: Vec<u32>,
     /// Surface seen, square metres.
     pub area: f64,
     /// Corners of its box, camera frame.
@@ -93,7 +93,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// Distance of a point in the camera's frame to its box, and a little of that to the box's middle.
-    pub(super) fn distance(&self, point: Vec3) -> f64 {
+    pub(crate) fn distance(&self, point: Vec3) -> f64 {
         /// A place within several boxes belongs to the one whose middle is nearest.
         const TO_MIDDLE: f64 = 0.1;
         let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
@@ -101,21 +101,21 @@ impl Candidate {
     }
 
     /// The middle of its box, camera frame.
-    pub(super) fn middle(&self) -> Vec3 {
+    pub(crate) fn middle(&self) -> Vec3 {
         0.5 * (self.low + self.high)
     }
 
     /// Whether both have a part in common.
-    pub(super) fn shares(&self, other: &Self) -> bool {
+    pub(crate) fn shares(&self, other: &Self) -> bool {
         self.labels.iter().any(|label| other.labels.binary_search(label).is_ok())
     }
 }
 
 /// Working memory, and what was found in the last image.
 #[derive(Debug, Default)]
-pub(super) struct Components {
+pub(crate) struct Components {
     /// The label of every pixel: the index of another of its part, or of itself.
-    pub(super) labels: Vec<u32>,
+    pub(crate) labels: Vec<u32>,
     parts: Vec<Part>,
     /// Every label once, ascending.
     distinct: Vec<u32>,
@@ -129,7 +129,7 @@ pub(super) struct Components {
 
 impl Components {
     /// What may be a person, the likeliest sizes first.
-    pub(super) fn find(&mut self, view: &View, candidates: &mut Vec<Candidate>) {
+    pub(crate) fn find(&mut self, view: &View, candidates: &mut Vec<Candidate>) {
         self.labels.clear();
         self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
         self.again.clear();
@@ -377,23 +377,21 @@ fn unlikely(candidate: &Candidate) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::view::Surroundings;
-    use crate::testing::{before_wall, put_board, standing, with_frame};
+    use crate::testing::{before_wall, image, put_board, standing};
+    use voodoo_core::detect::Surroundings;
 
     /// What may be a person in an image of the unit tests' camera.
     fn candidates(pixels: &[u16]) -> Vec<Candidate> {
-        with_frame(pixels, 0.0, |frame| {
-            let (mut view, mut found) = (View::default(), Vec::new());
-            view.read(&frame.images[0], &Surroundings::default());
-            Components::default().find(&view, &mut found);
-            found
-        })
+        let (mut view, mut found) = (View::default(), Vec::new());
+        view.read(&image(pixels), &Surroundings::default());
+        Components::default().find(&view, &mut found);
+        found
     }
 
     #[test]
     fn a_person_before_a_wall_is_a_candidate_and_the_wall_is_none() {
-        let (model, poses) = standing();
-        let found = candidates(&before_wall(&model.body, &poses));
+        let (body, poses) = standing();
+        let found = candidates(&before_wall(&body, &poses));
         assert_eq!(found.len(), 1, "{found:?}");
         let (size, middle) = (found[0].high - found[0].low, found[0].middle());
         assert!((1.5..1.85).contains(&size.y) && size.z < 0.5, "{size}");
@@ -402,8 +400,8 @@ mod tests {
 
     #[test]
     fn a_person_cut_in_two_by_something_before_it_is_one_candidate() {
-        let (model, poses) = standing();
-        let mut pixels = before_wall(&model.body, &poses);
+        let (body, poses) = standing();
+        let mut pixels = before_wall(&body, &poses);
         // A rail at the height of the hips, a metre before the body.
         put_board(&mut pixels, Vec3::new(0.0, 0.03, 1.6), [1.5, 0.03]);
         let found = candidates(&pixels);
@@ -413,7 +411,7 @@ mod tests {
 
     #[test]
     fn nothing_and_what_is_flat_small_or_too_large_are_no_candidates() {
-        let size = before_wall(&standing().0.body, &standing().1).len();
+        let size = before_wall(&standing().0, &standing().1).len();
         assert_eq!(candidates(&vec![0; size]), []);
         for (depth, half) in [(2.6, [0.3, 0.8]), (2.0, [0.05, 0.1]), (3.0, [1.4, 1.2])] {
             let mut pixels = vec![0; size];

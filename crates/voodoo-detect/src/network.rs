@@ -3,10 +3,10 @@
 //! The structure is that of A2J (Xiong et al., "A2J: Anchor-to-Joint Regression Network", ICCV 2019) on a small residual network:
 //! every cell of a 12 x 12 grid says of every joint how much it counts and where the joint is from there.
 
-use super::convolution::{Convolution, Map, Working, rectify};
-use super::crop::{SIZE, WIDTH};
-use super::product::Panels;
-use super::weights::{Weights, WeightsError};
+use crate::convolution::{Convolution, Map, Working, rectify};
+use crate::crop::{SIZE, WIDTH};
+use crate::product::Panels;
+use crate::weights::{Weights, WeightsError};
 
 /// Numbers a cell gives for a joint: how much it counts, offset to the right, offset down, depth.
 const A_JOINT: usize = 4;
@@ -88,7 +88,6 @@ pub struct Answer {
 }
 
 /// The trained layers.
-#[derive(Debug)]
 pub struct Network {
     stages: [Stage; 4],
     top: [Convolution; 2],
@@ -99,6 +98,12 @@ pub struct Network {
     facing: Linear,
     person: Linear,
     sizes: Option<[Linear; 3]>,
+}
+
+impl std::fmt::Debug for Network {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Network").field("joints", &self.joints()).finish_non_exhaustive()
+    }
 }
 
 /// Working memory of a network.
@@ -310,10 +315,10 @@ mod tests {
 
     #[test]
     fn layers_that_do_not_fit_are_refused() {
-        let good = include_bytes!("person.weights");
+        let good = include_bytes!("../person.weights");
         let network = Network::read(good);
         assert!(
-            network.as_ref().is_ok_and(|network| network.joints() == crate::detect::names::JOINTS.len()),
+            network.as_ref().is_ok_and(|network| network.joints() == crate::names::JOINTS.len()),
             "{:?}",
             network.err()
         );

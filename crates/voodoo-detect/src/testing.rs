@@ -1,0 +1,65 @@
+//! What unit tests share: a synthetic depth camera that stands in the world's origin and looks along z.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use voodoo_core::Body;
+use voodoo_core::body::HumanModel;
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{DepthImage, DepthPixels};
+use voodoo_core::visibility::render::{Rendering, Viewpoint};
+
+/// Size and lens of the camera.
+const VIEW: Viewpoint<'static> = Viewpoint {
+    width: 160,
+    height: 124,
+    intrinsics: [145.0, 145.0, 79.5, 61.5],
+    rays: None,
+    world_from_sensor: Pose::IDENTITY,
+};
+
+/// Depth of the wall behind the body, millimetres.
+const WALL: u16 = 4500;
+
+/// A human who stands 2.6 m before the camera and faces it.
+pub(crate) fn standing() -> (Body, Vec<Pose>) {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    // The body's x looks forward and z up; the camera's y points down.
+    let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+    let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
+    let poses = body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces));
+    (body, poses)
+}
+
+/// Depth in millimetres, as the camera sees a posed body before a wall.
+pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
+    let mut rendering = Rendering::default();
+    rendering.render(body, poses, &VIEW, None).unwrap();
+    rendering.depth().iter().map(|depth| if *depth > 0.0 { (depth * 1000.0) as u16 } else { WALL }).collect()
+}
+
+/// Puts a board that faces the camera before what an image shows; half its width and height, metres.
+pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64; 2]) {
+    let [fx, fy, cx, cy] = VIEW.intrinsics;
+    for (index, pixel) in pixels.iter_mut().enumerate() {
+        let (column, row) = ((index % VIEW.width) as f64, (index / VIEW.width) as f64);
+        let (x, y) = (centre.z * (column - cx) / fx, centre.z * (row - cy) / fy);
+        let depth = (1000.0 * centre.z) as u16;
+        if (x - centre.x).abs() < width && (y - centre.y).abs() < height && (*pixel == 0 || depth < *pixel) {
+            *pixel = depth;
+        }
+    }
+}
+
+/// The camera's image of these pixels.
+pub(crate) fn image(pixels: &[u16]) -> DepthImage<'_> {
+    DepthImage {
+        pixels: DepthPixels::U16(pixels),
+        width: VIEW.width,
+        height: VIEW.height,
+        metres_per_unit: 0.001,
+        intrinsics: VIEW.intrinsics,
+        rays: None,
+        world_from_sensor: VIEW.world_from_sensor,
+        weight: 1.0,
+        source: 0,
+    }
+}
