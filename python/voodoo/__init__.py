@@ -7,7 +7,15 @@ if TYPE_CHECKING:
     from voodoo import ik
     from voodoo._core import ClosestPoints, Detection, Detector, Estimate, Frame, TaperedEllipticCylinder, __version__
     from voodoo.config import Config
-    from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
+    from voodoo.errors import (
+        BodyError,
+        CameraError,
+        ConfigError,
+        DetectorWarning,
+        MeasurementError,
+        RecordingError,
+        VoodooError,
+    )
     from voodoo.model.body import Body, Joint, Limb, Place
     from voodoo.model.camera import Camera
     from voodoo.people import People, PeopleEstimate, Person
@@ -25,6 +33,7 @@ __all__ = [
     "ConfigError",
     "Detection",
     "Detector",
+    "DetectorWarning",
     "Estimate",
     "Frame",
     "Joint",
@@ -61,6 +70,7 @@ _HOMES = {
         "BodyError",
         "CameraError",
         "ConfigError",
+        "DetectorWarning",
         "MeasurementError",
         "RecordingError",
         "VoodooError",
@@ -77,6 +87,7 @@ _ROOMS = (
     "_core",
     "cli",
     "config",
+    "detectors",
     "errors",
     "evaluation",
     "export",

@@ -632,6 +632,7 @@ def person_candidates(
     depth: npt.NDArray[np.float32],
     *,
     intrinsics: Sequence[float],
+    rays: npt.NDArray[np.float32] | None = None,
     up: Sequence[float] | None = None,
     floor: tuple[Sequence[float], float] | None = None,
     most: int = 8,
@@ -641,6 +642,7 @@ def person_candidates(
     Args:
         depth: float32, 0 or NaN means no return.
         intrinsics: (fx, fy, cx, cy) [px].
+        rays: (H, W, 2) undistorted (x/z, y/z) of every pixel, of a lens with distortion.
         up: unit vector upwards in the camera's optical frame; None means upwards in the image.
         floor: its unit normal and offset in that frame, normal . p = offset; None means that it is looked for.
         most: so many are returned, those of a standing person's size first.
@@ -708,6 +710,9 @@ class Detection:
     @property
     def mask(self) -> npt.NDArray[np.bool_]:
         """The pixels (H, W) of that image that show it."""
+    @property
+    def floor(self) -> tuple[tuple[float, float, float], float] | None:
+        """The floor as the image shows it, or as the frame gave it: unit normal (3,) upwards and height along it [m]; or None."""
 
 @final
 class Estimate:
@@ -791,7 +796,11 @@ class Estimate:
 class Tracker:
     """The tracker of the core; use voodoo.Tracker."""
 
-    def __new__(cls, body: Body, values: Mapping[str, Any]) -> Tracker: ...
+    def __new__(cls, body: Body, values: Mapping[str, Any], detector: object) -> Tracker: ...
+    @property
+    def can_search(self) -> bool: ...
+    @property
+    def detector_failures(self) -> int: ...
     @property
     def estimate(self) -> Estimate: ...
     def _body(self) -> Body: ...
@@ -829,12 +838,15 @@ class People:
         cls,
         body: Body,
         values: Mapping[str, Any],
+        detector: object,
         *,
         limit: int | None,
         nearest: bool,
         forget_after: float,
         region: tuple[Sequence[float], Sequence[float]] | None,
     ) -> People: ...
+    @property
+    def detector_failures(self) -> int: ...
     def step(self, frame: Frame, own: Sequence[tuple[int, Frame]]) -> list[tuple[int, Estimate]]: ...
     def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
     def wants_colors(self) -> bool: ...

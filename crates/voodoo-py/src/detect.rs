@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::body::HumanModel;
@@ -236,11 +236,12 @@ impl PyCandidate {
 
 #[doc = stub!("person_candidates")]
 #[pyfunction]
-#[pyo3(signature = (depth, *, intrinsics, up=None, floor=None, most=8))]
+#[pyo3(signature = (depth, *, intrinsics, rays=None, up=None, floor=None, most=8))]
 pub fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
     intrinsics: [f64; 4],
+    rays: Option<&Bound<'py, PyAny>>,
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
@@ -249,13 +250,20 @@ pub fn person_candidates<'py>(
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
     let [height, width] = [view.as_array().nrows(), view.as_array().ncols()];
+    let rays = rays.map(|rays| {
+        let wrong = || wrong_argument(py, "rays", &format!("an array of shape ({height}, {width}, 2) and dtype float32"), rays);
+        let array = contiguous(rays).map_err(|_| wrong())?.cast_into::<PyArray3<f32>>().map_err(|_| wrong())?;
+        if array.shape() == [height, width, 2] { Ok(array.readonly()) } else { Err(wrong()) }
+    });
+    let rays = rays.transpose()?;
+    let rays = rays.as_ref().map(|rays| rays.as_slice()).transpose()?;
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
         width,
         height,
         metres_per_unit: 1.0,
         intrinsics,
-        rays: None,
+        rays: rays.map(|rays| rays.as_chunks().0),
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,
