@@ -29,21 +29,15 @@ __all__ = [
     "View",
     "__version__",
     "_estimate",
+    "body_before",
     "body_view",
     "carried",
-    "color_bins",
     "config_fields",
     "expected_sites",
-    "joined_mask",
     "linear_sum_assignment",
-    "mask_regions",
     "nearest_surface",
     "person_candidates",
-    "points_within",
     "render_depth",
-    "shown",
-    "skin_candidates",
-    "skin_mask",
 ]
 
 __version__: str
@@ -79,121 +73,16 @@ def render_depth(
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int16]]:
     """Depth (height, width) [m], 0 where nothing is seen, and index of the limb, -1 for none; see voodoo.render_depth."""
 
-def points_within(
-    depth: npt.NDArray[np.float32],
-    rays: npt.NDArray[np.float32],
-    *,
-    step: int,
-    rows: tuple[int, int],
-    columns: tuple[int, int],
-    low: npt.NDArray[np.float64],
-    high: npt.NDArray[np.float64],
-    world_from_sensor: npt.NDArray[np.float64],
-    other_from_sensor: npt.NDArray[np.float64],
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.intp]]:
-    """Points (N, 3) of a depth image within a box, in another camera's frame [m], and the index of each one's pixel.
-
-    Args:
-        depth: (h, w) along the optical axis [m]; what is not finite and above zero is no return.
-        rays: (H, W, 2) of the camera; `depth` has every `step`-th row and column of it.
-        step: see rays.
-        rows, columns: of `depth`, from and up to.
-        low, high: corners (3,) of the box in the world [m].
-        world_from_sensor, other_from_sensor: (4, 4).
-
-    Raises:
-        MeasurementError: sizes that do not fit together.
-    """
-
-def color_bins(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint16]:
-    """The bin of each pixel's colour in a histogram of 64 x 64 x 8 of Cr, Cb and Y, row by row; 32768 more where it is too
-    dark to have a colour.
-
-    Args:
-        image: (H, W, 3) BGR.
-
-    Returns:
-        (H, W).
-
-    Raises:
-        MeasurementError: another shape.
-    """
-
-def shown(
-    pixels: npt.NDArray[np.float64],
-    points: npt.NDArray[np.float64],
-    marks: npt.NDArray[np.bool_] | None,
-    *,
-    beyond: npt.NDArray[np.bool_],
-    reach: int,
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_] | None, npt.NDArray[np.intp]]:
-    """Where a depth camera saw something in a picture (H, W).
-
-    Args:
-        pixels: (N, 2) where its points are, NaN = nowhere.
-        points: (N, 3) in the camera's frame [m].
-        marks: (N,) of some of them.
-        beyond: (H, W) where it does not look.
-        reach: what is within so many rows and columns of a point belongs to it.
-
-    Returns:
-        (H, W) where something was seen, or is beyond, but no line of pixels on the far side of edges between surfaces; (H, W) the
-        same of the marked points alone; which points lie in the picture.
-
-    Raises:
-        MeasurementError: other shapes.
-    """
-
-def skin_mask(
-    bins: npt.NDArray[np.uint16],
-    table: npt.NDArray[np.bool_],
-    *,
-    longest: float,
-    body: npt.NDArray[np.bool_] | None = None,
-    always: npt.NDArray[np.float32] | None = None,
-    before: npt.NDArray[np.bool_] | None = None,
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """(H, W): where a picture has skin's colour, single pixels removed; (H, W): where that may be the body's.
-
-    Args:
-        bins: (H, W), see `color_bins`.
-        table: (32768,) which of them are skin's.
-        longest: gaps of two pixels are closed between regions no longer than this [px].
-        body: (H, W) where the body may be.
-        always: (H, W) share of the time in which a pixel shows skin where none is; half or more is the scene.
-        before: (H, W) where something is before the scene.
-
-    Raises:
-        MeasurementError: sizes that do not fit together.
-    """
-
-def joined_mask(mask: npt.NDArray[np.bool_], longest: float) -> npt.NDArray[np.bool_]:
-    """A mask (H, W) with gaps of two pixels closed between regions no longer than `longest` [px]."""
-
-def mask_regions(
-    mask: npt.NDArray[np.bool_],
-) -> tuple[npt.NDArray[np.int32], list[tuple[tuple[int, int], tuple[int, int], int, tuple[float, float]]]]:
-    """What hangs together in a mask (H, W), at corners too: (H, W) the number of its region in each pixel, from 1; and rows,
-    columns (from and up to), area [px] and middle (u, v) of each region."""
-
 def nearest_surface(
-    pixels: npt.NDArray[np.float64],
-    depths: npt.NDArray[np.float64],
-    still: npt.NDArray[np.bool_] | None,
-    *,
-    pixel: tuple[float, float],
-    radius: float,
-    among: npt.NDArray[np.bool_] | None = None,
-) -> tuple[float, bool] | None:
-    """Depth [m] of the nearest surface around a place in a picture, and whether most of it is still; None with less than three
-    points there. Where three of the points `among` are there, only those count.
+    pixels: npt.NDArray[np.float64], depths: npt.NDArray[np.float64], *, pixel: tuple[float, float], radius: float
+) -> float | None:
+    """Depth of the nearest surface around a place in a picture [m], None with fewer than three points there.
 
     Args:
-        pixels, depths: (N, 2) and (N,) [m], what was measured.
-        still: (N,) which may be the still scene; None: not known.
-        pixel: the place.
-        radius: [px].
-        among: (N,).
+        pixels: (N, 2) where points are seen.
+        depths: (N,) [m].
+        pixel: the place (u, v).
+        radius: of what is looked at [px].
 
     Raises:
         MeasurementError: other shapes.
@@ -201,12 +90,6 @@ def nearest_surface(
 
 def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
     """Pairs (row, column) of finite costs (N, M) with the least sum, every row or every column once, by rows."""
-
-def skin_candidates(
-    mask: npt.NDArray[np.bool_], palm_px: float
-) -> tuple[list[tuple[tuple[float, float], int, int, bool]], npt.NDArray[np.int32]]:
-    """Where in a skin mask (H, W) a head or a hand may be: pixel, region, area [px], whether it may be a hand; (H, W) the number
-    of its region in each pixel. See voodoo.sensors.skin.regions."""
 
 @final
 class BodyView:
@@ -241,12 +124,6 @@ class BodyView:
     def still(self) -> npt.NDArray[np.bool_] | None: ...
     @property
     def before(self) -> npt.NDArray[np.bool_] | None: ...
-    def look_at(
-        self, labels: npt.NDArray[np.int32], places: Sequence[tuple[tuple[float, float], int]], radius: float
-    ) -> list[tuple[float, bool] | None]:
-        """Depth [m] of the nearest surface within `radius` pixels of each place (u, v), and whether most of it is still; None
-        with less than three points there. Where three of them are in its region, by its number among `labels` (H, W) of the
-        picture, only those count."""
 
 @final
 class StillDepth:
@@ -260,15 +137,6 @@ class StillDepth:
     def __copy__(self) -> StillDepth: ...
     @property
     def farthest(self) -> npt.NDArray[np.float32]: ...
-    def see(
-        self, z: npt.NDArray[np.float32], world_from_sensor: npt.NDArray[np.float64]
-    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]] | None:
-        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew.
-
-        Returns:
-            (H, W): True where the image shows what may be the scene; (H, W): True where it shows something before what
-            was seen there once. None as long as too little was seen.
-        """
 
 def body_view(
     depth: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
@@ -499,6 +367,11 @@ def carried(
     Returns:
         (N, 3), or None where nothing moves: too little time has passed, or the body's motion is not known.
     """
+
+def body_before(
+    tracker: Tracker | tuple[People, int], sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Length of body (N,) [m] between places (N, 3) and a camera (3,); see voodoo.Tracker.body_before."""
 
 def expected_sites(tracker: Tracker | tuple[People, int], stamp: float) -> dict[str, npt.NDArray[np.float64]]:
     """Site name -> (3,) where it is expected at a time [m]; see voodoo.Tracker.predict."""
@@ -937,9 +810,6 @@ class Tracker:
     def _set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None: ...
     def distance(self, points: _Points) -> npt.NDArray[np.float32]: ...
     def limb_distances(self, points: _Points) -> npt.NDArray[np.float32]: ...
-    def body_before(
-        self, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64]: ...
     def scale(self, factor: float) -> None: ...
     def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None: ...
     def _add_limb(
@@ -970,10 +840,6 @@ class People:
     def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
     def wants_colors(self) -> bool: ...
     def only(self, ids: Sequence[int] | None) -> None: ...
-    def limb_distances(self, id: int, points: _Points) -> npt.NDArray[np.float32] | None: ...
-    def body_before(
-        self, id: int, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64] | None: ...
     def estimate(self, id: int) -> Estimate | None: ...
     def body(self, id: int) -> Body | None: ...
 

@@ -8,7 +8,6 @@ use numpy::{
 use pyo3::prelude::*;
 use voodoo_core::observation::frame::DepthPixels;
 use voodoo_sensors::body_view::{Beside, BodyView, Matrix, StillDepth};
-use voodoo_sensors::registration::Labels;
 
 use crate::arrays::contiguous;
 use crate::errors::{IntoPy, exception, wrong_argument};
@@ -83,19 +82,6 @@ impl PyBodyView {
         let before = self.0.before.as_ref();
         before.map(|marks| PyArray1::from_slice(py, marks).reshape(self.0.size)).transpose()
     }
-
-    /// Depth of the nearest surface around each of some places and whether most of it is still; none with too few points.
-    fn look_at(
-        &self,
-        labels: PyReadonlyArray2<'_, i32>,
-        places: Vec<([f64; 2], i32)>,
-        radius: f64,
-    ) -> PyResult<Vec<Option<(f64, bool)>>> {
-        let size = [labels.dims()[0], labels.dims()[1]];
-        let image = Labels { first: [0, 0], size, values: labels.as_slice()?.to_vec() };
-        let found = self.0.measured().nearest_surfaces(&image, &places, radius);
-        found.map_err(|error| error.into_py(labels.py()))
-    }
 }
 
 #[pyclass(name = "StillDepth", module = "voodoo._core")]
@@ -116,20 +102,6 @@ impl PyStillDepth {
     #[getter]
     fn farthest<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
         PyArray1::from_slice(py, self.0.farthest())
-    }
-
-    /// Where an image (metres) shows what may be the scene, and where something before what was seen there once.
-    fn see<'py>(
-        &mut self,
-        z: PyReadonlyArray2<'py, f32>,
-        world_from_sensor: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Option<(Marks<'py>, Marks<'py>)>> {
-        let (py, size) = (z.py(), [z.dims()[0], z.dims()[1]]);
-        let image = z.as_array().iter().copied().collect();
-        let pose = rows_of("world_from_sensor", &world_from_sensor)?;
-        let found = self.0.see(image, size, &pose, size.map(|size| 0..size)).map_err(|error| error.into_py(py))?;
-        let mask = |marks: Vec<bool>| PyArray1::from_vec(py, marks).reshape(size);
-        found.map(|(still, before)| Ok((mask(still)?, mask(before)?))).transpose()
     }
 }
 

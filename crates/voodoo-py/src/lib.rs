@@ -9,7 +9,6 @@ mod arrays;
 mod body;
 mod body_view;
 mod borrowed;
-mod chroma;
 mod config;
 mod detect;
 mod errors;
@@ -35,8 +34,6 @@ mod _core {
     #[pymodule_export]
     use super::body_view::{PyBodyView, PyStillDepth, body_view};
     #[pymodule_export]
-    use super::chroma::{color_bins, joined_mask, mask_regions, skin_mask};
-    #[pymodule_export]
     use super::config::config_fields;
     #[pymodule_export]
     use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
@@ -53,7 +50,7 @@ mod _core {
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
-    use super::registration::{nearest_surface, points_within, shown};
+    use super::registration::nearest_surface;
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]
@@ -61,9 +58,9 @@ mod _core {
     #[pymodule_export]
     use super::sites::{PySiteGate, PySiteRay, expected_sites};
     #[pymodule_export]
-    use super::skin::{PySkinCue, PySkinTeacher, skin_candidates};
+    use super::skin::{PySkinCue, PySkinTeacher};
     #[pymodule_export]
-    use super::tracker::PyTracker;
+    use super::tracker::{PyTracker, body_before};
 
     #[pymodule_init]
     fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {

@@ -194,7 +194,7 @@ impl MeasuredPixels<'_> {
             let found = format!("{} for {height} rows of {width}", labels.values.len());
             return Err(TrackError::measurement("labels", "one for every pixel", found));
         }
-        self.check(None)?;
+        self.check()?;
         // Neighbours in the list are near each other: most stretches of it are nowhere near a place.
         let stretches: Vec<[[f64; 2]; 2]> = self.places.chunks(POINTS_TOGETHER).map(bounds_of).collect();
         let look = |(place, region): &([f64; 2], i32)| {
@@ -220,33 +220,22 @@ impl MeasuredPixels<'_> {
     }
 
     /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
-    /// three points there. Where three of the points `among` are there, only those count.
+    /// three points there.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when there are not as many depths, or marks, as places.
-    pub fn nearest_surface(
-        &self,
-        place: [f64; 2],
-        radius: f64,
-        among: Option<&[bool]>,
-    ) -> Result<Option<(f64, bool)>, TrackError> {
-        self.check(among)?;
-        let (mut near, mut chosen) = (Vec::new(), Vec::new());
-        for (index, _) in self.places.iter().enumerate().filter(|(_, other)| is_near(other, &place, radius)) {
-            near.push(index);
-            if among.is_some_and(|among| among[index]) {
-                chosen.push(index);
-            }
-        }
-        Ok(self.surface_of(near, chosen))
+    pub fn nearest_surface(&self, place: [f64; 2], radius: f64) -> Result<Option<(f64, bool)>, TrackError> {
+        self.check()?;
+        let near = self.places.iter().enumerate().filter(|(_, other)| is_near(other, &place, radius));
+        Ok(self.surface_of(near.map(|(index, _)| index).collect(), Vec::new()))
     }
 
-    fn check(&self, among: Option<&[bool]>) -> Result<(), TrackError> {
-        let (count, marks) = (self.places.len(), [self.still, among]);
-        if self.depths.len() == count && marks.iter().flatten().all(|marks| marks.len() == count) {
+    fn check(&self) -> Result<(), TrackError> {
+        let (count, still) = (self.places.len(), self.still.map(<[_]>::len));
+        if self.depths.len() == count && still.is_none_or(|still| still == count) {
             return Ok(());
         }
-        let found = format!("{} depths, {:?} marks", self.depths.len(), marks.map(|marks| marks.map(<[_]>::len)));
+        let found = format!("{} depths, {still:?} marks", self.depths.len());
         Err(TrackError::measurement("depths", "as many depths, and marks, as pixels", found))
     }
 
@@ -281,4 +270,115 @@ fn bounds_of(places: &[[f64; 2]]) -> [[f64; 2]; 2] {
         }
     }
     [low, high]
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    /// Numbers from 0 to 1 that look like chance.
+    fn chance(seed: u32) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24)
+        }
+    }
+
+    #[test]
+    fn what_is_shown_lies_within_reach_of_a_point_and_not_behind_an_edge() {
+        for seed in 0..40 {
+            let mut chance = chance(seed);
+            let (size, reach) =
+                ([1 + (chance() * 40.0) as usize, 1 + (chance() * 60.0) as usize], (chance() * 5.0) as usize);
+            let [height, width] = size;
+            let count = (chance() * (height * width) as f64 / 3.0) as usize;
+            let mut places: Vec<[f64; 2]> = (0..count)
+                .map(|_| [chance() * (width as f64 + 6.0) - 3.0, chance() * (height as f64 + 6.0) - 3.0])
+                .collect();
+            places.iter_mut().step_by(17).for_each(|place| *place = [f64::NAN; 2]);
+            let points: Vec<[f64; 3]> =
+                (0..count).map(|_| [0.0, 0.0, [1.0, 1.05, 1.5, 2.3][(chance() * 4.0) as usize]]).collect();
+            let marks: Vec<bool> = (0..count).map(|_| chance() < 0.2).collect();
+            let beyond: Vec<bool> = (0..height * width).map(|_| chance() < 0.05).collect();
+            let projected = ProjectedPoints::new(&places, &points, Some(&marks), size).unwrap();
+            let (mask, before) = projected.shown(&beyond, reach, size).unwrap();
+            // The same, pixel by pixel.
+            let cell = |[u, v]: &[f64; 2]| {
+                let (u, v) = (u.round_ties_even(), v.round_ties_even());
+                (u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64).then_some([v as usize, u as usize])
+            };
+            let inside: Vec<isize> =
+                (0..count).filter(|index| cell(&places[*index]).is_some()).map(|i| i as isize).collect();
+            assert_eq!(projected.inside, inside);
+            let (rows, columns) = (projected.rows.clone(), projected.columns.clone());
+            let edges = far_edges(&projected.nearest, columns.len(), SURFACES_APART, reach);
+            let near = |row: usize, column: usize, index: usize| {
+                cell(&places[index]).is_some_and(|[v, u]| v.abs_diff(row) <= reach && u.abs_diff(column) <= reach)
+            };
+            let before = before.unwrap();
+            for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
+                let index = row * width + column;
+                let edge = rows.contains(&row)
+                    && columns.contains(&column)
+                    && edges[(row - rows.start) * columns.len() + column - columns.start];
+                let seen = (0..count).any(|point| near(row, column, point));
+                let marked = (0..count).any(|point| marks[point] && near(row, column, point));
+                assert_eq!(mask[index], if seen { !edge } else { beyond[index] }, "{seed}: {row} {column}");
+                assert_eq!(before[index], marked && !(edge && seen), "{seed}: {row} {column}");
+            }
+            assert!(
+                ProjectedPoints::new(&places, &points, None, size)
+                    .unwrap()
+                    .shown(&beyond, reach, size)
+                    .unwrap()
+                    .1
+                    .is_none()
+            );
+        }
+        let (places, points) = ([[0.0; 2]; 4], [[0.0; 3]; 4]);
+        assert!(ProjectedPoints::new(&places, &points[..3], None, [4, 8]).is_err());
+        assert!(ProjectedPoints::new(&places, &points, Some(&[false; 3]), [4, 8]).is_err());
+        let projected = ProjectedPoints::new(&places, &points, None, [4, 8]).unwrap();
+        assert!(projected.shown(&[false; 31], 1, [4, 8]).is_err());
+    }
+
+    #[test]
+    fn the_nearest_surface_is_that_of_most_points_near_the_fifth_nearest() {
+        let mut chance = chance(5);
+        let places: Vec<[f64; 2]> = (0..600).map(|_| [40.0 * chance(), 40.0 * chance()]).collect();
+        let depths: Vec<f64> =
+            places.iter().map(|[u, _]| if *u < 20.0 { 2.0 } else { 3.0 } + 0.02 * chance()).collect();
+        let still: Vec<bool> = places.iter().map(|[u, _]| *u < 20.0).collect();
+        let measured = MeasuredPixels { places: &places, depths: &depths, still: Some(&still) };
+        for (place, stays) in [([20.0; 2], true), ([30.0, 20.0], false)] {
+            let near = |index: &usize| (places[*index][0] - place[0]).hypot(places[*index][1] - place[1]) < 8.0;
+            let mut there: Vec<f64> = (0..600).filter(near).map(|index| depths[index]).collect();
+            there.sort_by(f64::total_cmp);
+            let fifth = there[(there.len() - 1) / 5];
+            there.retain(|depth| (depth - fifth).abs() < ONE_SURFACE);
+            let found = measured.nearest_surface(place, 8.0).unwrap();
+            assert_eq!(found, Some((there[there.len() / 2], stays)));
+        }
+        assert_eq!(measured.nearest_surface([90.0, 20.0], 8.0).unwrap(), None);
+        assert!(MeasuredPixels { depths: &depths[1..], ..measured }.nearest_surface([0.0; 2], 1.0).is_err());
+        let few = MeasuredPixels { places: &places[..2], depths: &depths[..2], still: None };
+        assert_eq!(few.nearest_surface(places[0], 60.0).unwrap(), None, "two are too few to tell");
+    }
+
+    #[test]
+    fn each_place_is_looked_at_among_the_points_of_its_region() {
+        let mut chance = chance(6);
+        let mut places: Vec<[f64; 2]> = (0..600).map(|_| [40.0 * chance(), 40.0 * chance()]).collect();
+        places.extend([[f64::NAN, 3.0], [-5.0, 3.0], [3.0, 99.0]]);
+        let depths: Vec<f64> = places.iter().map(|[u, _]| if *u < 20.0 { 2.0 } else { 3.0 }).collect();
+        let values = (0..41 * 41).map(|index| if index % 41 >= 20 { 7 } else { 0 }).collect();
+        let labels = Labels { first: [0, 0], size: [41, 41], values };
+        let measured = MeasuredPixels { places: &places, depths: &depths, still: None };
+        let looked_at = [([20.0; 2], 7), ([20.0; 2], 0), ([20.0; 2], 5), ([90.0; 2], 7)];
+        let found = measured.nearest_surfaces(&labels, &looked_at, 8.0).unwrap();
+        assert_eq!(found, [Some((3.0, false)), Some((2.0, false)), Some((2.0, false)), None]);
+        assert!(measured.nearest_surfaces(&Labels { size: [41, 40], ..labels }, &looked_at, 8.0).is_err());
+    }
 }

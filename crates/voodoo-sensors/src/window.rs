@@ -141,3 +141,69 @@ fn gate<'a>(
         *inside = passes;
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    type Matrix = [[f64; 4]; 4];
+
+    fn pose(angle: f64, shift: [f64; 3]) -> Matrix {
+        let (sine, cosine) = angle.sin_cos();
+        let [x, y, z] = shift;
+        [[cosine, -sine, 0.0, x], [sine, cosine, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]]
+    }
+
+    fn moved(pose: &Matrix, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| pose[axis][0] * x + pose[axis][1] * y + pose[axis][2] * z + pose[axis][3])
+    }
+
+    #[test]
+    fn points_within_a_box_are_those_found_one_by_one_and_what_does_not_fit_is_refused() {
+        let camera = [48, 64];
+        let rays: Vec<[f32; 2]> = (0..48 * 64_i32)
+            .map(|index| [((index % 64) as f32 - 31.5) / 50.0, ((index / 64) as f32 - 23.5) / 52.0])
+            .collect();
+        let (world, other) = (pose(0.3, [0.1, 0.0, -0.2]), pose(-0.1, [0.05, 0.02, 0.01]));
+        let (low, high) = ([-0.8, -0.6, 1.0], [0.7, 0.9, 2.4]);
+        for step in [1, 3] {
+            let size = camera.map(|count: usize| count.div_ceil(step));
+            let mut depth: Vec<f32> = (0..size[0] * size[1])
+                .map(|index| if index % 11 == 0 { 0.0 } else { 0.5 + (index * 7919 % 3500) as f32 / 1000.0 })
+                .collect();
+            (depth[40], depth[61], depth[82]) = (f32::NAN, f32::INFINITY, -1.0);
+            let (rows, columns) = (2..size[0] - 1, 1..size[1] - 3);
+            let window =
+                Window { depth: &depth, size, rays: &rays, camera, step, rows: rows.clone(), columns: columns.clone() };
+            let (points, pixels) = window.within(low, high, &world, &other).unwrap();
+            let mut expected = Vec::new();
+            for row in rows {
+                for column in columns.clone() {
+                    let (index, ray) = (row * size[1] + column, rays[row * step * 64 + column * step]);
+                    let z = depth[index];
+                    let point = [ray[0] * z, ray[1] * z, z].map(f64::from);
+                    let place = moved(&world, point);
+                    if z.is_finite()
+                        && z > 0.0
+                        && (0..3).all(|axis| place[axis] > low[axis] && place[axis] < high[axis])
+                    {
+                        expected.push((index as isize, moved(&other, point)));
+                    }
+                }
+            }
+            assert!(expected.len() > 20 && pixels.iter().eq(expected.iter().map(|(index, _)| index)));
+            let near =
+                |(a, (_, b)): (&[f64; 3], &(isize, [f64; 3]))| (0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-6);
+            assert!(points.iter().zip(&expected).all(near));
+            for wrong in [
+                Window { rows: 0..size[0] + 1, ..window.clone() },
+                Window { columns: 0..size[1] + 1, ..window.clone() },
+                Window { step: step + 1, ..window.clone() },
+                Window { step: 0, ..window },
+            ] {
+                assert!(wrong.within(low, high, &world, &other).is_err());
+            }
+        }
+    }
+}
