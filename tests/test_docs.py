@@ -1,4 +1,4 @@
-"""The documentation: short lines, no history, code that runs, links that lead somewhere, a clean build."""
+"""The documentation: code that runs, links that lead somewhere, a clean build."""
 
 import functools
 import importlib
@@ -29,25 +29,6 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
 TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CHANGELOG.md"]
-NOW = [*PAGES, ROOT / "README.md"]
-"""Pages that say what is, not what was."""
-
-WIDTH = 99
-COLUMNS = 5
-HISTORY = (
-    "used to ",
-    "version before",
-    "version before last",
-    "earlier version",
-    "tried and dropped",
-    "tried and left",
-    "when it was made",
-    "before the mending",
-    "formerly",
-    "previously",
-    "no longer",
-    "anymore",
-)
 CHEAP = ("info", "config", "body")
 
 voodoo_command = typer.main.get_command(app)
@@ -75,30 +56,6 @@ def name(page: Path) -> str:
 
 def with_blocks(*languages: str) -> list[Path]:
     return [page for page in PAGES if any(block.language in languages for block in blocks(page))]
-
-
-@pytest.mark.parametrize("page", TEXTS, ids=name)
-def test_lines_and_tables_fit_a_screen(page: Path):
-    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
-        assert len(line) <= WIDTH, f"{name(page)}:{number} has {len(line)} characters"
-        if re.match(r"\|[-|: ]+\|$", line):
-            assert line.count("|") - 1 <= COLUMNS, f"{name(page)}:{number} is a table of {line.count('|') - 1} columns"
-
-
-@pytest.mark.parametrize("page", TEXTS, ids=name)
-def test_a_line_has_one_sentence(page: Path):
-    for line in prose(page).splitlines():
-        plain = re.sub(r"`[^`]*`", "code", line)
-        if not line.startswith(("|", "#", "    ")):
-            two = re.search(r"[a-z)]\. [A-Z][a-z]", plain)
-            assert two is None, f"{name(page)}: {line}"
-
-
-@pytest.mark.parametrize("page", NOW, ids=name)
-def test_history_is_in_the_record(page: Path):
-    text = " ".join(page.read_text(encoding="utf-8").lower().split())
-    found = [words for words in HISTORY if words in text]
-    assert not found, f"{name(page)} tells history: {found}"
 
 
 @pytest.mark.parametrize("page", with_blocks("python"), ids=name)
@@ -188,7 +145,7 @@ def test_two_steps_from_the_front_page(question: str):
 
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=name)
 def test_names_exist(page: Path):
-    """`voodoo.x.Y` in the text can be imported; scripts, examples and files of the core are there."""
+    """`voodoo.x.Y` in the text can be imported; scripts, examples and files of the crates are there."""
     code = re.findall(r"`([^`]+)`", re.sub(r"\s+", " ", prose(page)))
     for path in {match for text in code for match in re.findall(r"\bvoodoo(?:\.\w+)+", text)}:
         parts, found = path.split(".")[1:], voodoo
@@ -199,9 +156,9 @@ def test_names_exist(page: Path):
     rooms = r"(?:^|\s)((?:examples|benches|lab|tests|scripts|python)/[\w./]+)"
     for path in {match for text in code for match in re.findall(rooms, text)}:
         assert (ROOT / path).exists(), f"{name(page)} names {path}"
-    core = ROOT / "crates" / "voodoo-core" / "src"
+    sources = [path.as_posix() for path in (ROOT / "crates").rglob("*.rs")]
     for path in {text for text in code if re.fullmatch(r"[\w/]+\.rs", text)}:
-        assert (core / path).exists(), f"{name(page)} names {path} of the core"
+        assert any(source.endswith(f"/{path}") for source in sources), f"{name(page)} names {path} of the crates"
 
 
 def test_the_pages_build_without_a_warning(tmp_path: Path):
