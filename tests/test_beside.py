@@ -26,7 +26,7 @@ def within(depth, **changes):
         "world_from_sensor": pose(0.3, (0.1, 0.0, -0.2)),
         "other_from_sensor": pose(-0.1, (0.05, 0.02, 0.01)),
     }
-    return _core.points_within(depth, CAMERA.rays(), **(options | changes))
+    return _core.points_within(depth, CAMERA, **(options | changes))
 
 
 def noisy(step=1, seed=1):

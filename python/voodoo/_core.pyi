@@ -10,6 +10,7 @@ import numpy.typing as npt
 __all__ = [
     "Body",
     "BodyView",
+    "Camera",
     "Chain",
     "ClosestPoints",
     "Detection",
@@ -49,38 +50,43 @@ __version__: str
 
 _Points = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
+@final
+class Camera:
+    """A camera as the core holds it; use voodoo.Camera."""
+
+    def __new__(
+        cls,
+        width: int,
+        height: int,
+        intrinsics: tuple[float, float, float, float],
+        model: str,
+        coefficients: Sequence[float],
+    ) -> Camera: ...
+    def project(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Pixels (N, 2) of points (N, 3) in the camera's frame [m]; NaN where there is none."""
+
+    def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """x/z, y/z (N, 2) of pixels (N, 2); NaN where the lens puts nothing."""
+
+    def rays(self) -> npt.NDArray[np.float32]:
+        """x/z, y/z (height, width, 2) of all pixels."""
+
 class _Camera(Protocol):
     @property
-    def width(self) -> int: ...
-    @property
-    def height(self) -> int: ...
-    @property
-    def fx(self) -> float: ...
-    @property
-    def fy(self) -> float: ...
-    @property
-    def cx(self) -> float: ...
-    @property
-    def cy(self) -> float: ...
-    @property
-    def distorted(self) -> bool: ...
-    def rays(self) -> npt.NDArray[np.float32]: ...
+    def core(self) -> Camera: ...
 
 def render_depth(
     body: Body,
     world_from_limb: Sequence[npt.NDArray[np.float64]],
     *,
-    width: int,
-    height: int,
-    intrinsics: tuple[float, float, float, float],
-    rays: npt.NDArray[np.float32] | None = None,
+    camera: _Camera,
     world_from_sensor: npt.NDArray[np.float64] | None = None,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int16]]:
     """Depth (height, width) [m], 0 where nothing is seen, and index of the limb, -1 for none; see voodoo.render_depth."""
 
 def points_within(
     depth: npt.NDArray[np.float32],
-    rays: npt.NDArray[np.float32],
+    camera: _Camera,
     *,
     step: int,
     rows: tuple[int, int],
@@ -94,8 +100,8 @@ def points_within(
 
     Args:
         depth: (h, w) along the optical axis [m]; what is not finite and above zero is no return.
-        rays: (H, W, 2) of the camera; `depth` has every `step`-th row and column of it.
-        step: see rays.
+        camera: `depth` has every `step`-th row and column of it.
+        step: see camera.
         rows, columns: of `depth`, from and up to.
         low, high: corners (3,) of the box in the world [m].
         world_from_sensor, other_from_sensor: (4, 4).
@@ -268,15 +274,13 @@ class StillDepth:
 
 def body_view(
     depth: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
-    rays: npt.NDArray[np.float32],
+    camera: _Camera,
     joints: npt.NDArray[np.float64],
     *,
     metres_per_unit: float,
-    intrinsics: tuple[float, float, float, float] | None,
     world_from_depth: npt.NDArray[np.float64],
     color_from_depth: npt.NDArray[np.float64],
-    color_intrinsics: tuple[float, float, float, float],
-    project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+    color_camera: _Camera,
     beyond: Callable[[float], npt.NDArray[np.bool_]],
     reach: int,
     step: int,
@@ -287,13 +291,11 @@ def body_view(
 
     Args:
         depth: (H, W).
-        rays: (H, W, 2) x/z, y/z of its pixels.
+        camera: its calibration.
         joints: (N, 3) of the body in the world [m].
         metres_per_unit: of `depth`.
-        intrinsics: (fx, fy, cx, cy) of the depth camera; None: its lens distorts.
         world_from_depth, color_from_depth: (4, 4).
-        color_intrinsics: (fx, fy, cx, cy) of the colour camera.
-        project: pixels (N, 2) of points (N, 3) in the colour camera's frame, if its lens distorts.
+        color_camera: calibration of the colour camera.
         beyond: where the depth camera does not look (H, W) at a distance from it [m], in the colour picture.
         reach: what is within so many rows and columns of a point belongs to it.
         step: every step-th row and column of the depth image is used.
@@ -320,8 +322,7 @@ class SkinTeacher:
         places: npt.NDArray[np.float64],
         *,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         half_life: float,
         every: int,
         settled: int,
@@ -359,8 +360,7 @@ class SkinCue:
         *,
         stamp: float,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         body: BodyView | None,
         settled: bool,
         arm_lost: Sequence[bool],
@@ -387,8 +387,7 @@ class KeypointLayout:
         predicted: Mapping[str, npt.NDArray[np.float64]],
         *,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         least: float,
     ) -> int | None: ...
     def observe(
@@ -399,8 +398,7 @@ class KeypointLayout:
         stamp: float,
         source: str,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         noise: float,
         place_sigma: float,
         least: float,
@@ -778,7 +776,7 @@ class PersonCandidate:
 def person_candidates(
     depth: npt.NDArray[np.float32],
     *,
-    intrinsics: Sequence[float],
+    camera: _Camera,
     up: Sequence[float] | None = None,
     floor: tuple[Sequence[float], float] | None = None,
     most: int = 8,
@@ -787,7 +785,7 @@ def person_candidates(
 
     Args:
         depth: float32, 0 or NaN means no return.
-        intrinsics: (fx, fy, cx, cy) [px].
+        camera: its calibration.
         up: unit vector upwards in the camera's optical frame; None means upwards in the image.
         floor: its unit normal and offset in that frame, normal . p = offset; None means that it is looked for.
         most: so many are returned, those of a standing person's size first.
@@ -1003,7 +1001,7 @@ class View:
         thickness: npt.NDArray[np.float32],
         depth: npt.NDArray[np.float32] | None,
         border: float,
-        intrinsics: tuple[float, float, float, float],
+        camera: _Camera,
         camera_from_world: npt.ArrayLike,
     ) -> View: ...
 

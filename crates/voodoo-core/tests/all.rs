@@ -5,6 +5,7 @@ mod color_scene;
 mod scene;
 mod shape_support;
 
+mod camera;
 mod detector_check;
 mod determinism;
 mod hostile;

@@ -14,6 +14,7 @@ use voodoo_core::observation::frame::{DepthImage, DepthPixels, Ground};
 use voodoo_core::{Body, Frame};
 
 use crate::arrays::{contiguous, vector};
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::frame::PyFrame;
 
@@ -80,7 +81,12 @@ impl PyDetector {
                     let mut pixels = Vec::new();
                     detector.mask(&detection, &mut pixels);
                     let source = frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
-                    found.push(PyDetection { detection, pixels, size: [image.height, image.width], source });
+                    found.push(PyDetection {
+                        detection,
+                        pixels,
+                        size: [image.camera.height(), image.camera.width()],
+                        source,
+                    });
                 }
             }
             found
@@ -240,11 +246,11 @@ impl PyCandidate {
 
 /// Candidates in a depth image `(H, W)` float32, metres; `up` and `floor` (normal, offset) in the camera's optical frame.
 #[pyfunction]
-#[pyo3(signature = (depth, *, intrinsics, up=None, floor=None, most=8))]
+#[pyo3(signature = (depth, *, camera, up=None, floor=None, most=8))]
 pub fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
-    intrinsics: [f64; 4],
+    camera: &Bound<'py, PyAny>,
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
@@ -252,14 +258,15 @@ pub fn person_candidates<'py>(
     let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
-    let [height, width] = [view.as_array().nrows(), view.as_array().ncols()];
+    let camera = camera_of(camera)?;
+    let [height, width] = [camera.height(), camera.width()];
+    if view.as_array().dim() != (height, width) {
+        return Err(wrong_argument(py, "depth", &format!("shape ({height}, {width}), as its camera has"), depth));
+    }
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
-        width,
-        height,
+        camera: &camera,
         metres_per_unit: 1.0,
-        intrinsics,
-        rays: None,
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

@@ -9,6 +9,7 @@ mod arrays;
 mod body;
 mod body_view;
 mod borrowed;
+mod camera;
 mod chroma;
 mod config;
 mod detect;
@@ -34,6 +35,8 @@ mod _core {
     use super::body::PyBody;
     #[pymodule_export]
     use super::body_view::{PyBodyView, PyStillDepth, body_view};
+    #[pymodule_export]
+    use super::camera::PyCamera;
     #[pymodule_export]
     use super::chroma::{color_bins, joined_mask, mask_regions, skin_mask};
     #[pymodule_export]

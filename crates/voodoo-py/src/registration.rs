@@ -1,25 +1,24 @@
 //! A depth camera's points in the picture of another camera.
 
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::error::TrackError;
 use voodoo_sensors::registration::{MeasuredPixels, ProjectedPoints};
 use voodoo_sensors::window::Window;
 
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception};
 
 type Points<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<isize>>);
 
 /// Points of a depth image (metres) within a box, in another camera's frame, and the index of each one's pixel.
 #[pyfunction]
-#[pyo3(signature = (depth, rays, *, step, rows, columns, low, high, world_from_sensor, other_from_sensor))]
+#[pyo3(signature = (depth, camera, *, step, rows, columns, low, high, world_from_sensor, other_from_sensor))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn points_within<'py>(
     py: Python<'py>,
     depth: PyReadonlyArray2<'py, f32>,
-    rays: PyReadonlyArray3<'py, f32>,
+    camera: &Bound<'py, PyAny>,
     step: usize,
     rows: (usize, usize),
     columns: (usize, usize),
@@ -28,16 +27,11 @@ pub fn points_within<'py>(
     world_from_sensor: [[f64; 4]; 4],
     other_from_sensor: [[f64; 4]; 4],
 ) -> PyResult<Points<'py>> {
-    let (size, camera) = (depth.dims(), rays.dims());
-    if camera[2] != 2 {
-        let text = format!("rays: expected shape (height, width, 2), found {:?}", rays.shape());
-        return Err(exception(py, "MeasurementError", text));
-    }
+    let (size, camera) = (depth.dims(), camera_of(camera)?);
     let window = Window {
         depth: depth.as_slice()?,
         size: [size[0], size[1]],
-        rays: rays.as_slice()?.as_chunks().0,
-        camera: [camera[0], camera[1]],
+        camera: &camera,
         step,
         rows: rows.0..rows.1,
         columns: columns.0..columns.1,

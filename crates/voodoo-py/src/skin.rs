@@ -16,6 +16,7 @@ use voodoo_sensors::skin::teacher::{Pace, Shown, Teacher};
 
 use crate::arrays::rows;
 use crate::body_view::{PyBodyView, rows_of};
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception};
 use crate::sites::places_of;
 
@@ -46,34 +47,14 @@ pub fn skin_candidates<'py>(
     Ok((found.iter().map(told).collect(), PyArray1::from_vec(py, labels).reshape(size)?))
 }
 
-fn eye(world_from_sensor: &PyReadonlyArray2<'_, f64>, intrinsics: [f64; 4]) -> PyResult<Eye> {
-    Ok(Eye { world_from_sensor: rows_of("world_from_sensor", world_from_sensor)?, intrinsics })
-}
-
-/// Two columns of what a function of Python makes of some rows.
-pub fn pairs<'py, const N: usize>(function: &Bound<'py, PyAny>, rows: &[[f64; N]]) -> PyResult<Vec<[f64; 2]>> {
-    let py = function.py();
-    let array = PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), N])?;
-    let found: PyReadonlyArray2<'py, f64> = function.call1((array,))?.extract()?;
-    if found.dims() != numpy::Ix2(rows.len(), 2) {
-        let text = format!("lens: expected two columns of {} rows, found {:?}", rows.len(), found.shape());
-        return Err(exception(py, "MeasurementError", text));
-    }
-    Ok(found.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect())
-}
-
 /// Places before a camera, and their pixels.
 type Before = (Vec<[f64; 3]>, Vec<[f64; 2]>);
 
 /// Places of the world before a camera, metres, and their columns and rows; NaN behind it, and where its lens shows nothing.
-pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>, project: Option<&Bound<'_, PyAny>>) -> PyResult<Before> {
+pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> Before {
     let inside: Vec<[f64; 3]> = places.map(|place| eye.in_sensor(place).to_array()).collect();
-    let pixel = |place: &[f64; 3]| if place[2] > 0.0 { eye.pixel(Vec3::from_array(*place)) } else { [f64::NAN; 2] };
-    let pixels = match project {
-        Some(project) => pairs(project, &inside)?,
-        None => inside.iter().map(pixel).collect(),
-    };
-    Ok((inside, pixels))
+    let pixels = inside.iter().map(|place| eye.pixel(Vec3::from_array(*place))).collect();
+    (inside, pixels)
 }
 
 fn image_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<(&'a [[u8; 3]], [usize; 2])> {
@@ -108,7 +89,7 @@ impl PySkinTeacher {
     }
 
     /// Learns colours and background from a picture.
-    #[pyo3(signature = (cue, image, places, *, world_from_sensor, intrinsics, project, half_life, every, settled))]
+    #[pyo3(signature = (cue, image, places, *, world_from_sensor, camera, half_life, every, settled))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn learn<'py>(
         &mut self,
@@ -117,15 +98,15 @@ impl PySkinTeacher {
         image: Option<PyReadonlyArray3<'py, u8>>,
         places: PyReadonlyArray2<'py, f64>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        project: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         half_life: f64,
         every: u32,
         settled: u32,
     ) -> PyResult<()> {
-        let eye = eye(&world_from_sensor, intrinsics)?;
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = rows("places", &places)?.iter().map(|place| Vec3::from_array(*place));
-        let (inside, pixels) = before(&eye, places, project)?;
+        let (inside, pixels) = before(&eye, places);
         let shown = |(site, (place, pixel)): (usize, (&[f64; 3], &[f64; 2]))| {
             let seen = place[2] > 0.1 && pixel.iter().all(|value| value.is_finite());
             let found = cue.cue.assigned.iter().any(|(other, _)| *other == site);
@@ -206,7 +187,7 @@ impl PySkinCue {
     }
 
     /// Looks for regions of skin and follows them; where their candidates are, none without any.
-    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, intrinsics, lens, body, settled, arm_lost, upper_arm_visible))]
+    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, camera, body, settled, arm_lost, upper_arm_visible))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn look<'py>(
         &mut self,
@@ -216,14 +197,14 @@ impl PySkinCue {
         predicted: &Bound<'py, PyAny>,
         stamp: f64,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        lens: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         body: Option<&PyBodyView>,
         settled: bool,
         arm_lost: Vec<bool>,
         upper_arm_visible: Vec<bool>,
     ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let eye = eye(&world_from_sensor, intrinsics)?;
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let count = self.arms.len();
         if arm_lost.len() != count || upper_arm_visible.len() != count {
             let found = [arm_lost.len(), upper_arm_visible.len()];
@@ -267,12 +248,8 @@ impl PySkinCue {
         if self.cue.candidates().is_empty() {
             return Ok(None);
         }
-        let pixels: Vec<[f64; 2]> = self.cue.candidates().iter().map(|item| item.pixel).collect();
-        let flat = match lens {
-            Some(lens) => pairs(lens, &pixels)?,
-            None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),
-        };
-        let directions: Vec<Vec3> = flat.into_iter().map(|xy| eye.direction(xy)).collect();
+        let candidates = self.cue.candidates().iter();
+        let directions: Vec<Vec3> = candidates.map(|item| eye.direction(eye.undistorted(item.pixel))).collect();
         let sights = self.cue.place(&directions, eye.origin(), eye.axis()).map_err(|error| error.into_py(py))?;
         let places = sights.iter().flat_map(|sight| sight.place.to_array()).collect();
         PyArray1::from_vec(py, places).reshape([sights.len(), 3]).map(Some)

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use voodoo_core::camera::Camera;
 use voodoo_core::error::TrackError;
 use voodoo_core::math::widest;
 
@@ -12,10 +13,8 @@ pub struct Window<'a> {
     pub depth: &'a [f32],
     /// Rows and columns of that image.
     pub size: [usize; 2],
-    /// `(x/z, y/z)` of every pixel of the camera, row by row.
-    pub rays: &'a [[f32; 2]],
-    /// Rows and columns of the camera.
-    pub camera: [usize; 2],
+    /// The camera.
+    pub camera: &'a Camera,
     /// The image has every so-many-th row and column of the camera.
     pub step: usize,
     /// Rows of the image that are looked at.
@@ -27,26 +26,24 @@ pub struct Window<'a> {
 impl Window<'_> {
     fn check(&self) -> Result<(), TrackError> {
         let [height, width] = self.size;
+        let camera = [self.camera.height(), self.camera.width()];
         let fits = self.step > 0
-            && self.size.iter().zip(&self.camera).all(|(size, camera)| *size == camera.div_ceil(self.step.max(1)))
-            && self.camera[0].checked_mul(self.camera[1]) == Some(self.rays.len())
+            && self.size.iter().zip(&camera).all(|(size, camera)| *size == camera.div_ceil(self.step.max(1)))
             && height.checked_mul(width) == Some(self.depth.len());
         if fits && self.rows.end <= height && self.columns.end <= width {
             return Ok(());
         }
         let found = format!(
-            "{} depths for {:?}, {} rays for {:?}, step {}, rows {:?} and columns {:?}",
+            "{} depths for {:?}, a camera of {camera:?}, step {}, rows {:?} and columns {:?}",
             self.depth.len(),
             self.size,
-            self.rays.len(),
-            self.camera,
             self.step,
             self.rows,
             self.columns
         );
         Err(TrackError::measurement(
             "window",
-            "a depth, and a ray, for every pixel, and rows and columns of them",
+            "a depth for every pixel of the camera, and rows and columns of them",
             found,
         ))
     }
@@ -68,10 +65,11 @@ impl Window<'_> {
         // Values of single precision are between these where they are between the corners.
         let (low, high) = (low.map(below), high.map(|value| -below(-value)));
         let (rows, count) = (self.rows.clone(), self.columns.len());
+        let all_rays = self.camera.rays();
         let mut inside = vec![false; rows.len() * count];
         for (row, inside) in rows.clone().zip(inside.chunks_exact_mut(count.max(1))) {
             let depths = &self.depth[row * self.size[1]..][self.columns.clone()];
-            let rays = &self.rays[(row * self.camera[1] + self.columns.start) * self.step..];
+            let rays = &all_rays[(row * self.camera.width() + self.columns.start) * self.step..];
             widest(
                 #[inline(always)]
                 || {
@@ -89,7 +87,7 @@ impl Window<'_> {
         for (row, inside) in rows.zip(inside.chunks_exact(count.max(1))) {
             let first = row * self.size[1] + self.columns.start;
             let depths = &self.depth[first..][..count];
-            let rays = &self.rays[(row * self.camera[1] + self.columns.start) * self.step..];
+            let rays = &all_rays[(row * self.camera.width() + self.columns.start) * self.step..];
             // Most of the columns are passed over, some at once.
             for (block, inside) in inside.chunks(COLUMNS_TOGETHER).enumerate().filter(|(_, inside)| any(inside)) {
                 for (offset, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {

@@ -73,12 +73,12 @@ class Silhouette:
         self.empty = not person.any()
         pose = rigid(world_from_camera, name="world_from_camera")
         seen = None if depth is None else _depths(depth, camera, person)
-        intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
+        pinhole = Camera(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
         # It is rigid, so the inverse rotation is the transposed one.
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, self.thickness, seen, self.border, intrinsics, inverse)
+        self._core = _core.View(self.distance, self.thickness, seen, self.border, pinhole, inverse)
 
     @property
     def core(self) -> _core.View:

@@ -53,14 +53,12 @@ def body_view(
     lens = depth_camera
     return _core.body_view(
         depth,
-        lens.rays(),
+        lens,
         np.ascontiguousarray(joints, dtype=np.float64),
         metres_per_unit=metres_per_unit,
-        intrinsics=None if lens.distorted else (lens.fx, lens.fy, lens.cx, lens.cy),
         world_from_depth=world_from_depth,
         color_from_depth=_between(*poses),
-        color_intrinsics=(color_camera.fx, color_camera.fy, color_camera.cx, color_camera.cy),
-        project=color_camera.project if color_camera.distorted else None,
+        color_camera=color_camera,
         # A few centimetres of the body's distance move what is beyond by less than a pixel.
         beyond=lambda away: _beyond(lens, poses[1], color_camera, poses[0], max(round(away, 1), 0.1)),
         # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.

@@ -49,7 +49,7 @@ impl Backdrop {
     pub fn make_room(&mut self, frame: &Frame, limbs: usize) {
         self.planes.resize_with(frame.colors.len(), Labels::default);
         for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
-            labels.make_room(BACKDROP_BITS, picture.width, picture.height);
+            labels.make_room(BACKDROP_BITS, picture.camera.width(), picture.camera.height());
         }
         self.camera_from_limb.clear();
         self.camera_from_limb.reserve(limbs);
@@ -114,7 +114,7 @@ impl Regions {
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
         for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
-            let known = self.cameras.iter().find(|camera| camera.number == picture.camera && camera.known);
+            let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
             let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
             let (model, scene) = (&camera.model, camera.scene.as_ref());
             let unit = super::unit_of(&camera.lens);
@@ -128,7 +128,7 @@ impl Regions {
                 let (column, row) = (u as usize, v as usize);
                 let (label, before) = labels.at(column, row);
                 if let Some(other) = behind((label, f64::from(before)), depth) {
-                    let pixel = row * picture.width + column;
+                    let pixel = row * picture.camera.width() + column;
                     let bin = bin_of(&picture.pixels, pixel);
                     claim.gained += area * f64::from(view.certainty(group, other, pixel, bin));
                 }

@@ -14,7 +14,8 @@ pub(super) struct Lens {
 
 impl Lens {
     pub(super) fn of(picture: &ColorImage) -> Self {
-        Self { width: picture.width, height: picture.height, intrinsics: picture.intrinsics }
+        let ([fx, fy], [cx, cy]) = (picture.camera.focal(), picture.camera.center());
+        Self { width: picture.camera.width(), height: picture.camera.height(), intrinsics: [fx, fy, cx, cy] }
     }
 
     /// Where a point of the camera's frame is seen, pixels.

@@ -136,10 +136,15 @@ impl Regions {
         Ok(())
     }
 
-    /// Refuses pictures that cannot be compared with those of the empty scene.
+    /// Refuses pictures with distortion, and those that cannot be compared with those of the empty scene.
     pub fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         for (index, picture) in frame.colors.iter().enumerate() {
-            let known = self.cameras.iter().find(|camera| camera.number == picture.camera);
+            if picture.camera.distorts() {
+                let found = format!("{:?}", picture.camera.lens());
+                let expected = "a pinhole camera: take the distortion out of the picture";
+                return Err(TrackError::measurement(format!("color[{index}].camera"), expected, found));
+            }
+            let known = self.cameras.iter().find(|camera| camera.number == picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }
         Ok(())
@@ -154,7 +159,7 @@ impl Regions {
         for picture in frame.colors {
             let kind = Kind::of(&picture.pixels);
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
-            let camera = self.camera(picture.camera);
+            let camera = self.camera(picture.number);
             if camera.known && camera.model.kind == kind {
                 continue;
             }
@@ -202,7 +207,7 @@ impl Regions {
         for picture in frame.colors {
             self.look(frame, picture, posed);
             let Self { cameras, groups, scanner, evidence, .. } = self;
-            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera && camera.known) else {
+            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
                 continue;
             };
             let unit = unit_of(&camera.lens);
@@ -274,7 +279,7 @@ impl Regions {
     /// Places the lines of one picture.
     fn look(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
         let viewpoint = self.viewpoint(frame, picture, posed);
-        let camera = self.camera(picture.camera);
+        let camera = self.camera(picture.number);
         camera.camera_from_limb.clear();
         camera.camera_from_limb.extend((0..posed.poses.len()).map(|limb| viewpoint.of(limb)));
         camera.lens = Lens::of(picture);
@@ -293,7 +298,7 @@ impl Regions {
     /// Learns the colours along the lines of one picture, of limbs that are not in doubt.
     fn teach(&mut self, picture: &ColorImage) {
         let Self { cameras, groups, evidence, .. } = self;
-        let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera) else { return };
+        let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number) else { return };
         let unit = unit_of(&camera.lens);
         // Where many limbs are in doubt at once, it is the light that has changed.
         let light = evidence.iter().filter(|evidence| evidence.doubts()).count() > MANY;
