@@ -135,7 +135,14 @@ impl Camera {
     /// behind it, and where the lens does not put points: beyond the radius at which its distortion stops growing.
     #[inline]
     pub fn project(&self, point: Vec3) -> Option<[f64; 2]> {
-        if point.z > 0.0 { self.pixel([point.x / point.z, point.y / point.z]) } else { None }
+        if !(point.z > 0.0) {
+            return None;
+        }
+        if self.distorts() {
+            return self.pixel([point.x / point.z, point.y / point.z]);
+        }
+        let ([fx, fy], [cx, cy]) = (self.focal, self.center);
+        Some([fx * point.x / point.z + cx, fy * point.y / point.z + cy])
     }
 
     /// Column and row in which all points on the ray through `(x/z, y/z)` are seen; none as of [`Camera::project`].
@@ -259,8 +266,8 @@ impl Camera {
             if !(corner.z >= NEAREST_SEEN) {
                 return whole;
             }
-            let ray = [corner.x / corner.z, corner.y / corner.z];
-            take(if self.distorts() { ray } else { self.pixel(ray).unwrap_or(ray) });
+            let bend = self.distorts();
+            take(self.project(corner).filter(|_| !bend).unwrap_or([corner.x / corner.z, corner.y / corner.z]));
         }
         if self.distorts() {
             match self.bounds(low, high) {

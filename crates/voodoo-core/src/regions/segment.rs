@@ -5,7 +5,7 @@
 
 use super::histogram::bin_of;
 use super::labels::NOTHING;
-use super::{Posed, Regions, scan, unit_of};
+use super::{Posed, Regions, scan};
 use crate::association::correspondence::Correspondences;
 use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
@@ -46,7 +46,7 @@ impl Regions {
         let mut likely = vec![0.0; picture.camera.width() * picture.camera.height()];
         let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
         let (model, labels, scene) = (&camera.model, &camera.labels, camera.scene.as_ref());
-        let unit = unit_of(&camera.lens);
+        let unit = camera.unit;
         let view = scan::View { picture, model, labels, scene, groups: &self.groups, unit };
         let cell = 1_usize << super::CELL_BITS;
         let near = distances(labels, [picture.camera.width(), picture.camera.height()], cell as f32 / unit);
