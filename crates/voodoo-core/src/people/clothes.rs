@@ -93,7 +93,7 @@ impl Histogram {
 
 /// The point that a depth image shows where a limb's surface is expected, camera frame.
 fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Option<Vec3> {
-    let pixel = pixel_of(image.intrinsics, [image.width, image.height], place)?;
+    let pixel = image.camera.index_of(place)?;
     let z = f64::from(image.pixels.get(pixel)) * image.metres_per_unit;
     ((z - place.z).abs() < SHOWS && own(pixel)).then(|| place * (z / place.z))
 }
@@ -101,15 +101,7 @@ fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Opti
 /// The colour of a place of the world in a picture.
 fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
     let place = picture.world_from_sensor.inverse_transform_point(world);
-    let pixel = pixel_of(picture.intrinsics, [picture.width, picture.height], place)?;
-    Some(picture.pixels.get(pixel))
-}
-
-/// The pixel in which a point of the camera's frame is seen.
-fn pixel_of([fx, fy, cx, cy]: [f64; 4], [width, height]: [usize; 2], point: Vec3) -> Option<usize> {
-    let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
-    let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
-    inside.then(|| v as usize * width + u as usize)
+    Some(picture.pixels.get(picture.camera.index_of(place)?))
 }
 
 /// Counts a colour in the bins about it, by how near it is to their middles.
