@@ -12,7 +12,6 @@ from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_e
 from voodoo import MeasurementError
 from voodoo.sensors.body_view import BodyView
 from voodoo.sensors.pixels import in_sensor, ray_distance
-from voodoo.sensors.skin.regions import candidates
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.sensors.skin.tracker import SkinTracker
 
@@ -189,16 +188,6 @@ def test_lost_tracking_teaches_nothing():
     skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
     np.testing.assert_array_equal(before, skin.colours)
     assert not skin.settled
-
-
-def test_candidates_skip_noise_and_doors():
-    mask = np.zeros((240, 320), bool)
-    mask[10:12, 10:12] = True
-    mask[40:52, 40:52] = True
-    mask[0:240, 200:320] = True
-    found, regions = candidates(mask, palm_px=5.4)
-    assert [item.pixel for item in found] == [(45.5, 45.5)]
-    assert (regions == found[0].region).sum() == found[0].area == 144
 
 
 def test_settings_and_images_are_checked():

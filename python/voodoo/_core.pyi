@@ -29,6 +29,7 @@ __all__ = [
     "View",
     "__version__",
     "_estimate",
+    "body_before",
     "body_view",
     "carried",
     "config_fields",
@@ -37,7 +38,6 @@ __all__ = [
     "nearest_surface",
     "person_candidates",
     "render_depth",
-    "skin_candidates",
 ]
 
 __version__: str
@@ -76,12 +76,13 @@ def render_depth(
 def nearest_surface(
     pixels: npt.NDArray[np.float64], depths: npt.NDArray[np.float64], *, pixel: tuple[float, float], radius: float
 ) -> float | None:
-    """Depth [m] of the nearest surface around a place in a picture; None with less than three points there.
+    """Depth of the nearest surface around a place in a picture [m], None with fewer than three points there.
 
     Args:
-        pixels, depths: (N, 2) and (N,) [m], what was measured.
-        pixel: the place.
-        radius: [px].
+        pixels: (N, 2) where points are seen.
+        depths: (N,) [m].
+        pixel: the place (u, v).
+        radius: of what is looked at [px].
 
     Raises:
         MeasurementError: other shapes.
@@ -89,12 +90,6 @@ def nearest_surface(
 
 def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
     """Pairs (row, column) of finite costs (N, M) with the least sum, every row or every column once, by rows."""
-
-def skin_candidates(
-    mask: npt.NDArray[np.bool_], palm_px: float
-) -> tuple[list[tuple[tuple[float, float], int, int, bool]], npt.NDArray[np.int32]]:
-    """Where in a skin mask (H, W) a head or a hand may be: pixel, region, area [px], whether it may be a hand; (H, W) the number
-    of its region in each pixel. See voodoo.sensors.skin.regions."""
 
 @final
 class BodyView:
@@ -368,6 +363,11 @@ def carried(
     Returns:
         (N, 3), or None where nothing moves: too little time has passed, or the body's motion is not known.
     """
+
+def body_before(
+    tracker: Tracker | tuple[People, int], sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Length of body (N,) [m] between places (N, 3) and a camera (3,); see voodoo.Tracker.body_before."""
 
 def expected_sites(tracker: Tracker | tuple[People, int], stamp: float) -> dict[str, npt.NDArray[np.float64]]:
     """Site name -> (3,) where it is expected at a time [m]; see voodoo.Tracker.predict."""
@@ -815,9 +815,6 @@ class Tracker:
     def _set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None: ...
     def distance(self, points: _Points) -> npt.NDArray[np.float32]: ...
     def limb_distances(self, points: _Points) -> npt.NDArray[np.float32]: ...
-    def body_before(
-        self, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64]: ...
     def scale(self, factor: float) -> None: ...
     def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None: ...
     def _add_limb(
@@ -851,10 +848,6 @@ class People:
     def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
     def wants_colors(self) -> bool: ...
     def only(self, ids: Sequence[int] | None) -> None: ...
-    def limb_distances(self, id: int, points: _Points) -> npt.NDArray[np.float32] | None: ...
-    def body_before(
-        self, id: int, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64] | None: ...
     def estimate(self, id: int) -> Estimate | None: ...
     def body(self, id: int) -> Body | None: ...
 

@@ -223,24 +223,10 @@ class Followed:
         """See Tracker.predict."""
         return _core.expected_sites(self._core, stamp)
 
-    def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """See Tracker.limb_distances."""
-        found = self._people._core.limb_distances(self._number, points)
-        if found is None:
-            raise BodyError(f"person: expected one of those who are there, found {self._number}")
-        return found
-
-    def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """See Tracker.distance."""
-        return np.asarray(self.limb_distances(points).min(axis=0))
-
     def body_before(self, sites: npt.ArrayLike, camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """See Tracker.body_before."""
-        places = np.asarray(sites, dtype=np.float64).reshape(-1, 3)
-        found = self._people._core.body_before(self._number, places, np.asarray(camera, dtype=np.float64))
-        if found is None:
-            raise BodyError(f"person: expected one of those who are there, found {self._number}")
-        return found
+        places = np.ascontiguousarray(sites, dtype=np.float64).reshape(-1, 3)
+        return _core.body_before(self._core, places, np.asarray(camera, dtype=np.float64))
 
 
 def _box(region: tuple[Sequence[float], Sequence[float]] | None) -> tuple[list[float], list[float]] | None:

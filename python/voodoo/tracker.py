@@ -225,8 +225,8 @@ class Tracker:
         Raises:
             MeasurementError: no pose yet, or another shape.
         """
-        places = np.asarray(sites, dtype=np.float64).reshape(-1, 3)
-        return self._core.body_before(places, np.asarray(camera, dtype=np.float64))
+        places = np.ascontiguousarray(sites, dtype=np.float64).reshape(-1, 3)
+        return _core.body_before(self._core, places, np.asarray(camera, dtype=np.float64))
 
     def scale(self, factor: float) -> None:
         """Scale the whole body by a factor above zero without losing the track.

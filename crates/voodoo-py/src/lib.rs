@@ -65,9 +65,9 @@ mod _core {
     #[pymodule_export]
     use super::sites::{PySiteGate, PySiteRay, expected_sites};
     #[pymodule_export]
-    use super::skin::{PySkinCue, PySkinTeacher, skin_candidates};
+    use super::skin::{PySkinCue, PySkinTeacher};
     #[pymodule_export]
-    use super::tracker::PyTracker;
+    use super::tracker::{PyTracker, body_before};
 
     #[pymodule_init]
     fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {

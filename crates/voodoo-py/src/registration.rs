@@ -10,13 +10,12 @@ use crate::errors::{IntoPy, exception};
 #[pyfunction]
 #[pyo3(signature = (pixels, depths, *, pixel, radius))]
 pub fn nearest_surface(
-    py: Python<'_>,
     pixels: PyReadonlyArray2<'_, f64>,
     depths: PyReadonlyArray1<'_, f64>,
     pixel: [f64; 2],
     radius: f64,
 ) -> PyResult<Option<f64>> {
-    let shape = pixels.dims();
+    let (py, shape) = (pixels.py(), pixels.dims());
     if shape[1] != 2 {
         let text = format!("pixels: expected shape (N, 2), found ({}, {})", shape[0], shape[1]);
         return Err(exception(py, "MeasurementError", text));

@@ -8,7 +8,7 @@ use voodoo_core::error::TrackError;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::chroma::{CHROMA_BINS, LUMA_BINS};
 use voodoo_sensors::eye::Eye;
-use voodoo_sensors::skin::candidates::{Candidate, candidates};
+use voodoo_sensors::skin::candidates::Candidate;
 use voodoo_sensors::skin::cue::{SkinCue, SkinInput, SkinSettings, Undistort};
 use voodoo_sensors::skin::rules::Expected;
 use voodoo_sensors::skin::teacher::{Pace, Shown, Teacher};
@@ -27,23 +27,6 @@ type Names = (Option<usize>, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>);
 fn told(candidate: &Candidate) -> Place {
     let [u, v] = candidate.pixel;
     ((u, v), candidate.region, candidate.area, candidate.hand)
-}
-
-#[doc = stub!("skin_candidates")]
-#[pyfunction]
-pub fn skin_candidates<'py>(
-    py: Python<'py>,
-    mask: PyReadonlyArray2<'py, bool>,
-    palm_px: f64,
-) -> PyResult<(Vec<Place>, Bound<'py, PyArray2<i32>>)> {
-    let (size, pixels) = ([mask.dims()[0], mask.dims()[1]], mask.as_slice()?);
-    let pixels: Vec<u8> = pixels.iter().map(|pixel| u8::from(*pixel)).collect();
-    let (found, part) = py.detach(|| candidates(&pixels, size[1], palm_px));
-    let mut labels = vec![0; pixels.len()];
-    for (row, values) in part.values.chunks_exact(part.size[1].max(1)).enumerate() {
-        labels[(part.first[0] + row) * size[1] + part.first[1]..][..values.len()].copy_from_slice(values);
-    }
-    Ok((found.iter().map(told).collect(), PyArray1::from_vec(py, labels).reshape(size)?))
 }
 
 fn eye(world_from_sensor: &PyReadonlyArray2<'_, f64>, intrinsics: [f64; 4]) -> PyResult<Eye> {

@@ -215,6 +215,83 @@ mod tests {
         assert!(regions(&[], 0).0.is_empty() && regions(&[0; 6], 3).0.is_empty());
     }
 
+    /// Numbers of the regions in each pixel, by filling one after the other.
+    fn flooded(mask: &[u8], width: usize) -> Vec<i32> {
+        let mut labels = vec![0; mask.len()];
+        let mut count = 0;
+        for start in 0..mask.len() {
+            if mask[start] == 0 || labels[start] != 0 {
+                continue;
+            }
+            count += 1;
+            let mut open = vec![start];
+            while let Some(index) = open.pop() {
+                if mask[index] == 0 || labels[index] != 0 {
+                    continue;
+                }
+                labels[index] = count;
+                let (row, column) = (index / width, index % width);
+                for row in row.saturating_sub(1)..(row + 2).min(mask.len() / width) {
+                    open.extend((column.saturating_sub(1)..(column + 2).min(width)).map(|column| row * width + column));
+                }
+            }
+        }
+        labels
+    }
+
+    #[test]
+    fn regions_are_those_that_filling_finds() {
+        let mut state = 3_u32;
+        for _ in 0..60 {
+            let mut next = || {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                state >> 16
+            };
+            let (height, width) = (1 + next() as usize % 30, 1 + next() as usize % 40);
+            let share = 20 + next() % 40;
+            let mask: Vec<u8> = (0..height * width).map(|_| u8::from(next() % 100 < share)).collect();
+            let (found, labels) = regions(&mask, width);
+            let flooded = flooded(&mask, width);
+            let mut pairs: Vec<(i32, i32)> = labels.iter().copied().zip(flooded).collect();
+            pairs.sort_unstable();
+            pairs.dedup();
+            assert!(pairs.iter().filter(|(own, _)| *own > 0).count() == found.len(), "one to one");
+            assert!(pairs.iter().all(|(own, other)| (*own == 0) == (*other == 0)));
+            for (region, number) in found.iter().zip(1..) {
+                let pixels = || (0..mask.len()).filter(|index| labels[*index] == number);
+                let span = |of: fn(usize, usize) -> usize| {
+                    let places = || pixels().map(|index| of(index, width));
+                    (places().min().unwrap(), places().max().unwrap() + 1, places().sum::<usize>())
+                };
+                let (rows, columns) = (span(|index, width| index / width), span(|index, width| index % width));
+                let expected = Region {
+                    rows: (rows.0, rows.1),
+                    columns: (columns.0, columns.1),
+                    area: pixels().count(),
+                    sums: [columns.2, rows.2],
+                };
+                assert_eq!(*region, expected);
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_shadow_parts_is_one_hand_and_arms_stay_apart() {
+        let (width, palm) = (240, 5.4);
+        let mut mask = vec![0; width * 160];
+        let mut fill = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+            rows.for_each(|row| mask[row * width..][columns.clone()].fill(1));
+        };
+        // Palm and fingers, and two forearms.
+        fill(100..108, 100..108);
+        fill(110..118, 100..108);
+        fill(100..150, 200..208);
+        fill(100..150, 210..218);
+        let (_, labels) = regions(&joined(&mask, width, 3.0 * palm), width);
+        let at = |row: usize, column: usize| labels[row * width + column];
+        assert!(at(104, 104) == at(114, 104) && at(104, 104) != 0 && at(120, 204) != at(120, 214));
+    }
+
     #[test]
     fn only_short_regions_are_joined_and_sizes_are_checked() {
         let mask = [[1, 0, 1, 1, 0, 0, 0], [1, 0, 1, 1, 0, 0, 0]].concat();
@@ -235,6 +312,7 @@ mod tests {
         assert_eq!(look(before).unwrap().1[..4], [1, 1, 1, 0]);
         assert!(look(SkinPicture { width: 5, ..picture }).is_err());
         assert!(look(SkinPicture { body: Some(&body[1..]), ..picture }).is_err());
+        assert!(look(SkinPicture { table: &table[1..], ..picture }).is_err());
     }
     /// Numbers in [0, 1) that look random and are the same in every run (Knuth's linear congruence).
     fn numbers(mut state: u64) -> impl FnMut() -> f64 {
