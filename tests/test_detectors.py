@@ -88,7 +88,9 @@ def test_the_shipped_network_may_be_wrapped_and_named(someone):
 
     def detect(image):
         shown = voodoo.Frame(0.0)
-        shown.add_depth(image.depth, camera=image.camera, metres_per_unit=1.0, world_from_sensor=image.world_from_sensor)
+        shown.add_depth(
+            image.depth, camera=image.camera, metres_per_unit=1.0, world_from_sensor=image.world_from_sensor
+        )
         return shipped.detect(shown)
 
     tracker, found = run(CallableDetector(detect, joints=JOINTS, lengths=LENGTHS), someone)
@@ -155,7 +157,10 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
         ([DetectedPerson({}, 2.0)], "confidence: expected a probability"),
         ([DetectedPerson({}, 0.9, facing="yes")], "facing: expected a probability"),
         ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, joint_sigma=-1.0)], "sigma: expected finite metres > 0"),
-        ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, mask=np.ones((3, 3), bool))], "mask: expected an array of shape"),
+        (
+            [DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, mask=np.ones((3, 3), bool))],
+            "mask: expected an array of shape",
+        ),
         ([DetectedPerson({}, 0.9, lengths={"thigh": 0.4})], "lengths"),
         ([DetectedPerson(None, 0.9)], "low and high|joints"),
         ([DetectedPerson(7, 0.9)], "joints: expected a mapping from names"),
@@ -222,7 +227,9 @@ def constant_network(path, **outputs):
     for name, values in outputs.items():
         values = np.asarray(values, dtype="<f4")
         tensor = b"".join(field(1, size) for size in values.shape) + field(2, 1) + field(9, values.tobytes())
-        graph += field(1, field(2, name) + field(4, "Constant") + field(5, field(1, "value") + field(5, tensor) + field(20, 4)))
+        graph += field(
+            1, field(2, name) + field(4, "Constant") + field(5, field(1, "value") + field(5, tensor) + field(20, 4))
+        )
     graph += field(2, "constant") + field(11, shaped("x", (1, 2, 96, 96)))
     graph += b"".join(field(12, shaped(name, np.shape(values))) for name, values in outputs.items())
     path.write_bytes(field(1, 8) + field(8, field(2, 13)) + field(7, graph))
