@@ -105,6 +105,9 @@ impl PythonDetector {
     /// What an object with the attributes of `voodoo.detectors.DetectedPerson` says.
     fn detection(&self, person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Detection> {
         let py = person.py();
+        if person.getattr("joints")?.is_none() {
+            return Err(wrong_argument(py, "joints", "a mapping from names", &person.getattr("joints")?));
+        }
         let positions: HashMap<String, Bound<'_, PyAny>> = mapping(person, "joints")?;
         if let Some(name) = positions.keys().find(|name| !self.joints.contains(name)) {
             let text = format!("joints: expected some of {}, found {name:?}", self.joints.join(", "));
