@@ -5,13 +5,17 @@ use voodoo_core::CameraError;
 use voodoo_core::camera::{Camera, Lens};
 use voodoo_core::math::Vec3;
 
-/// Lenses as they are sold: the rational one has the numbers of an Azure Kinect's depth camera.
+/// An Azure Kinect's depth camera.
+const AZURE: [f64; 8] =
+    [0.5479397774, -0.0209713709, 2.0557534e-5, -7.2104158e-5, -0.0026522316, 0.8896790743, 0.0861302093, -0.0139103848];
+
+/// Lenses as they are sold.
 fn lenses() -> Vec<Lens> {
     vec![
         Lens::Pinhole,
         Lens::PlumbBob([-0.25, 0.08, 0.001, -0.002, 0.01]),
         Lens::PlumbBob([0.15, -0.1, -0.002, 0.001, 0.03]),
-        Lens::from_model("rational_polynomial", &[5.2, 3.4, 0.0001, -0.00003, 0.17, 5.5, 5.1, 0.9]).unwrap(),
+        Lens::from_model("rational_polynomial", &AZURE).unwrap(),
         Lens::Rational([0.3, -0.1, 0.001, 0.0005, 0.02, 0.4, -0.05, 0.03, 0.002, -0.001, 0.001, 0.003, 0.02, -0.03]),
         Lens::Fisheye([0.02, -0.01, 0.003, -0.001]),
         Lens::Fisheye([0.0; 4]),

@@ -34,7 +34,7 @@ class Silhouette:
         border: float = 1.0,
         depth: npt.ArrayLike | None = None,
     ) -> None:
-        """Transform a mask; lens distortion is taken out of it first.
+        """Transform a mask; lens distortion is taken out of it, and of depths, first.
 
         Args:
             mask: (height, width), true (or not 0) where the person is.
@@ -47,7 +47,7 @@ class Silhouette:
 
         Raises:
             MeasurementError: the border is no number of pixels, mask or depth have not the camera's size, depths are
-                whole numbers (millimetres), negative or of a camera with lens distortion, or the pose is not rigid.
+                whole numbers (millimetres) or negative, or the pose is not rigid.
         """
         if not isinstance(camera, Camera):
             raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
