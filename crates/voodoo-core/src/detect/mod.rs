@@ -14,6 +14,7 @@ mod view;
 pub mod weights;
 mod winograd;
 
+use crate::body::Body;
 use crate::math::{Aabb, Pose, Vec3};
 use crate::observation::frame::{DepthImage, Ground};
 pub use components::Candidate;
@@ -102,6 +103,16 @@ impl Detection {
     /// A joint by its name in [`JOINTS`].
     pub fn joint(&self, name: &str) -> Option<&DetectedJoint> {
         JOINTS.iter().position(|joint| *joint == name).and_then(|index| self.joints.get(index))
+    }
+
+    /// The joint that is a site of a body, by the site's name.
+    pub(crate) fn at_site(&self, body: &Body, site: usize) -> Option<&DetectedJoint> {
+        self.joint(&body.sites()[site].name)
+    }
+
+    /// Where the person is: the root of its body, world frame, metres.
+    pub(crate) fn place(&self) -> Option<Vec3> {
+        self.joint("humanoid_root").map(|root| root.position)
     }
 
     /// The person's sizes as in [`LENGTHS`], metres: those that the network tells, else the joints' distances without the stature.

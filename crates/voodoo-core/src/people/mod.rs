@@ -231,7 +231,7 @@ impl People {
 
     /// Whether somebody where a person is seen is to be followed.
     fn asked_for(&self, frame: &Frame, detection: &Detection) -> bool {
-        let Some(place) = detection.joint("humanoid_root").map(|root| root.position) else { return false };
+        let Some(place) = detection.place() else { return false };
         let others = self.others_than(None);
         self.options.allows(place) && self.options.room(frame, place, &others).is_some()
     }

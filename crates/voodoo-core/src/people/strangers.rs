@@ -35,7 +35,7 @@ impl Strangers {
 
     /// Takes a look in; `still`: what is seen has stood there all the time.
     pub(super) fn note(&mut self, stamp: f64, detection: Detection, image: usize, pixels: Vec<usize>, still: bool) {
-        let Some(place) = detection.joint("humanoid_root").map(|root| root.position) else { return };
+        let Some(place) = detection.place() else { return };
         let gain = detection.person - if still { STILL_COSTS } else { LOOK_COSTS };
         let near = |stranger: &&mut Stranger| stranger.place.distance(place) < SAME_PERSON;
         let before = self.seen.iter_mut().find(near).map(|stranger| stranger.sum);

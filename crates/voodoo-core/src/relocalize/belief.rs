@@ -20,7 +20,7 @@ pub(super) struct Belief {
 impl Belief {
     /// Takes a frame's look in; whether it is a person now.
     pub(super) fn observe(&mut self, seen: Option<&Detection>) -> bool {
-        let root = seen.and_then(|seen| Some((seen.joint("humanoid_root")?.position, seen.person)));
+        let root = seen.and_then(|seen| Some((seen.place()?, seen.person)));
         let Some((place, person)) = root else {
             // What flickers is forgotten.
             self.sum *= 0.5;

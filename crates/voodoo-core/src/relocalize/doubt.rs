@@ -1,7 +1,7 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
 use super::belief::ENOUGH_ODDS;
-use crate::body::Body;
+use crate::body::{Body, JointRole, Side};
 use crate::detect::Detection;
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
@@ -31,16 +31,19 @@ pub enum Seen {
 }
 
 /// Joints that tell where the trunk is and which way round.
-const TRUNK: [&str; 4] = ["l_shoulder", "r_shoulder", "l_hip", "r_hip"];
+const TRUNK: [Joint; 2] = [JointRole::Shoulder, JointRole::Hip];
+const LEGS: [Joint; 2] = [JointRole::Knee, JointRole::Ankle];
+const ARMS: [Joint; 2] = [JointRole::Elbow, JointRole::Wrist];
 
-const LEGS: [&str; 4] = ["l_knee", "r_knee", "l_ankle", "r_ankle"];
-const ARMS: [&str; 4] = ["l_elbow", "r_elbow", "l_wrist", "r_wrist"];
+/// A joint of both sides.
+type Joint = fn(Side) -> JointRole;
 
 /// Mean distance of detected joints from the tracked ones, and mean of their standard deviations, metres.
-fn apart(detection: &Detection, body: &Body, world_from_limb: &[Pose], names: &[&str]) -> [f64; 2] {
+fn apart(detection: &Detection, body: &Body, world_from_limb: &[Pose], joints: &[Joint]) -> [f64; 2] {
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
-    for name in names {
-        if let (Some(seen), Ok(site)) = (detection.joint(name), body.site_index(name)) {
+    for role in joints.iter().flat_map(|joint| Side::BOTH.map(joint)) {
+        let site = body.roles().site_at(role);
+        if let Some((seen, site)) = site.and_then(|site| Some((detection.at_site(body, site)?, site))) {
             let tracked: Vec3 = body.site_position(world_from_limb, site);
             apart += seen.position.distance(tracked);
             spread += seen.sigma;
@@ -129,8 +132,8 @@ impl Doubt {
         among: bool,
     ) -> Seen {
         let sigmas = if among { 0.0 } else { SIGMAS };
-        let elsewhere = |names: &[&str], least: f64| {
-            let [apart, spread] = apart(detection, body, world_from_limb, names);
+        let elsewhere = |joints: &[Joint], least: f64| {
+            let [apart, spread] = apart(detection, body, world_from_limb, joints);
             apart > least && apart > sigmas * spread
         };
         let limbs = young || among;
@@ -164,7 +167,7 @@ impl Doubt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{Body, HumanModel};
+    use crate::body::HumanModel;
     use crate::detect::{DetectedJoint, JOINTS};
     use crate::math::Quat;
 

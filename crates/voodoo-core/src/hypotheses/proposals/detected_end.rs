@@ -16,13 +16,15 @@ impl DetectedEnd<'_> {
         let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
         let detection = self.0?;
         let last = chain.ends.first()?;
-        let joint = body.limbs()[*last].parent.as_ref().map(|(_, joint)| joint)?;
-        let on_end = body.sites().iter().filter(|site| site.limb == *last && site.name != joint.name);
-        if let Some(seen) = on_end.filter_map(|site| detection.joint(&site.name)).next() {
+        let (_, joint) = body.limbs()[*last].parent.as_ref()?;
+        let center = body.roles().joint_site(*last);
+        let mut on_end =
+            (0..body.sites().len()).filter(|site| body.sites()[*site].limb == *last && Some(*site) != center);
+        if let Some(seen) = on_end.find_map(|site| detection.at_site(body, site)) {
             return Some(seen.position);
         }
         let beyond = chain.end(poses) - poses[*last] * joint.limb_from_joint.translation;
-        Some(detection.joint(&joint.name)?.position + beyond)
+        Some(detection.at_site(body, center?)?.position + beyond)
     }
 }
 

@@ -16,7 +16,7 @@ pub(super) fn said_by_detection(
 ) -> f64 {
     let apart = |limb: usize| {
         let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
-        let seen = detection.joint(&joint.name)?;
+        let seen = detection.at_site(body, body.roles().joint_site(limb)?)?;
         let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
         Some(said_by_joint(tracked - seen.position, seen.sigma))
     };
