@@ -1,13 +1,11 @@
 //! The colour of somebody's clothes, above and below the waist.
 
-use crate::body::Body;
+use crate::body::{Body, LimbRole};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 use crate::visibility::surface::surface_rows;
 
-/// Limbs that show what is worn above the waist, and below it, by what their names hold.
-const WORN: [&[&str]; 2] = [&["thorax", "upperarm", "torso"], &["thigh", "calf"]];
 /// Where across a limb colours are taken, in shares of its radius from the middle: the rim may show what is behind.
 const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
 /// A depth pixel shows the limb when it lies within this of where the limb's surface is, metres: clothes are thick.
@@ -39,12 +37,12 @@ impl Clothes {
     /// Looks at a posed body, world frame; `own` says of a depth image's number and pixel whether it may be the body's.
     pub(super) fn look(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
         let Self { worn, counts } = self;
-        for (names, histogram) in WORN.iter().zip(worn) {
+        for (half, histogram) in worn.iter_mut().enumerate() {
             counts.clear();
             counts.resize(BINS.iter().product(), 0.0);
             let mut seen = 0;
-            for (limb, pose) in body.limbs().iter().zip(poses) {
-                if !names.iter().any(|name| limb.name.contains(name)) {
+            for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
+                if body.roles().limb(index).and_then(half_of) != Some(half) {
                     continue;
                 }
                 for (number, image) in frame.images.iter().enumerate() {
@@ -77,6 +75,15 @@ impl Clothes {
             count += 1.0;
         }
         (count > 0.0).then(|| sum / count)
+    }
+}
+
+/// Whether a limb shows what is worn above the waist (0) or below it (1).
+fn half_of(limb: LimbRole) -> Option<usize> {
+    match limb {
+        LimbRole::Thorax | LimbRole::UpperArm(_) => Some(0),
+        LimbRole::Thigh(_) | LimbRole::Calf(_) => Some(1),
+        _ => None,
     }
 }
 

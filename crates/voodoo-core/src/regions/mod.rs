@@ -17,7 +17,7 @@ mod scene;
 mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
-use crate::body::{Body, Limb};
+use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
@@ -152,8 +152,8 @@ impl Regions {
 
     /// Learns the colours of cameras that are new at the pose where the body is thought to be.
     pub fn begin(&mut self, frame: &Frame, posed: Posed) {
-        if self.groups.len() != posed.poses.len() {
-            self.groups = groups(posed.body);
+        if self.groups != posed.body.roles().groups() {
+            posed.body.roles().groups().clone_into(&mut self.groups);
             self.cameras.iter_mut().for_each(|camera| camera.known = false);
         }
         for picture in frame.colors {
@@ -324,19 +324,4 @@ fn moved_on(before: &Pose, now: &Pose, share: f64) -> Pose {
     let turn = (now.rotation * before.rotation.inverse()).to_scaled_axis_shortest();
     let shift = now.translation - before.translation;
     Pose::from_parts(now.translation + share * shift, Quat::from_scaled_axis(share * turn) * now.rotation)
-}
-
-/// Groups of limbs with the same colours: the two of a pair.
-fn groups(body: &Body) -> Vec<u16> {
-    let stem = |limb: &Limb| limb.name.trim_start_matches("l_").trim_start_matches("r_").to_owned();
-    let mut names: Vec<String> = Vec::new();
-    let group = |limb: &Limb| {
-        let name = stem(limb);
-        let known = names.iter().position(|known| *known == name);
-        known.unwrap_or_else(|| {
-            names.push(name);
-            names.len() - 1
-        }) as u16
-    };
-    body.limbs().iter().map(group).collect()
 }
