@@ -3,8 +3,6 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from voodoo._moved import MOVED, install
-
 if TYPE_CHECKING:
     from voodoo import ik
     from voodoo._core import ClosestPoints, Detection, Detector, Estimate, Frame, TaperedEllipticCylinder, __version__
@@ -106,15 +104,13 @@ _ROOMS = (
     "visualization",
 )
 
-install()
-
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
     if name in _HOME_OF:
         value = getattr(import_module(_HOME_OF[name]), name)
         globals()[name] = value
         return value
-    if name in _ROOMS or f"voodoo.{name}" in MOVED:
+    if name in _ROOMS:
         return import_module(f"voodoo.{name}")
     raise AttributeError(f"module 'voodoo' has no attribute {name!r}")
 

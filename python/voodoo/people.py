@@ -198,6 +198,11 @@ class Followed:
         self._number = number
 
     @property
+    def _core(self) -> tuple[_core.People, int]:
+        """What the compiled core knows them by."""
+        return self._people._core, self._number
+
+    @property
     def body(self) -> Body:
         """The body in their sizes."""
         return self._people.body(self._number)
@@ -214,24 +219,14 @@ class Followed:
             raise BodyError(f"person: expected one of those who are there, found {self._number}")
         return found
 
-    def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """See Tracker.limb_distances."""
-        found = self._people._core.limb_distances(self._number, points)
-        if found is None:
-            raise BodyError(f"person: expected one of those who are there, found {self._number}")
-        return found
-
-    def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """See Tracker.distance."""
-        return np.asarray(self.limb_distances(points).min(axis=0))
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+        """See Tracker.predict."""
+        return _core.expected_sites(self._core, stamp)
 
     def body_before(self, sites: npt.ArrayLike, camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """See Tracker.body_before."""
-        places = np.asarray(sites, dtype=np.float64).reshape(-1, 3)
-        found = self._people._core.body_before(self._number, places, np.asarray(camera, dtype=np.float64))
-        if found is None:
-            raise BodyError(f"person: expected one of those who are there, found {self._number}")
-        return found
+        places = np.ascontiguousarray(sites, dtype=np.float64).reshape(-1, 3)
+        return _core.body_before(self._core, places, np.asarray(camera, dtype=np.float64))
 
 
 def _box(region: tuple[Sequence[float], Sequence[float]] | None) -> tuple[list[float], list[float]] | None:

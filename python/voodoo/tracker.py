@@ -189,6 +189,16 @@ class Tracker:
     def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.NDArray[np.float64]] | None:
         return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
 
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+        """Site name -> (3,) where it is expected at `stamp` [s], before or after the last frame [m].
+
+        The last estimate moved on by the share of its motion that is expected to go on, `Config.prediction`.
+
+        Raises:
+            MeasurementError: no pose yet.
+        """
+        return _core.expected_sites(self._core, stamp)
+
     def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside.
 
@@ -215,8 +225,8 @@ class Tracker:
         Raises:
             MeasurementError: no pose yet, or another shape.
         """
-        places = np.asarray(sites, dtype=np.float64).reshape(-1, 3)
-        return self._core.body_before(places, np.asarray(camera, dtype=np.float64))
+        places = np.ascontiguousarray(sites, dtype=np.float64).reshape(-1, 3)
+        return _core.body_before(self._core, places, np.asarray(camera, dtype=np.float64))
 
     def scale(self, factor: float) -> None:
         """Scale the whole body by a factor above zero without losing the track.

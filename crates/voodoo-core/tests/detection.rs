@@ -145,7 +145,7 @@ fn lengths_that_are_reported_set_the_sizes_and_others_stay_as_they_were_given() 
     };
     let given =
         ["l_thigh", "r_thigh", "l_calf"].map(|name| body.limbs()[body.limb_index(name).unwrap()].shape.length());
-    let rest = body.rest_pose(Pose::identity());
+    let rest = body.rest_pose(Pose::IDENTITY);
     let at = |name: &str| body.site_position(&rest, body.site_index(name).unwrap());
     let thigh = at("l_hip").distance(at("l_knee"));
     let ratios = |found: [f64; 3]| [0, 1, 2].map(|limb: usize| found[limb] / given[limb]);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::body::HumanModel;
@@ -15,16 +15,11 @@ use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
 use crate::arrays::{contiguous, vector};
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::frame::PyFrame;
 
-/// Finds people in depth images, with a small network that comes with the library.
-///
-/// Args:
-///     weights: path of another network's weights, as training/ exports them; None means those that come with the library.
-///
-/// Raises:
-///     MeasurementError: a file that holds no such weights.
+#[doc = stub!("Detector")]
 #[pyclass(name = "Detector", module = "voodoo")]
 pub struct PyDetector(pub Detector);
 
@@ -45,16 +40,7 @@ impl PyDetector {
         detector.map(Self).map_err(refused)
     }
 
-    /// The people in the depth images of a frame, the surest first.
-    ///
-    /// Floor and boxes to leave out are those of the frame; what else it holds is not looked at. Releases the GIL.
-    ///
-    /// Args:
-    ///     frame: with at least one depth image.
-    ///     up: (3,) unit vector upwards in the world, where the frame tells no floor; None means upwards in the image.
-    ///
-    /// Raises:
-    ///     MeasurementError: a measurement that cannot be used.
+    #[doc = stub!("Detector.detect")]
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
         let any = Body::human(1.75, HumanModel::Full).map_err(|error| error.into_py(py))?;
@@ -79,7 +65,7 @@ impl PyDetector {
                     Surroundings { ground: input.ground, up, excluded: input.excluded, ..Surroundings::default() };
                 for detection in detector.detect(image, &around, DetectionQuery::All)? {
                     let source = frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
-                    found.push(PyDetection { detection, size: [image.height, image.width], source });
+                    found.push(PyDetection { detection, size: [image.camera.height(), image.camera.width()], source });
                 }
             }
             Ok::<_, DetectError>(found)
@@ -94,7 +80,7 @@ impl PyDetector {
     }
 }
 
-/// A person in a depth image. World frame, metres.
+#[doc = stub!("Detection")]
 #[pyclass(name = "Detection", module = "voodoo", frozen)]
 pub struct PyDetection {
     detection: Detection,
@@ -131,61 +117,61 @@ impl PyDetection {
 
 #[pymethods]
 impl PyDetection {
-    /// Joint name -> position (3,) [m]; `l_` and `r_` are the person's own.
+    #[doc = stub!("Detection.joints")]
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_joints(py, |joint| PyArray1::from_slice(py, &joint.position.to_array()))
     }
 
-    /// Joint name -> standard deviation along each axis [m].
+    #[doc = stub!("Detection.joint_sigma")]
     #[getter]
     fn joint_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_joints(py, |joint| joint.sigma)
     }
 
-    /// Joint name -> probability that it is in the image and not hidden.
+    #[doc = stub!("Detection.visible")]
     #[getter]
     fn visible<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_joints(py, |joint| joint.visible)
     }
 
-    /// Upper arm, forearm, thigh, shank, shoulder and hip width, trunk, neck and stature [m].
+    #[doc = stub!("Detection.lengths")]
     #[getter]
     fn lengths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_lengths(py, |[length, _]| length)
     }
 
-    /// The same names -> standard deviation [m].
+    #[doc = stub!("Detection.length_sigma")]
     #[getter]
     fn length_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_lengths(py, |[length, relative]| length * relative)
     }
 
-    /// Height of the person when standing upright [m].
+    #[doc = stub!("Detection.stature")]
     #[getter]
     fn stature(&self) -> f64 {
         self.detection.lengths.last().map_or(f64::NAN, |length| length[0])
     }
 
-    /// Probability that the front of the trunk shows.
+    #[doc = stub!("Detection.facing")]
     #[getter]
     fn facing(&self) -> f64 {
         probability(self.detection.facing.unwrap_or(0.0))
     }
 
-    /// Probability that it is a person.
+    #[doc = stub!("Detection.confidence")]
     #[getter]
     fn confidence(&self) -> f64 {
         probability(self.detection.person)
     }
 
-    /// The depth image it was found in.
+    #[doc = stub!("Detection.source")]
     #[getter]
     fn source(&self) -> &str {
         &self.source
     }
 
-    /// The pixels (H, W) of that image that show it.
+    #[doc = stub!("Detection.mask")]
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         let mut mask = vec![false; self.size[0] * self.size[1]];
@@ -215,42 +201,47 @@ impl PyDetection {
     }
 }
 
-/// What may be a person in a depth image, with the network's picture of it.
+#[doc = stub!("PersonCandidate")]
 #[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen)]
 pub struct PyCandidate {
     crop: Py<PyArray3<f32>>,
     mask: Py<PyArray2<bool>>,
+    #[doc = stub!("PersonCandidate.middle")]
     #[pyo3(get)]
     middle: [f64; 3],
+    #[doc = stub!("PersonCandidate.roll")]
     #[pyo3(get)]
     roll: f64,
+    #[doc = stub!("PersonCandidate.area")]
     #[pyo3(get)]
     area: f64,
+    #[doc = stub!("PersonCandidate.floor")]
     #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
 }
 
 #[pymethods]
 impl PyCandidate {
+    #[doc = stub!("PersonCandidate.crop")]
     #[getter]
     fn crop(&self, py: Python<'_>) -> Py<PyArray3<f32>> {
         self.crop.clone_ref(py)
     }
 
+    #[doc = stub!("PersonCandidate.mask")]
     #[getter]
     fn mask(&self, py: Python<'_>) -> Py<PyArray2<bool>> {
         self.mask.clone_ref(py)
     }
 }
 
-/// Candidates in a depth image `(H, W)` float32, metres; `rays` `(H, W, 2)` of a lens with distortion; `up` and `floor` (normal, offset) in the camera's optical frame.
+#[doc = stub!("person_candidates")]
 #[pyfunction]
-#[pyo3(signature = (depth, *, intrinsics, rays=None, up=None, floor=None, most=8))]
+#[pyo3(signature = (depth, *, camera, up=None, floor=None, most=8))]
 pub fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
-    intrinsics: [f64; 4],
-    rays: Option<&Bound<'py, PyAny>>,
+    camera: &Bound<'py, PyAny>,
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
@@ -258,22 +249,15 @@ pub fn person_candidates<'py>(
     let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
-    let [height, width] = [view.as_array().nrows(), view.as_array().ncols()];
-    let rays = rays.map(|rays| {
-        let wrong =
-            || wrong_argument(py, "rays", &format!("an array of shape ({height}, {width}, 2) and dtype float32"), rays);
-        let array = contiguous(rays).map_err(|_| wrong())?.cast_into::<PyArray3<f32>>().map_err(|_| wrong())?;
-        if array.shape() == [height, width, 2] { Ok(array.readonly()) } else { Err(wrong()) }
-    });
-    let rays = rays.transpose()?;
-    let rays = rays.as_ref().map(|rays| rays.as_slice()).transpose()?;
+    let camera = camera_of(camera)?;
+    let [height, width] = [camera.height(), camera.width()];
+    if view.as_array().dim() != (height, width) {
+        return Err(wrong_argument(py, "depth", &format!("shape ({height}, {width}), as its camera has"), depth));
+    }
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
-        width,
-        height,
+        camera: &camera,
         metres_per_unit: 1.0,
-        intrinsics,
-        rays: rays.map(|rays| rays.as_chunks().0),
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

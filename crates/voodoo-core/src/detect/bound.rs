@@ -119,7 +119,7 @@ fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundin
         let bounds = Aabb { mins: detection.low, maxs: detection.high };
         let mut depth = Vec::new();
         around.open_depth(image, &mut depth);
-        let within = |index: &usize| bounds.contains_local_point(world_point(image, *index, depth[*index]));
+        let within = |index: &usize| bounds.contains(world_point(image, *index, depth[*index]));
         detection.pixels = (0..depth.len()).filter(|index| depth[*index] > 0.0).filter(within).collect();
     }
     detection

@@ -193,7 +193,7 @@ impl Surroundings<'_> {
 
     /// Whether a place of the world is in one of the boxes that hold nobody.
     pub fn excludes(&self, point: Vec3) -> bool {
-        self.excluded.iter().any(|bounds| bounds.contains_local_point(point))
+        self.excluded.iter().any(|bounds| bounds.contains(point))
     }
 
     /// The depth of every pixel of an image, metres; 0 where nothing returned, and where it is known that what returned is nobody who

@@ -65,7 +65,7 @@ fn positions_of(detected: Detected) -> Vec<Option<Vec3>> {
 
 /// Where a body's sites are at rest.
 fn at_rest(body: &Body, sites: &[Option<usize>]) -> Vec<Option<Vec3>> {
-    let rest = body.rest_pose(Pose::identity());
+    let rest = body.rest_pose(Pose::IDENTITY);
     sites.iter().map(|site| site.map(|site| body.site_position(&rest, site))).collect()
 }
 

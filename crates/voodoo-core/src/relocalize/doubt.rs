@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn a_given_start_that_proves_right_is_looked_at_half_as_often_and_one_that_was_found_as_often_as_ever() {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
-        let poses = body.rest_pose(Pose::identity());
+        let poses = body.rest_pose(Pose::IDENTITY);
         let looks = |itself| {
             let mut doubt = Doubt::default();
             doubt.found_itself(itself);
@@ -203,7 +203,7 @@ mod tests {
             let joints = (0..names.len()).map(joint).collect();
             Detection { person: 5.0, facing: Some(6.0), joints, ..Detection::default() }
         };
-        let tracked = body.rest_pose(Pose::identity());
+        let tracked = body.rest_pose(Pose::IDENTITY);
         let about = Pose::from_parts(Vec3::ZERO, Quat::from_rotation_z(std::f64::consts::PI));
         let aside = Pose::from_parts(0.4 * Vec3::X, Quat::IDENTITY);
         let near = Pose::from_parts(0.09 * Vec3::X, Quat::IDENTITY);

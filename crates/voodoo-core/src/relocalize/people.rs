@@ -104,7 +104,7 @@ impl People {
                 }
             }
             if let (DetectionQuery::Near(place), Some((person, bounds))) = (query, self.detector.nearest())
-                && bounds.contains_local_point(place)
+                && bounds.contains(place)
             {
                 self.verdict = Some(self.verdict.map_or(person, |before| before.max(person)));
             }

@@ -3,6 +3,7 @@
 mod assess;
 mod edits;
 pub mod estimate;
+mod expected;
 mod queries;
 mod report;
 
@@ -22,6 +23,9 @@ use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::Found;
 use assess::Assessor;
 use estimate::{Estimate, Status};
+use expected::Before;
+
+pub use expected::LimbMotion;
 
 /// Follows one body through frames.
 #[derive(Debug)]
@@ -36,6 +40,7 @@ pub struct Tracker {
     sizes: Sizes,
     assessor: Assessor,
     estimate: Estimate,
+    before: Before,
 }
 
 impl Tracker {
@@ -51,6 +56,7 @@ impl Tracker {
             sizes: Sizes::default(),
             assessor: Assessor::default(),
             estimate: Estimate::default(),
+            before: Before::default(),
             config,
         })
     }
@@ -116,6 +122,7 @@ impl Tracker {
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
+        self.before.keep(&self.estimate);
         self.relocalizer.clear_error();
         // Where nobody tells the floor, it is where a detector saw it when it found the body.
         let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
@@ -193,6 +200,7 @@ impl Tracker {
         let frame = &Frame { colors: &[], ..*frame };
         let Some((body, poses)) = self.relocalizer.placed(&self.model, detected, known) else { return false };
         self.restart(body, poses, !known);
+        self.before.keep(&self.estimate);
         self.assessor.doubt_pose();
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
@@ -272,6 +280,7 @@ impl Tracker {
     pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
         self.relocalizer.clear_error();
         if self.is_started() {
+            self.before.keep(&self.estimate);
             self.follow(&Frame { colors: &[], ..*frame }, Some(share));
         }
         &self.estimate
