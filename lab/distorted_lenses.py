@@ -105,7 +105,7 @@ def made_up(sequence: VirtualSequence | Walk) -> Iterator[Step]:
     for frame in sequence:
         if tracker is None:
             tracker = voodoo.Tracker(sequence.body)
-            tracker.reset(frame.joints)
+            tracker.reset(joints=frame.joints)
         estimate = tracker.step(sequence.measurement(frame))
         item = DepthImage("depth", frame.stamp, frame.image, 0.001, sequence.camera, sequence.world_from_sensor)
         yield Step(item, tracker.body, estimate, joints_of(frame))
