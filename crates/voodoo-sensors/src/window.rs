@@ -170,7 +170,7 @@ mod tests {
         for step in [1, 3] {
             let size = camera.map(|count: usize| count.div_ceil(step));
             let mut depth: Vec<f32> = (0..size[0] * size[1])
-                .map(|index| if index % 11 == 0 { 0.0 } else { 0.5 + (index * 7919 % 3500) as f32 / 1000.0 })
+                .map(|index| if index % 11 == 0 { 0.0 } else { 0.50037 + (index * 7919 % 3500) as f32 / 1000.0 })
                 .collect();
             (depth[40], depth[61], depth[82]) = (f32::NAN, f32::INFINITY, -1.0);
             let (rows, columns) = (2..size[0] - 1, 1..size[1] - 3);
