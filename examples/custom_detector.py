@@ -11,9 +11,11 @@ from voodoo.detectors import CallableDetector, DetectedPerson, DetectorImage
 from voodoo.pipeline.run import track
 from voodoo.recordings import open_recording, sample_path
 
-JOINTS = ("head_center", "humanoid_root", "l_shoulder", "r_shoulder", "l_ankle", "r_ankle")
-SHARES = {"head_center": 0.93, "shoulders": 0.81, "humanoid_root": 0.55, "ankles": 0.05}
-"""Heights above the floor of someone who stands, as shares of the stature."""
+MIDDLE = {"head_center": 0.93, "humanoid_root": 0.55}
+SIDES = {"shoulder": (0.81, 0.06), "wrist": (0.47, 0.03), "ankle": (0.05, 0.03)}
+"""Heights above the floor of someone who stands with hanging arms, as shares of the stature; and how far joints lie within the
+outline [m]."""
+JOINTS = (*MIDDLE, *(f"{side}_{joint}" for joint in SIDES for side in "lr"))
 
 
 def standing_person(image: DetectorImage) -> list[DetectedPerson]:
@@ -46,13 +48,12 @@ def joints_of(blob: np.ndarray, stature: float, camera: np.ndarray) -> list[tupl
         return blob[np.abs(blob[:, 2] - share * stature) < 0.04 * stature]
 
     joints = []
-    for name in ("head_center", "humanoid_root"):
-        slab = level(SHARES[name])
+    for name, share in MIDDLE.items():
+        slab = level(share)
         if len(slab):
             place = np.median(slab, axis=0) + 0.1 * away
-            joints.append((name, np.array([*place[:2], SHARES[name] * stature])))
-    for joint, inwards in (("shoulder", 0.06), ("ankle", 0.03)):
-        share = SHARES[f"{joint}s"]
+            joints.append((name, np.array([*place[:2], share * stature])))
+    for joint, (share, inwards) in SIDES.items():
         slab = level(share)
         if len(slab):
             across = (slab - middle) @ right

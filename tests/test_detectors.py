@@ -149,7 +149,7 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
 @pytest.mark.parametrize(
     ("found", "words"),
     [
-        ([3], "has no attribute|joints"),
+        ([3], "has no attribute 'joints'"),
         (3, "not iterable"),
         ([DetectedPerson({"tail": (0, 0, 1)}, 0.9)], 'expected some of .*, found "tail"'),
         ([DetectedPerson({"l_shoulder": (0, 1)}, 0.9)], r"joints\[l_shoulder\]"),
@@ -162,7 +162,7 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
             "mask: expected an array of shape",
         ),
         ([DetectedPerson({}, 0.9, lengths={"thigh": 0.4})], "lengths"),
-        ([DetectedPerson(None, 0.9)], "low and high|joints"),
+        ([DetectedPerson(None, 0.9)], "joints: expected a mapping from names, found None"),
         ([DetectedPerson(7, 0.9)], "joints: expected a mapping from names"),
         ([DetectedPerson({}, 0.9, floor=3)], "floor: expected a unit normal"),
     ],
@@ -204,9 +204,9 @@ def test_persons_on_several_threads_ask_one_function_and_get_the_same(someone):
 def field(number, value):
     """A field of a protocol buffer: whole numbers, bytes and text."""
     if isinstance(value, int):
-        return bytes([number << 3]) + varint(value)
+        return varint(number << 3) + varint(value)
     value = value.encode() if isinstance(value, str) else value
-    return bytes([number << 3 | 2]) + varint(len(value)) + value
+    return varint(number << 3 | 2) + varint(len(value)) + value
 
 
 def varint(value):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.training.scenes import Frame, Person
-from voodoo import _core
+from voodoo import Camera, _core
 
 Array = NDArray[np.float64]
 PERSON_SHARE = (0.1, 0.45)  # of a candidate's pixels: below the first it is nobody, above the second somebody
@@ -57,7 +57,8 @@ def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sampl
     """At most so many candidates of a frame that show a person, and as many (one, beside people) that show none."""
     floor = None if frame.floor is None else (list(frame.floor[0]), float(frame.floor[1]))
     up = None if frame.up is None else list(frame.up)
-    found = _core.person_candidates(frame.depth, intrinsics=list(frame.intrinsics), up=up, floor=floor)
+    height, width = frame.depth.shape
+    found = _core.person_candidates(frame.depth, camera=Camera(width, height, *frame.intrinsics), up=up, floor=floor)
     counts = {p.label: int((frame.labels == p.label).sum()) for p in frame.people}
     yes: list[Sample] = []
     no: list[Sample] = []

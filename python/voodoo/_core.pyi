@@ -10,6 +10,7 @@ import numpy.typing as npt
 __all__ = [
     "Body",
     "BodyView",
+    "Camera",
     "Chain",
     "ClosestPoints",
     "Detection",
@@ -44,31 +45,36 @@ __version__: str
 
 _Points = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
+@final
+class Camera:
+    """A camera as the core holds it; use voodoo.Camera."""
+
+    def __new__(
+        cls,
+        width: int,
+        height: int,
+        intrinsics: tuple[float, float, float, float],
+        model: str,
+        coefficients: Sequence[float],
+    ) -> Camera: ...
+    def project(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Pixels (N, 2) of points (N, 3) in the camera's frame [m]; NaN where there is none."""
+
+    def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """x/z, y/z (N, 2) of pixels (N, 2); NaN where the lens puts nothing."""
+
+    def rays(self) -> npt.NDArray[np.float32]:
+        """x/z, y/z (height, width, 2) of all pixels."""
+
 class _Camera(Protocol):
     @property
-    def width(self) -> int: ...
-    @property
-    def height(self) -> int: ...
-    @property
-    def fx(self) -> float: ...
-    @property
-    def fy(self) -> float: ...
-    @property
-    def cx(self) -> float: ...
-    @property
-    def cy(self) -> float: ...
-    @property
-    def distorted(self) -> bool: ...
-    def rays(self) -> npt.NDArray[np.float32]: ...
+    def core(self) -> Camera: ...
 
 def render_depth(
     body: Body,
     world_from_limb: Sequence[npt.NDArray[np.float64]],
     *,
-    width: int,
-    height: int,
-    intrinsics: tuple[float, float, float, float],
-    rays: npt.NDArray[np.float32] | None = None,
+    camera: _Camera,
     world_from_sensor: npt.NDArray[np.float64] | None = None,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int16]]:
     """Depth (height, width) [m], 0 where nothing is seen, and index of the limb, -1 for none; see voodoo.render_depth."""
@@ -138,15 +144,13 @@ class StillDepth:
 
 def body_view(
     depth: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
-    rays: npt.NDArray[np.float32],
+    camera: _Camera,
     joints: npt.NDArray[np.float64],
     *,
     metres_per_unit: float,
-    intrinsics: tuple[float, float, float, float] | None,
     world_from_depth: npt.NDArray[np.float64],
     color_from_depth: npt.NDArray[np.float64],
-    color_intrinsics: tuple[float, float, float, float],
-    project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+    color_camera: _Camera,
     beyond: Callable[[float], npt.NDArray[np.bool_]],
     reach: int,
     step: int,
@@ -157,13 +161,11 @@ def body_view(
 
     Args:
         depth: (H, W).
-        rays: (H, W, 2) x/z, y/z of its pixels.
+        camera: its calibration.
         joints: (N, 3) of the body in the world [m].
         metres_per_unit: of `depth`.
-        intrinsics: (fx, fy, cx, cy) of the depth camera; None: its lens distorts.
         world_from_depth, color_from_depth: (4, 4).
-        color_intrinsics: (fx, fy, cx, cy) of the colour camera.
-        project: pixels (N, 2) of points (N, 3) in the colour camera's frame, if its lens distorts.
+        color_camera: calibration of the colour camera.
         beyond: where the depth camera does not look (H, W) at a distance from it [m], in the colour picture.
         reach: what is within so many rows and columns of a point belongs to it.
         step: every step-th row and column of the depth image is used.
@@ -190,8 +192,7 @@ class SkinTeacher:
         places: npt.NDArray[np.float64],
         *,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         half_life: float,
         every: int,
         settled: int,
@@ -229,8 +230,7 @@ class SkinCue:
         *,
         stamp: float,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         body: BodyView | None,
         settled: bool,
         arm_lost: Sequence[bool],
@@ -253,8 +253,7 @@ class KeypointLayout:
         predicted: Mapping[str, npt.NDArray[np.float64]],
         *,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         least: float,
     ) -> int | None: ...
     def observe(
@@ -265,8 +264,7 @@ class KeypointLayout:
         stamp: float,
         source: str,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         noise: float,
         place_sigma: float,
         least: float,
@@ -631,8 +629,7 @@ class PersonCandidate:
 def person_candidates(
     depth: npt.NDArray[np.float32],
     *,
-    intrinsics: Sequence[float],
-    rays: npt.NDArray[np.float32] | None = None,
+    camera: _Camera,
     up: Sequence[float] | None = None,
     floor: tuple[Sequence[float], float] | None = None,
     most: int = 8,
@@ -641,8 +638,7 @@ def person_candidates(
 
     Args:
         depth: float32, 0 or NaN means no return.
-        intrinsics: (fx, fy, cx, cy) [px].
-        rays: (H, W, 2) undistorted (x/z, y/z) of every pixel, of a lens with distortion.
+        camera: its calibration.
         up: unit vector upwards in the camera's optical frame; None means upwards in the image.
         floor: its unit normal and offset in that frame, normal . p = offset; None means that it is looked for.
         most: so many are returned, those of a standing person's size first.
@@ -861,7 +857,7 @@ class View:
         thickness: npt.NDArray[np.float32],
         depth: npt.NDArray[np.float32] | None,
         border: float,
-        intrinsics: tuple[float, float, float, float],
+        camera: _Camera,
         camera_from_world: npt.ArrayLike,
     ) -> View: ...
 

@@ -48,6 +48,24 @@ pub enum BodyError {
     },
 }
 
+/// A calibration that no camera can have.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("camera {what}: expected {expected}, found {found}")]
+pub struct CameraError {
+    /// Which of its numbers.
+    pub what: &'static str,
+    /// What would be right.
+    pub expected: &'static str,
+    /// What was there.
+    pub found: String,
+}
+
+impl CameraError {
+    pub(crate) fn new(what: &'static str, expected: &'static str, found: impl Into<String>) -> Self {
+        Self { what, expected, found: found.into() }
+    }
+}
+
 /// A configuration entry that is unknown or outside its range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ConfigError {

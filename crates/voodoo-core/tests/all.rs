@@ -5,6 +5,7 @@ mod color_scene;
 mod scene;
 mod shape_support;
 
+mod camera;
 mod detection;
 mod determinism;
 mod hostile;

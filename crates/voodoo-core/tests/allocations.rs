@@ -95,10 +95,7 @@ fn people_allocations() -> [usize; 2] {
 fn allocations_of_a_rendering() -> usize {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let view = Viewpoint {
-        width: 160,
-        height: 124,
-        intrinsics: [145.0, 145.0, 79.5, 61.5],
-        rays: None,
+        camera: scene::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]),
         world_from_sensor: scene::DepthCamera::world_from_sensor(),
     };
     let poses = scene::standing(&body);

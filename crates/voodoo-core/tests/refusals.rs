@@ -4,6 +4,7 @@
 use crate::detection::Fixed;
 use crate::scene;
 use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
+use voodoo_core::camera::Camera;
 use voodoo_core::config::{RawValue, Value};
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{
@@ -72,26 +73,21 @@ fn bad_clouds_are_refused() {
 #[test]
 fn bad_images_are_refused() {
     let pixels = [2400_u16; 12];
+    let camera = Camera::pinhole(4, 3, [100.0, 100.0, 1.5, 1.0]).unwrap();
+    let wider = Camera::pinhole(5, 3, [100.0, 100.0, 1.5, 1.0]).unwrap();
     let base = DepthImage {
         pixels: DepthPixels::U16(&pixels),
-        width: 4,
-        height: 3,
+        camera: &camera,
         metres_per_unit: 0.001,
-        intrinsics: [100.0, 100.0, 1.5, 1.0],
-        rays: None,
         world_from_sensor: scene::DepthCamera::world_from_sensor(),
         weight: 1.0,
         source: 0,
     };
-    let rays = [[0.0_f32; 2]; 11];
     for (image, what) in [
-        (DepthImage { width: 5, ..base }, "depth[0].image"),
-        (DepthImage { width: 0, height: 0, pixels: DepthPixels::U16(&[]), ..base }, "depth[0].image"),
+        (DepthImage { camera: &wider, ..base }, "depth[0].image"),
+        (DepthImage { pixels: DepthPixels::U16(&[]), ..base }, "depth[0].image"),
         (DepthImage { metres_per_unit: 0.0, ..base }, "depth[0].metres_per_unit"),
         (DepthImage { metres_per_unit: f64::NAN, ..base }, "depth[0].metres_per_unit"),
-        (DepthImage { intrinsics: [0.0, 1.0, 1.0, 1.0], ..base }, "depth[0].camera"),
-        (DepthImage { intrinsics: [1.0, 1.0, f64::NAN, 1.0], ..base }, "depth[0].camera"),
-        (DepthImage { rays: Some(&rays), ..base }, "depth[0].rays"),
         (DepthImage { weight: -2.0, ..base }, "depth[0].weight"),
         (
             DepthImage { world_from_sensor: Pose::from_parts(Vec3::NAN, Quat::IDENTITY), ..base },

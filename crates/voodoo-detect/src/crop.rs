@@ -24,13 +24,7 @@ pub struct Crop {
 
 impl Crop {
     /// The picture of a candidate; `up` in the camera's frame. `None` if it has no pixels.
-    pub(crate) fn of(
-        view: &View,
-        parts: &Components,
-        candidate: &Candidate,
-        up: Vec3,
-        distorted: bool,
-    ) -> Option<Self> {
+    pub(crate) fn of(view: &View, parts: &Components, candidate: &Candidate, up: Vec3) -> Option<Self> {
         let roll = roll(up);
         let (sin, cos) = roll.sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
@@ -51,8 +45,7 @@ impl Crop {
             for column in 0..SIZE {
                 let x = middle[0] + (column as f32 - half) * pixel / z0;
                 let y = middle[1] + (row as f32 - half) * pixel / z0;
-                let seen =
-                    view.pixel_at([cos * x + sin * y, cos * y - sin * x], distorted).filter(|index| member(*index));
+                let seen = view.pixel_at([cos * x + sin * y, cos * y - sin * x]).filter(|index| member(*index));
                 pixels.push(seen.map_or([1.0, 0.0], |index| {
                     let behind = (view.depth[index] - z0) / DEPTH as f32;
                     [behind.clamp(-1.0, 1.0), 1.0]

@@ -179,6 +179,7 @@ impl Draw {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use voodoo_core::Camera;
     use voodoo_core::detect::Surroundings;
     use voodoo_core::math::Pose;
     use voodoo_core::observation::frame::{DepthImage, DepthPixels};
@@ -204,13 +205,11 @@ mod tests {
             .collect();
         let mut view = View::default();
         let half = 0.5 * (EDGE as f64 - 1.0);
+        let camera = Camera::pinhole(EDGE, EDGE, [FOCAL, FOCAL, half, half]).unwrap();
         let image = DepthImage {
             pixels: DepthPixels::F32(&pixels),
-            width: EDGE,
-            height: EDGE,
+            camera: &camera,
             metres_per_unit: 1.0,
-            intrinsics: [FOCAL, FOCAL, half, half],
-            rays: None,
             world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,

@@ -17,7 +17,6 @@ pub struct Segmentation {
     candidates: Vec<Candidate>,
     floor: Option<Ground>,
     up: Vec3,
-    distorted: bool,
 }
 
 impl Segmentation {
@@ -25,7 +24,6 @@ impl Segmentation {
     pub fn find(&mut self, image: &DepthImage, around: &Surroundings) -> &[Candidate] {
         let camera_from_world = image.world_from_sensor.inverse();
         self.view.read(image, around);
-        self.distorted = image.rays.is_some();
         let told = around.ground.map(|ground| {
             let normal = camera_from_world.rotation * ground.normal;
             Ground { normal, ..ground.about(image.world_from_sensor.translation) }
@@ -58,7 +56,7 @@ impl Segmentation {
 
     /// What the network sees of a candidate of the last image.
     pub fn crop(&self, candidate: &Candidate) -> Option<Crop> {
-        Crop::of(&self.view, &self.parts, candidate, self.up, self.distorted)
+        Crop::of(&self.view, &self.parts, candidate, self.up)
     }
 
     /// Indices in the image of all pixels of a candidate, those between thinned ones, too.

@@ -1,20 +1,15 @@
 //! What unit tests share: a synthetic depth camera that stands in the world's origin and looks along z.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use voodoo_core::Body;
+use std::sync::LazyLock;
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{DepthImage, DepthPixels};
 use voodoo_core::visibility::render::{Rendering, Viewpoint};
+use voodoo_core::{Body, Camera};
 
-/// Size and lens of the camera.
-const VIEW: Viewpoint<'static> = Viewpoint {
-    width: 160,
-    height: 124,
-    intrinsics: [145.0, 145.0, 79.5, 61.5],
-    rays: None,
-    world_from_sensor: Pose::IDENTITY,
-};
+/// The camera.
+static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());
 
 /// Depth of the wall behind the body, millimetres.
 const WALL: u16 = 4500;
@@ -32,16 +27,15 @@ pub(crate) fn standing() -> (Body, Vec<Pose>) {
 /// Depth in millimetres, as the camera sees a posed body before a wall.
 pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
-    rendering.render(body, poses, &VIEW, None).unwrap();
+    let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
+    rendering.render(body, poses, &view, None).unwrap();
     rendering.depth().iter().map(|depth| if *depth > 0.0 { (depth * 1000.0) as u16 } else { WALL }).collect()
 }
 
 /// Puts a board that faces the camera before what an image shows; half its width and height, metres.
 pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64; 2]) {
-    let [fx, fy, cx, cy] = VIEW.intrinsics;
     for (index, pixel) in pixels.iter_mut().enumerate() {
-        let (column, row) = ((index % VIEW.width) as f64, (index / VIEW.width) as f64);
-        let (x, y) = (centre.z * (column - cx) / fx, centre.z * (row - cy) / fy);
+        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| centre.z * ray);
         let depth = (1000.0 * centre.z) as u16;
         if (x - centre.x).abs() < width && (y - centre.y).abs() < height && (*pixel == 0 || depth < *pixel) {
             *pixel = depth;
@@ -53,12 +47,9 @@ pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64;
 pub(crate) fn image(pixels: &[u16]) -> DepthImage<'_> {
     DepthImage {
         pixels: DepthPixels::U16(pixels),
-        width: VIEW.width,
-        height: VIEW.height,
+        camera: &CAMERA,
         metres_per_unit: 0.001,
-        intrinsics: VIEW.intrinsics,
-        rays: None,
-        world_from_sensor: VIEW.world_from_sensor,
+        world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,
     }

@@ -1,5 +1,6 @@
 //! A depth image as the detector looks at it: thinned out, in metres, without what cannot be a person.
 
+use voodoo_core::Camera;
 use voodoo_core::detect::Surroundings;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::observation::frame::{DepthImage, Ground};
@@ -22,34 +23,30 @@ pub(crate) struct View {
     pub(crate) depth: Vec<f32>,
     /// `(x/z, y/z)` of every pixel.
     pub(crate) slopes: Vec<[f32; 2]>,
-    /// `x/z` of every column where the lens has no distortion.
-    across: Vec<f32>,
     /// The image's width, for its pixels' indices.
     columns: usize,
-    intrinsics: [f64; 4],
+    camera: Option<Camera>,
 }
 
 impl View {
     /// Reads an image; what holds nobody is left out but for the floor.
     pub(crate) fn read(&mut self, image: &DepthImage, around: &Surroundings) {
         let mut step = 1;
-        while (image.width.div_ceil(step)) * (image.height.div_ceil(step)) > MOST_PIXELS {
+        let [width, height] = [image.camera.width(), image.camera.height()];
+        while (width.div_ceil(step)) * (height.div_ceil(step)) > MOST_PIXELS {
             step += 1;
         }
-        (self.width, self.height, self.step) = (image.width.div_ceil(step), image.height.div_ceil(step), step);
-        (self.columns, self.intrinsics) = (image.width, image.intrinsics);
+        (self.width, self.height, self.step) = (width.div_ceil(step), height.div_ceil(step), step);
+        (self.columns, self.camera) = (width, Some(image.camera.clone()));
         self.depth.clear();
         self.slopes.clear();
-        let [fx, fy, cx, cy] = image.intrinsics;
-        self.across.clear();
-        self.across.extend((0..image.width).step_by(step).map(|column| ((column as f64 - cx) / fx) as f32));
-        for row in (0..image.height).step_by(step) {
-            let down = ((row as f64 - cy) / fy) as f32;
-            for (column, across) in (0..image.width).step_by(step).zip(&self.across) {
-                let index = row * image.width + column;
-                let slope = image.rays.map_or([*across, down], |rays| rays[index]);
+        for row in (0..height).step_by(step) {
+            for column in (0..width).step_by(step) {
+                let index = row * width + column;
+                let slope = image.camera.pixel_ray(column, row).map(|value| value as f32);
                 let z = image.pixels.get(index) * image.metres_per_unit as f32;
-                let kept = z > RANGE[0] && z < RANGE[1] && !around.explains(index, z);
+                let seen = z > RANGE[0] && z < RANGE[1] && !slope[0].is_nan();
+                let kept = seen && !around.explains(index, z);
                 self.depth.push(if kept { z } else { 0.0 });
                 self.slopes.push(slope);
             }
@@ -89,20 +86,14 @@ impl View {
     }
 
     /// The pixel in whose direction `(x/z, y/z)` lies.
-    pub(crate) fn pixel_at(&self, [x, y]: [f32; 2], distorted: bool) -> Option<usize> {
-        let [fx, fy, cx, cy] = self.intrinsics.map(|value| value as f32);
-        let (mut column, mut row) = (fx * x + cx, fy * y + cy);
-        if distorted {
-            // Fixed point of the lens: the pinhole's error at a pixel is nearly that at its neighbour.
-            for _ in 0..3 {
-                let index = self.index(column, row)?;
-                let seen = self.slopes[index];
-                let (at_column, at_row) = self.place(index);
-                column = at_column + fx * (x - seen[0]);
-                row = at_row + fy * (y - seen[1]);
-            }
+    pub(crate) fn pixel_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
+        let camera = self.camera.as_ref()?;
+        if camera.distorts() {
+            let [column, row] = camera.pixel([f64::from(x), f64::from(y)])?;
+            return self.index(column as f32, row as f32);
         }
-        self.index(column, row)
+        let ([fx, fy], [cx, cy]) = (camera.focal().map(|f| f as f32), camera.center().map(|c| c as f32));
+        self.index(fx * x + cx, fy * y + cy)
     }
 
     fn index(&self, column: f32, row: f32) -> Option<usize> {
@@ -112,13 +103,10 @@ impl View {
         inside.then(|| row as usize * self.width + column as usize)
     }
 
-    fn place(&self, index: usize) -> (f32, f32) {
-        (((index % self.width) * self.step) as f32, ((index / self.width) * self.step) as f32)
-    }
-
     /// Surface that a pixel covers at a depth of 1 m, square metres.
     pub(crate) fn pixel_area(&self) -> f64 {
-        (self.step * self.step) as f64 / (self.intrinsics[0] * self.intrinsics[1])
+        let [fx, fy] = self.camera.as_ref().map_or([1.0; 2], Camera::focal);
+        (self.step * self.step) as f64 / (fx * fy)
     }
 
     /// The pixels of the image for which one with this index in the image stands.

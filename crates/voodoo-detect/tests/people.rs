@@ -128,12 +128,10 @@ fn a_refused_frame_changes_nothing() {
     let short = [[0_u8; 3]; 5];
     let picture = ColorImage {
         pixels: ColorPixels::Color(&short),
-        width: 3,
-        height: 2,
-        intrinsics: [1.0; 4],
+        camera: scene::pinhole(3, 2, [1.0; 4]),
         world_from_sensor: Pose::IDENTITY,
         stamp: 1.0,
-        camera: 0,
+        number: 0,
         source: 0,
     };
     assert!(people.step(&Frame { colors: &[picture], ..good }, &[]).is_err(), "a pixel is missing");

@@ -3,11 +3,11 @@
 
 use nalgebra::Matrix6;
 use proptest::prelude::*;
-use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::terms::normal_equations::{LimbBlock, line};
+use voodoo_core::{Body, Camera};
 use voodoo_ik::{
     Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Solver, Trunk, View, bones, level_rows, log,
     project, trunk,
@@ -112,7 +112,8 @@ proptest! {
         // Optical frame: z towards -x of the world, 3 m away.
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { pixels: &pixels, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
+        let camera = Camera::pinhole(160, 120, [140.0, 150.0, 79.5, 59.5]).unwrap();
+        let view = View { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
         let deep = View { depth: &depth, ..view };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Bone| segment.radius = [radius, 0.5 * radius]);
@@ -155,7 +156,8 @@ proptest! {
         let image = vec![[-100.0_f32, 0.0]; 160 * 120];
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { pixels: &image, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+        let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
+        let view = View { pixels: &image, depth: &[], border: 1.0, camera: &camera, camera_from_world };
         // One short bone beside the shoulder, moved into the trunk by its base.
         let segment = Bone { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
         let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };

@@ -2,9 +2,9 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use proptest::prelude::*;
-use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::{Body, Camera};
 use voodoo_ik::{
     Aim, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, View, bones, level_cost, level_rows, trunk,
 };
@@ -92,8 +92,8 @@ fn view(pixels: &[[f32; 2]]) -> View<'_> {
     // Optical frame: z towards -x of the world, 3 m away.
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-    let intrinsics = [140.0, 140.0, 79.5, 59.5];
-    View { pixels, depth: &[], border: 1.0, width: 160, height: 120, intrinsics, camera_from_world }
+    let camera = Box::leak(Box::new(Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap()));
+    View { pixels, depth: &[], border: 1.0, camera, camera_from_world }
 }
 
 proptest! {

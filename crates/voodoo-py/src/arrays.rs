@@ -89,11 +89,11 @@ pub fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>>
 }
 
 /// Rows of three numbers.
-pub fn rows<'a>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; 3]]> {
-    if array.dims()[1] == 3 {
+pub fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; N]]> {
+    if array.dims()[1] == N {
         return Ok(array.as_slice()?.as_chunks().0);
     }
-    let text = format!("{name}: expected shape (N, 3), found {:?}", array.shape());
+    let text = format!("{name}: expected shape (N, {N}), found {:?}", array.shape());
     Err(exception(array.py(), "MeasurementError", text))
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::body::HumanModel;
@@ -15,6 +15,7 @@ use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
 use crate::arrays::{contiguous, vector};
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::frame::PyFrame;
 
@@ -64,7 +65,7 @@ impl PyDetector {
                     Surroundings { ground: input.ground, up, excluded: input.excluded, ..Surroundings::default() };
                 for detection in detector.detect(image, &around, DetectionQuery::All)? {
                     let source = frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
-                    found.push(PyDetection { detection, size: [image.height, image.width], source });
+                    found.push(PyDetection { detection, size: [image.camera.height(), image.camera.width()], source });
                 }
             }
             Ok::<_, DetectError>(found)
@@ -236,12 +237,11 @@ impl PyCandidate {
 
 #[doc = stub!("person_candidates")]
 #[pyfunction]
-#[pyo3(signature = (depth, *, intrinsics, rays=None, up=None, floor=None, most=8))]
+#[pyo3(signature = (depth, *, camera, up=None, floor=None, most=8))]
 pub fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
-    intrinsics: [f64; 4],
-    rays: Option<&Bound<'py, PyAny>>,
+    camera: &Bound<'py, PyAny>,
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
@@ -249,21 +249,15 @@ pub fn person_candidates<'py>(
     let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
-    let [height, width] = [view.as_array().nrows(), view.as_array().ncols()];
-    let rays = rays.map(|rays| {
-        let wrong = || wrong_argument(py, "rays", &format!("an array of shape ({height}, {width}, 2) and dtype float32"), rays);
-        let array = contiguous(rays).map_err(|_| wrong())?.cast_into::<PyArray3<f32>>().map_err(|_| wrong())?;
-        if array.shape() == [height, width, 2] { Ok(array.readonly()) } else { Err(wrong()) }
-    });
-    let rays = rays.transpose()?;
-    let rays = rays.as_ref().map(|rays| rays.as_slice()).transpose()?;
+    let camera = camera_of(camera)?;
+    let [height, width] = [camera.height(), camera.width()];
+    if view.as_array().dim() != (height, width) {
+        return Err(wrong_argument(py, "depth", &format!("shape ({height}, {width}), as its camera has"), depth));
+    }
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
-        width,
-        height,
+        camera: &camera,
         metres_per_unit: 1.0,
-        intrinsics,
-        rays: rays.map(|rays| rays.as_chunks().0),
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyDict, PyString, PyTuple};
 use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use voodoo_core::math::Vec3;
 use voodoo_core::observation::frame::{DepthImage, Ground};
@@ -105,6 +105,9 @@ impl PythonDetector {
     /// What an object with the attributes of `voodoo.detectors.DetectedPerson` says.
     fn detection(&self, person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Detection> {
         let py = person.py();
+        if person.getattr("joints")?.is_none() {
+            return Err(wrong_argument(py, "joints", "a mapping from names", &person.getattr("joints")?));
+        }
         let positions: HashMap<String, Bound<'_, PyAny>> = mapping(person, "joints")?;
         if let Some(name) = positions.keys().find(|name| !self.joints.contains(name)) {
             let text = format!("joints: expected some of {}, found {name:?}", self.joints.join(", "));
@@ -179,7 +182,8 @@ fn input<'py>(
     around: &Surroundings,
     query: DetectionQuery,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let DepthImage { width, height, intrinsics: [fx, fy, cx, cy], rays, .. } = *image;
+    let (width, height, lens) = (image.camera.width(), image.camera.height(), image.camera.lens());
+    let ([fx, fy], [cx, cy]) = (image.camera.focal(), image.camera.center());
     let mut depth = Vec::new();
     around.open_depth(image, &mut depth);
     let camera = PyDict::new(py);
@@ -188,9 +192,9 @@ fn input<'py>(
     for (name, value) in [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)] {
         camera.set_item(name, value)?;
     }
+    camera.set_item("distortion", PyTuple::new(py, lens.coefficients())?)?;
+    camera.set_item("model", lens.model())?;
     let camera = py.import("voodoo.model.camera")?.getattr("Camera")?.call((), Some(&camera))?;
-    let rays =
-        rays.map(|rays| PyArray1::from_slice(py, rays.as_flattened()).reshape([height, width, 2])).transpose()?;
     let (query, near) = match query {
         DetectionQuery::All => ("all", None),
         DetectionQuery::Any => ("any", None),
@@ -200,7 +204,6 @@ fn input<'py>(
     let fields = PyDict::new(py);
     fields.set_item("depth", PyArray1::from_vec(py, depth).reshape([height, width])?)?;
     fields.set_item("camera", camera)?;
-    fields.set_item("rays", rays)?;
     fields.set_item(
         "world_from_sensor",
         PyArray1::from_slice(py, matrix(&image.world_from_sensor).as_flattened()).reshape([4, 4])?,
@@ -260,8 +263,9 @@ fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
 fn pixels(person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Vec<usize>> {
     let Some(found) = person.getattr_opt("mask")?.filter(|found| !found.is_none()) else { return Ok(Vec::new()) };
     let array = contiguous(&found).ok().and_then(|array| array.cast_into::<PyArray2<bool>>().ok());
-    let array = array.filter(|array| array.shape() == [image.height, image.width]).ok_or_else(|| {
-        let expected = format!("an array of shape ({}, {}) and dtype bool", image.height, image.width);
+    let [height, width] = [image.camera.height(), image.camera.width()];
+    let array = array.filter(|array| array.shape() == [height, width]).ok_or_else(|| {
+        let expected = format!("an array of shape ({height}, {width}) and dtype bool");
         wrong_argument(person.py(), "mask", &expected, &found)
     })?;
     let view = array.readonly();

@@ -1,6 +1,6 @@
 //! `Frame`: holds references to the caller's arrays until the step reads them.
 
-use numpy::{PyArray2, PyArray3, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::Aabb;
@@ -9,6 +9,7 @@ use voodoo_core::observation::frame::Ground;
 use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
 use crate::borrowed::{Borrowed, CloudData, ColorArray, ColorData, ColorView, DepthArray, Held, ImageData, SiteData};
+use crate::camera::camera_of;
 use crate::errors::{exception, wrong_argument};
 use crate::sites::PySiteRay;
 
@@ -96,11 +97,8 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
-        let ([height, width], intrinsics) = calibration(camera)?;
-        let rays = match camera.getattr("distorted")?.extract::<bool>()? {
-            true => Some(camera.call_method0("rays")?.cast::<PyArray3<f32>>()?.clone()),
-            false => None,
-        };
+        let camera = camera_of(camera)?;
+        let [height, width] = [camera.height(), camera.width()];
         let py = image.py();
         let wrong = || {
             let found = match image.cast::<PyUntypedArray>() {
@@ -131,10 +129,8 @@ impl PyFrame {
         }
         let data = ImageData {
             pixels,
-            size: [size[0], size[1]],
+            camera,
             metres_per_unit,
-            intrinsics,
-            rays: rays.map(Bound::unbind),
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             weight,
             source: self.source(source),
@@ -153,18 +149,16 @@ impl PyFrame {
         stamp: Option<&Bound<'_, PyAny>>,
         source: &str,
     ) -> PyResult<()> {
-        let (size, intrinsics) = calibration(camera)?;
-        let [height, width] = size;
+        let camera = camera_of(camera)?;
+        let [height, width] = [camera.height(), camera.width()];
         let expected = format!("an array of shape ({height}, {width}, 3) or ({height}, {width}) and dtype uint8");
         unmasked("image", image, "fill it: image.filled(0)")?;
         let (pixels, _) = ColorArray::new(image)
-            .filter(|(_, found)| *found == size)
+            .filter(|(_, found)| *found == [height, width])
             .ok_or_else(|| wrong_argument(image.py(), "image", &expected, image))?;
         let data = ColorData {
             pixels,
-            size,
-            intrinsics,
-            distorted: camera.getattr("distorted")?.extract()?,
+            camera,
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             stamp: stamp.map_or(Ok(self.stamp), arguments::stamp)?,
             source: self.source(source),
@@ -279,16 +273,4 @@ impl PyFrame {
             self.sources
         )
     }
-}
-
-/// Size (rows, columns) and intrinsics of a calibration.
-fn calibration(camera: &Bound<'_, PyAny>) -> PyResult<([usize; 2], [f64; 4])> {
-    let number = |name: &str| camera.getattr(name)?.extract::<f64>();
-    let pixels = |name: &str| camera.getattr(name)?.extract::<usize>();
-    let (Ok(width), Ok(height)) = (pixels("width"), pixels("height")) else {
-        let found = camera.get_type().name()?;
-        let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
-        return Err(exception(camera.py(), "MeasurementError", text));
-    };
-    Ok(([height, width], [number("fx")?, number("fy")?, number("cx")?, number("cy")?]))
 }

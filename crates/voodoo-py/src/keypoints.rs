@@ -8,10 +8,11 @@ use voodoo_sensors::keypoints::{Part, Sensor, Sighting, Told, nearest_person};
 
 use crate::arrays::{PointArray, rows};
 use crate::body_view::rows_of;
+use crate::camera::camera_of;
 use crate::errors::IntoPy;
 use crate::people::TrackedBody;
 use crate::sites::{PySiteGate, PySiteRay, places_of};
-use crate::skin::{before, pairs};
+use crate::skin::before;
 
 type Seen = ((f64, f64), f64);
 /// Site, number and share of each keypoint, spread, and how far it lies behind the surface.
@@ -38,25 +39,25 @@ impl PyKeypointLayout {
     }
 
     /// Number of the person nearest to where the parts are expected.
-    #[pyo3(signature = (people, predicted, *, world_from_sensor, intrinsics, project, least))]
+    #[pyo3(signature = (people, predicted, *, world_from_sensor, camera, least))]
     fn nearest<'py>(
         &self,
         people: Vec<PyReadonlyArray2<'py, f64>>,
         predicted: &Bound<'py, PyAny>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        project: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         least: f64,
     ) -> PyResult<Option<usize>> {
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, intrinsics };
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
-        let (_, expected) = before(&eye, places, project)?;
+        let (_, expected) = before(&eye, places);
         let people = people.iter().map(|keypoints| rows("keypoints", keypoints)).collect::<PyResult<Vec<_>>>()?;
         Ok(nearest_person(people.into_iter(), &self.0, &expected, least))
     }
 
     /// Rays; sites with places and their standard deviations; names of those not seen, and of those that were dropped.
-    #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, intrinsics, lens, noise, place_sigma, least, only, gate, surface, before))]
+    #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, camera, noise, place_sigma, least, only, gate, surface, before))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
         &self,
@@ -66,8 +67,7 @@ impl PyKeypointLayout {
         stamp: f64,
         source: &str,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        lens: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         noise: f64,
         place_sigma: f64,
         least: f64,
@@ -76,17 +76,15 @@ impl PyKeypointLayout {
         surface: Option<&Bound<'py, PyAny>>,
         before: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Observed<'py>> {
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, intrinsics };
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
         let seen: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
         let pixels: Vec<[f64; 2]> = seen.iter().map(|seen| seen.map_or([f64::NAN; 2], |seen| seen.pixel)).collect();
-        let flat = match lens {
-            Some(lens) => pairs(lens, &pixels)?,
-            None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),
-        };
+        let flat = pixels.iter().map(|pixel| eye.undistorted(*pixel));
         let (places, mut gate) = (self.places(predicted)?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for ((part, seen), (flat, place)) in self.0.iter().zip(seen).zip(flat.into_iter().zip(places)) {
+        for ((part, seen), (flat, place)) in self.0.iter().zip(seen).zip(flat.zip(places)) {
             let Some(seen) = seen else {
                 unseen.push(part.site.clone());
                 continue;

@@ -13,6 +13,7 @@ mod arrays;
 mod body;
 mod body_view;
 mod borrowed;
+mod camera;
 mod config;
 #[cfg(feature = "detect")]
 mod detect;
@@ -39,6 +40,8 @@ mod _core {
     use super::body::PyBody;
     #[pymodule_export]
     use super::body_view::{PyBodyView, PyStillDepth, body_view};
+    #[pymodule_export]
+    use super::camera::PyCamera;
     #[pymodule_export]
     use super::config::config_fields;
     #[cfg(feature = "detect")]

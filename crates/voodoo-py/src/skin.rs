@@ -4,17 +4,17 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::error::TrackError;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::chroma::{CHROMA_BINS, LUMA_BINS};
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::skin::candidates::Candidate;
-use voodoo_sensors::skin::cue::{SkinCue, SkinInput, SkinSettings, Undistort};
+use voodoo_sensors::skin::cue::{SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::rules::Expected;
 use voodoo_sensors::skin::teacher::{Pace, Shown, Teacher};
 
 use crate::arrays::rows;
 use crate::body_view::{PyBodyView, rows_of};
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
@@ -29,34 +29,14 @@ fn told(candidate: &Candidate) -> Place {
     ((u, v), candidate.region, candidate.area, candidate.hand)
 }
 
-fn eye(world_from_sensor: &PyReadonlyArray2<'_, f64>, intrinsics: [f64; 4]) -> PyResult<Eye> {
-    Ok(Eye { world_from_sensor: rows_of("world_from_sensor", world_from_sensor)?, intrinsics })
-}
-
-/// Two columns of what a function of Python makes of some rows.
-pub fn pairs<'py, const N: usize>(function: &Bound<'py, PyAny>, rows: &[[f64; N]]) -> PyResult<Vec<[f64; 2]>> {
-    let py = function.py();
-    let array = PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), N])?;
-    let found: PyReadonlyArray2<'py, f64> = function.call1((array,))?.extract()?;
-    if found.dims() != numpy::Ix2(rows.len(), 2) {
-        let text = format!("lens: expected two columns of {} rows, found {:?}", rows.len(), found.shape());
-        return Err(exception(py, "MeasurementError", text));
-    }
-    Ok(found.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect())
-}
-
 /// Places before a camera, and their pixels.
 type Before = (Vec<[f64; 3]>, Vec<[f64; 2]>);
 
 /// Places of the world before a camera, metres, and their columns and rows; NaN behind it, and where its lens shows nothing.
-pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>, project: Option<&Bound<'_, PyAny>>) -> PyResult<Before> {
+pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> Before {
     let inside: Vec<[f64; 3]> = places.map(|place| eye.in_sensor(place).to_array()).collect();
-    let pixel = |place: &[f64; 3]| if place[2] > 0.0 { eye.pixel(Vec3::from_array(*place)) } else { [f64::NAN; 2] };
-    let pixels = match project {
-        Some(project) => pairs(project, &inside)?,
-        None => inside.iter().map(pixel).collect(),
-    };
-    Ok((inside, pixels))
+    let pixels = inside.iter().map(|place| eye.pixel(Vec3::from_array(*place))).collect();
+    (inside, pixels)
 }
 
 fn image_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<(&'a [[u8; 3]], [usize; 2])> {
@@ -92,7 +72,7 @@ impl PySkinTeacher {
     }
 
     /// Learns colours and background from a picture.
-    #[pyo3(signature = (cue, image, places, *, world_from_sensor, intrinsics, project, half_life, every, settled))]
+    #[pyo3(signature = (cue, image, places, *, world_from_sensor, camera, half_life, every, settled))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn learn<'py>(
         &mut self,
@@ -101,15 +81,15 @@ impl PySkinTeacher {
         image: Option<PyReadonlyArray3<'py, u8>>,
         places: PyReadonlyArray2<'py, f64>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        project: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         half_life: f64,
         every: u32,
         settled: u32,
     ) -> PyResult<()> {
-        let eye = eye(&world_from_sensor, intrinsics)?;
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = rows("places", &places)?.iter().map(|place| Vec3::from_array(*place));
-        let (inside, pixels) = before(&eye, places, project)?;
+        let (inside, pixels) = before(&eye, places);
         let shown = |(site, (place, pixel)): (usize, (&[f64; 3], &[f64; 2]))| {
             let seen = place[2] > 0.1 && pixel.iter().all(|value| value.is_finite());
             let found = cue.cue.assigned.iter().any(|(other, _)| *other == site);
@@ -192,7 +172,7 @@ impl PySkinCue {
 
     /// Finds regions of skin in a picture, follows and names them: of each site that was found its number, a point and the direction
     /// of its ray, its place, and its expected depth.
-    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, intrinsics, lens, body, settled, arm_lost, upper_arm_visible, tracker, others))]
+    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, camera, body, settled, arm_lost, upper_arm_visible, tracker, others))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
         &mut self,
@@ -202,8 +182,7 @@ impl PySkinCue {
         predicted: &Bound<'py, PyAny>,
         stamp: f64,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        lens: Option<Py<PyAny>>,
+        camera: &Bound<'py, PyAny>,
         body: Option<&PyBodyView>,
         settled: bool,
         arm_lost: Vec<bool>,
@@ -236,17 +215,12 @@ impl PySkinCue {
         }
         let (image, size) = image_of(&image)?;
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
-        let look_through = |lens: &Py<PyAny>, pixels: &[[f64; 2]]| {
-            let found = Python::attach(|py| pairs(lens.bind(py), pixels));
-            found.map_err(|error| TrackError::measurement("lens", "two numbers for each pixel", error.to_string()))
-        };
-        let undistort = lens.as_ref().map(|lens| move |pixels: &[[f64; 2]]| look_through(lens, pixels));
+        let camera = camera_of(camera)?;
         let input = SkinInput {
             image,
             size,
             stamp,
-            eye: eye(&world_from_sensor, intrinsics)?,
-            undistort: undistort.as_ref().map(|undistort| undistort as &Undistort),
+            eye: Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera },
             body: body.map(|body| &body.0),
             teacher: &teacher.0,
             settled,

@@ -85,7 +85,7 @@ impl PyTracker {
         let mut colors = Vec::with_capacity(views.len());
         for view in views {
             let name = &frame.sources[usize::from(view.data.source)];
-            if view.data.distorted {
+            if view.data.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
                 return Err(exception(py, "MeasurementError", text));
             }
@@ -203,7 +203,10 @@ impl PyTracker {
         let likely = PyDict::new(py);
         for ((pixels, picture), view) in found.into_iter().zip(&colors).zip(&views) {
             let name = &frame.sources[usize::from(view.data.source)];
-            likely.set_item(name, PyArray1::from_vec(py, pixels).reshape([picture.height, picture.width])?)?;
+            likely.set_item(
+                name,
+                PyArray1::from_vec(py, pixels).reshape([picture.camera.height(), picture.camera.width()])?,
+            )?;
         }
         Ok(likely)
     }

@@ -35,9 +35,8 @@ class DetectorImage:
     Args:
         depth: (H, W) float32 [m] along the optical axis; 0 where nothing returned, and where it is known that what returned is
             not asked for: boxes that were left out, the learnt background, persons who are tracked already.
-        camera: its calibration, without the distortion of its lens.
+        camera: its calibration.
         world_from_sensor: (4, 4) pose of its optical frame (x right, y down, z forward).
-        rays: (H, W, 2) float32, undistorted (x/z, y/z) of every pixel, of a lens with distortion; None: a pinhole camera.
         floor: unit normal (3,) upwards and height along it [m], in the world, if it is known.
         query: "all": everybody; "any" or "new": one person will do; "near": the one at `near`. A detector may always return
             everybody.
@@ -47,20 +46,15 @@ class DetectorImage:
     depth: npt.NDArray[np.float32]
     camera: Camera
     world_from_sensor: npt.NDArray[np.float64]
-    rays: npt.NDArray[np.float32] | None = None
     floor: tuple[Sequence[float], float] | None = None
     query: Literal["all", "any", "new", "near"] = "all"
     near: npt.NDArray[np.float64] | None = None
 
     def points(self) -> npt.NDArray[np.float64]:
         """The point (H, W, 3) of every pixel in the sensor's frame [m]; the origin where depth is 0."""
-        depth = self.depth.astype(np.float64)
-        if self.rays is not None:
-            return np.stack([depth * self.rays[..., 0], depth * self.rays[..., 1], depth], axis=-1)
-        rows, columns = np.indices(depth.shape, dtype=np.float64)
-        camera = self.camera
-        x, y = (columns - camera.cx) / camera.fx, (rows - camera.cy) / camera.fy
-        return np.stack([depth * x, depth * y, depth], axis=-1)
+        depth = self.depth.astype(np.float64)[..., None]
+        rays = np.nan_to_num(self.camera.rays().astype(np.float64))
+        return np.concatenate([depth * rays, depth], axis=-1)
 
     def to_world(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Points (..., 3) [m] of the sensor's frame in the world."""

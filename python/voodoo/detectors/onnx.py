@@ -118,8 +118,7 @@ class OnnxDetector:
             floor = ((sensor_from_world[:3, :3] @ normal).tolist(), height)
         return person_candidates(
             image.depth,
-            intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-            rays=image.rays,
+            camera=camera,
             floor=floor,
             most=self._most,
         )

@@ -44,7 +44,7 @@ impl Body {
         let stretch = Vec3::new(1.0, 1.0, shape.length() / self.limbs[index].shape.length());
         let mut body = self.clone();
         body.limbs[index].shape = shape;
-        body.map_landmarks(index, |_, position| position * stretch);
+        body.map_landmarks(index, |position| position * stretch);
         body.check()?;
         Ok(body)
     }
@@ -58,7 +58,7 @@ impl Body {
         let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
         let Ok(shape) = TaperedEllipticCylinder::new(shape.length(), a0, b0, a1, b1) else { return false };
         self.limbs[limb].shape = shape;
-        self.map_landmarks(limb, |_, position| position - shift);
+        self.map_landmarks(limb, |position| position - shift);
         true
     }
 
@@ -73,10 +73,10 @@ impl Body {
 
     /// Limbs that carry others, left and right together: they have one length.
     pub fn pairs(&self) -> Vec<Pair> {
-        let stem = |index: usize| self.limbs[index].name.trim_start_matches("l_").trim_start_matches("r_");
+        let groups = self.roles.groups();
         let mut pairs: Vec<Pair> = Vec::new();
         for index in (0..self.limbs.len()).filter(|index| self.children(*index).next().is_some()) {
-            match pairs.iter_mut().find(|pair| stem(pair[0]) == stem(index)) {
+            match pairs.iter_mut().find(|pair| groups[pair[0]] == groups[index]) {
                 Some(pair) => pair.push(index),
                 None => pairs.push(vec![index]),
             }
@@ -93,7 +93,7 @@ impl Body {
             return false;
         };
         self.limbs[limb].shape = shape;
-        self.map_landmarks(limb, |_, position| position * Vec3::new(1.0, 1.0, factor));
+        self.map_landmarks(limb, |position| position * Vec3::new(1.0, 1.0, factor));
         true
     }
 
@@ -107,12 +107,11 @@ impl Body {
         sites: Vec<(String, Vec3)>,
     ) -> Result<Self, BodyError> {
         let parent = self.limb_index(parent)?;
-        let mut body = self.clone();
-        let limb = body.limbs.len();
-        body.limbs.push(Limb { name: name.into(), shape, parent: Some((parent, joint)), match_caps: [false, true] });
-        body.sites.extend(sites.into_iter().map(|(name, position)| Site { name, limb, position }));
-        body.check()?;
-        Ok(body)
+        let Self { mut limbs, sites: mut all_sites, .. } = self.clone();
+        let limb = limbs.len();
+        limbs.push(Limb { name: name.into(), shape, parent: Some((parent, joint)), match_caps: [false, true] });
+        all_sites.extend(sites.into_iter().map(|(name, position)| Site { name, limb, position }));
+        Self::new(self.name.clone(), limbs, all_sites)
     }
 
     /// The body without a limb, its sites and all limbs that hang on it, and the indices of the limbs that stay.
@@ -148,9 +147,9 @@ impl Body {
     }
 
     /// Replaces the positions of everything fixed to a limb: its sites and the ellipses of its joints.
-    pub(super) fn map_landmarks(&mut self, limb: usize, mut map: impl FnMut(&str, Vec3) -> Vec3) {
+    pub(super) fn map_landmarks(&mut self, limb: usize, map: impl Fn(Vec3) -> Vec3) {
         for site in self.sites.iter_mut().filter(|site| site.limb == limb) {
-            site.position = map(&site.name, site.position);
+            site.position = map(site.position);
         }
         for (index, other) in self.limbs.iter_mut().enumerate() {
             if let Some((parent, joint)) = &mut other.parent {
@@ -159,7 +158,7 @@ impl Body {
                     (_, true) => &mut joint.limb_from_joint,
                     _ => continue,
                 };
-                ellipse.translation = map(&joint.name, ellipse.translation);
+                ellipse.translation = map(ellipse.translation);
             }
         }
     }

@@ -86,9 +86,8 @@ impl Body {
                 None => (world_from_rest * rest[0], None),
                 Some((parent, joint)) => {
                     let prior = poses[*parent] * joint.parent_from_limb_at_rest();
-                    let measured = positions.iter().find(|(site, _)| body.sites()[*site].name == joint.name);
-                    let centre = measured
-                        .map_or(poses[*parent] * joint.parent_from_joint.translation, |(_, position)| *position);
+                    let centre = measured(body.roles.joint_site(limb), positions)
+                        .unwrap_or_else(|| poses[*parent] * joint.parent_from_joint.translation);
                     (prior, Some((joint.limb_from_joint.translation, centre)))
                 }
             };
@@ -114,32 +113,30 @@ impl Body {
 
     /// Landmarks of a limb, in its frame, that the positions tell, with their measured positions.
     fn known_landmarks(&self, limb: usize, positions: &[(usize, Vec3)]) -> Vec<(Vec3, Vec3)> {
-        let measured = |name: &str| {
-            positions.iter().find(|(site, _)| self.sites()[*site].name == name).map(|(_, position)| *position)
-        };
         let mut pairs: Vec<(Vec3, Vec3)> = Vec::new();
-        let mut add = |name: &str, local: Vec3| {
-            if let Some(position) = measured(name)
+        let mut add = |site: Option<usize>, local: Vec3| {
+            if let Some(position) = measured(site, positions)
                 && !pairs.iter().any(|(known, _)| (*known - local).length() < 1e-9)
             {
                 pairs.push((local, position));
             }
         };
-        for site in self.sites().iter().filter(|site| site.limb == limb) {
-            add(&site.name, site.position);
+        for (index, site) in self.sites().iter().enumerate().filter(|(_, site)| site.limb == limb) {
+            add(Some(index), site.position);
         }
         for (index, other) in self.limbs().iter().enumerate() {
             if let Some((parent, joint)) = &other.parent {
+                let center = self.roles.joint_site(index);
                 if *parent == limb {
-                    add(&joint.name, joint.parent_from_joint.translation);
+                    add(center, joint.parent_from_joint.translation);
                 } else if index == limb {
-                    add(&joint.name, joint.limb_from_joint.translation);
+                    add(center, joint.limb_from_joint.translation);
                 } else if let Some((grandparent, carrier)) = &self.limbs()[*parent].parent
                     && *grandparent == limb
                     && self.carried(*parent)
                 {
                     let limb_from_parent = carrier.parent_from_limb_at_rest();
-                    add(&joint.name, limb_from_parent * joint.parent_from_joint.translation);
+                    add(center, limb_from_parent * joint.parent_from_joint.translation);
                 }
             }
         }
@@ -237,17 +234,15 @@ impl Body {
 
     /// The axis of a hinge at the far end of a limb: in the limb frame, and as the bent child shows it in the world.
     fn hinge_axis(&self, limb: usize, positions: &[(usize, Vec3)]) -> Option<(Vec3, Vec3)> {
-        let (_, own) = self.limbs()[limb].parent.as_ref()?;
-        let measured =
-            |name: &str| positions.iter().find(|(site, _)| self.sites()[*site].name == name).map(|(_, p)| *p);
         for (index, child) in self.limbs().iter().enumerate() {
             let Some((parent, joint)) = &child.parent else { continue };
             if *parent != limb || joint.kind() != JointKind::Hinge {
                 continue;
             }
-            let (start, bend) = (measured(&own.name)?, measured(&joint.name)?);
-            let own = |site: &&crate::body::Site| site.limb == index && site.name != joint.name;
-            let end = self.sites().iter().filter(own).find_map(|site| measured(&site.name));
+            let center = self.roles.joint_site(index);
+            let (start, bend) = (measured(self.roles.joint_site(limb), positions)?, measured(center, positions)?);
+            let own = |site: &usize| self.sites()[*site].limb == index && Some(*site) != center;
+            let end = (0..self.sites().len()).filter(own).find_map(|site| measured(Some(site), positions));
             // Without a site of its own, the joint of what hangs on the child shows where it points: a hand's wrist.
             let end = end.or_else(|| {
                 let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
@@ -291,7 +286,7 @@ impl Body {
         if let Ok(stretched) = stretched {
             self.limbs[limb].shape = stretched;
         }
-        self.map_landmarks(limb, |_, position| {
+        self.map_landmarks(limb, |position| {
             local
                 .iter()
                 .find(|(known, _)| (*known - position).length() < 1e-9)
@@ -362,6 +357,11 @@ impl Body {
             }
         }
     }
+}
+
+/// Where a site was measured.
+fn measured(site: Option<usize>, positions: &[(usize, Vec3)]) -> Option<Vec3> {
+    positions.iter().find(|(measured, _)| Some(*measured) == site).map(|(_, position)| *position)
 }
 
 /// Turns about the limb's own z axis so that `local` points towards `world` as closely as it can.

@@ -8,6 +8,7 @@ pub mod kinematics;
 mod model;
 mod pose_prior;
 mod pose_statistics;
+mod roles;
 pub(crate) mod shoulders;
 pub mod two_bone;
 
@@ -16,10 +17,12 @@ pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 pub use model::Model;
 pub use pose_prior::unusual;
+pub use roles::{JointRole, LimbRole, Roles, Side};
 
 use crate::error::BodyError;
 use crate::math::{Pose, Vec3, is_place, is_rigid};
 use crate::shape::TaperedEllipticCylinder;
+use std::sync::Arc;
 
 /// One rigid part of a body. Its frame has z along the axis of the shape, from the proximal end to the distal one.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,13 +55,15 @@ pub struct Body {
     name: String,
     limbs: Vec<Limb>,
     sites: Vec<Site>,
+    roles: Arc<Roles>,
 }
 
 impl Body {
     /// A body from its parts, checked.
     pub fn new(name: impl Into<String>, limbs: Vec<Limb>, sites: Vec<Site>) -> Result<Self, BodyError> {
-        let body = Self { name: name.into(), limbs, sites };
+        let mut body = Self { name: name.into(), limbs, sites, roles: Arc::default() };
         body.check()?;
+        body.roles = Arc::new(Roles::resolve(&body.name, &body.limbs, &body.sites)?);
         Ok(body)
     }
 
@@ -75,6 +80,11 @@ impl Body {
     /// The sites.
     pub fn sites(&self) -> &[Site] {
         &self.sites
+    }
+
+    /// What its limbs, joints and sites are on a human.
+    pub fn roles(&self) -> &Roles {
+        &self.roles
     }
 
     /// Index of a limb.
@@ -121,10 +131,10 @@ impl Body {
 
     /// Position of a site in the world. A site at the centre of a joint lies midway between the two limbs' ends of it.
     pub fn site_position(&self, world_from_limb: &[Pose], site: usize) -> Vec3 {
-        let site = &self.sites[site];
-        let position = world_from_limb[site.limb].transform_point(site.position);
-        match &self.limbs[site.limb].parent {
-            Some((parent, joint)) if joint.name == site.name => {
+        let Site { limb, position, .. } = self.sites[site];
+        let position = world_from_limb[limb].transform_point(position);
+        match &self.limbs[limb].parent {
+            Some((parent, joint)) if self.roles.joint_site(limb) == Some(site) => {
                 0.5 * (position + world_from_limb[*parent].transform_point(joint.parent_from_joint.translation))
             }
             _ => position,

@@ -4,23 +4,21 @@
 //! Of other bodies nothing is known.
 
 use super::pose_statistics::{MEAN, PRECISION};
-use super::{Body, Joint, JointKind};
+use super::{Body, JointKind, JointRole, Side};
 use crate::body::kinematics::joint_turn;
 use crate::math::{Pose, ShortestAxis};
 
-/// The body whose joints the statistics are of.
-const WHOSE: &str = "human";
 /// The joints, with the first of their components and how many these are: hinges have one.
-const JOINTS: [(&str, usize, usize); 9] = [
-    ("vl3", 0, 3),
-    ("l_shoulder", 3, 3),
-    ("l_elbow", 6, 1),
-    ("r_shoulder", 7, 3),
-    ("r_elbow", 10, 1),
-    ("l_hip", 11, 3),
-    ("l_knee", 14, 1),
-    ("r_hip", 15, 3),
-    ("r_knee", 18, 1),
+const JOINTS: [(JointRole, usize, usize); 9] = [
+    (JointRole::Waist, 0, 3),
+    (JointRole::Shoulder(Side::Left), 3, 3),
+    (JointRole::Elbow(Side::Left), 6, 1),
+    (JointRole::Shoulder(Side::Right), 7, 3),
+    (JointRole::Elbow(Side::Right), 10, 1),
+    (JointRole::Hip(Side::Left), 11, 3),
+    (JointRole::Knee(Side::Left), 14, 1),
+    (JointRole::Hip(Side::Right), 15, 3),
+    (JointRole::Knee(Side::Right), 18, 1),
 ];
 /// Number of components of all joints.
 const SIZE: usize = MEAN.len();
@@ -41,30 +39,27 @@ pub fn unusual(body: &Body, poses: &[Pose]) -> f64 {
 
 /// Calls `take` with the number and the difference from its mean of every component.
 fn each_turn(body: &Body, poses: &[Pose], mut take: impl FnMut(usize, f64)) {
-    if body.name() != WHOSE {
+    let roles = body.roles();
+    if !roles.is_human() {
         return;
     }
     for (limb, part) in body.limbs().iter().enumerate() {
         let Some((parent, joint)) = &part.parent else { continue };
-        let Some(index) = number(joint) else { continue };
-        let (_, first, count) = JOINTS[index];
+        let Some(role) = roles.joint(limb) else { continue };
+        let hinge = joint.kind() == JointKind::Hinge;
+        let known = JOINTS.iter().find(|(known, _, count)| *known == role && hinge == (*count == 1));
+        let Some(&(_, first, count)) = known else { continue };
         let turn = joint_turn(joint, &poses[*parent], &poses[limb]).to_scaled_axis_shortest();
         (0..count).for_each(|k| take(first + k, turn[k] - MEAN[first + k]));
     }
-}
-
-/// The number of a joint among those that the statistics are of.
-fn number(joint: &Joint) -> Option<usize> {
-    let hinge = joint.kind() == JointKind::Hinge;
-    JOINTS.iter().position(|(name, _, count)| *name == joint.name && hinge == (*count == 1))
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::body::HumanModel;
     use crate::body::kinematics::{hinge_axis, place};
+    use crate::body::{HumanModel, Joint};
     use crate::math::{Quat, Vec3};
 
     fn human() -> (Body, Vec<Pose>) {
@@ -73,32 +68,31 @@ mod tests {
         (body, poses)
     }
 
-    fn joint<'a>(body: &'a Body, name: &str) -> (usize, usize, &'a Joint) {
-        let limbs = body.limbs().iter().enumerate();
-        let mut all =
-            limbs.filter_map(|(limb, part)| part.parent.as_ref().map(|(parent, joint)| (limb, *parent, joint)));
-        all.find(|(.., joint)| joint.name == name).unwrap()
+    fn joint(body: &Body, role: JointRole) -> (usize, usize, &Joint) {
+        let limb = body.roles().limb_at(role).unwrap();
+        let (parent, joint) = body.limbs()[limb].parent.as_ref().unwrap();
+        (limb, *parent, joint)
     }
 
     #[test]
     fn left_and_right_are_alike_and_the_mean_costs_nothing() {
         let (body, mut mean) = human();
-        for (name, first, count) in JOINTS {
-            let (limb, parent, joint) = joint(&body, name);
+        for (role, first, count) in JOINTS {
+            let (limb, parent, joint) = joint(&body, role);
             let mut turn = Vec3::ZERO;
             (0..count).for_each(|k| turn[k] = MEAN[first + k]);
             mean[limb] = place(joint, &mean[parent], Quat::from_scaled_axis(turn));
         }
         assert!(unusual(&body, &mean) < 1e-12, "{}", unusual(&body, &mean));
-        let bent = |name: &str| {
+        let bent = |role| {
             let (_, mut poses) = human();
-            let (limb, parent, joint) = joint(&body, name);
+            let (limb, parent, joint) = joint(&body, role);
             poses[limb] = place(joint, &poses[parent], Quat::from_axis_angle(Vec3::X, 1.2));
             unusual(&body, &poses)
         };
-        for name in ["shoulder", "elbow", "hip", "knee"] {
-            let [left, right] = ["l", "r"].map(|side| bent(&format!("{side}_{name}")));
-            assert!((left - right).abs() < 0.01 * left, "{name}: {left} {right}");
+        for role in [JointRole::Shoulder, JointRole::Elbow, JointRole::Hip, JointRole::Knee] {
+            let [left, right] = Side::BOTH.map(|side| bent(role(side)));
+            assert!((left - right).abs() < 0.01 * left, "{:?}: {left} {right}", role(Side::Left));
         }
     }
 
@@ -106,9 +100,9 @@ mod tests {
     fn an_arm_in_the_chest_is_less_usual_than_one_that_hangs() {
         let (body, mut poses) = human();
         let hanging = unusual(&body, &poses);
-        let (limb, parent, shoulder) = joint(&body, "l_shoulder");
+        let (limb, parent, shoulder) = joint(&body, JointRole::Shoulder(Side::Left));
         poses[limb] = place(shoulder, &poses[parent], Quat::from_scaled_axis(Vec3::new(-0.3, 1.2, 0.5)));
-        let (fore, _, elbow) = joint(&body, "l_elbow");
+        let (fore, _, elbow) = joint(&body, JointRole::Elbow(Side::Left));
         poses[fore] = place(elbow, &poses[limb], Quat::from_axis_angle(hinge_axis(elbow), 2.0));
         assert!(unusual(&body, &poses) > hanging + 6.0, "{} {hanging}", unusual(&body, &poses));
     }

@@ -4,35 +4,25 @@
 //! A camera hardly sees a clavicle turn. Held where it was, it leaves the shoulder of an arm that is stretched upwards 8 to 13 cm
 //! too low, and the arm with it.
 
-use super::{Body, Joint};
+use super::Body;
 use crate::math::{Pose, Quat, Vec3};
 
 /// So far does a clavicle turn for an arm that turns by one beyond the horizontal.
 const RHYTHM: f64 = 0.3;
-
-/// Whether it is the joint of a clavicle.
-pub fn carries_shoulder(joint: &Joint) -> bool {
-    joint.name.ends_with("sternoclavicular")
-}
 
 /// Turns the clavicles of `predicted` by what arms have risen beyond the horizontal from `previous` to `current`, or sunk again. The
 /// arms keep their directions, and joints stay closed.
 pub fn raise_shoulders(body: &Body, previous: &[Pose], current: &[Pose], predicted: &mut [Pose]) {
     let limbs = body.limbs();
     let mut raised = false;
-    for (arm, limb) in limbs.iter().enumerate() {
-        // What else somebody has hung on a clavicle is no arm.
-        let Some((clavicle, shoulder)) = limb.parent.as_ref().filter(|(_, joint)| joint.name.ends_with("shoulder"))
-        else {
-            continue;
-        };
-        let Some((trunk, joint)) = limbs[*clavicle].parent.as_ref().filter(|(_, joint)| carries_shoulder(joint)) else {
+    for [clavicle, arm] in body.roles().clavicles() {
+        let (Some((_, shoulder)), Some((trunk, joint))) = (&limbs[*arm].parent, &limbs[*clavicle].parent) else {
             continue;
         };
         let rest = joint.parent_from_limb_at_rest();
         let hanging = rest.rotation * (shoulder.parent_from_limb_at_rest().rotation * Vec3::Z);
         let usual = |poses: &[Pose]| {
-            let along = poses[*trunk].rotation.inverse() * (poses[arm].rotation * Vec3::Z);
+            let along = poses[*trunk].rotation.inverse() * (poses[*arm].rotation * Vec3::Z);
             RHYTHM * (-hanging.dot(along)).clamp(0.0, 1.0).asin()
         };
         let more = usual(current) - usual(previous);

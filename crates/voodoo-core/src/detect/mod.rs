@@ -159,9 +159,11 @@ pub struct Detection {
 impl Detection {
     /// A person with these joints, which span its box, and log odds; nothing else is reported.
     pub fn new(joints: Vec<Option<DetectedJoint>>, person: f64) -> Self {
-        let bounds = Aabb::from_points(joints.iter().flatten().map(|joint| joint.position));
+        let positions = || joints.iter().flatten().map(|joint| joint.position);
         let around = Vec3::splat(AROUND_JOINTS);
-        Self { low: bounds.mins - around, high: bounds.maxs + around, joints, person, ..Self::default() }
+        let low = positions().reduce(Vec3::min).unwrap_or_default() - around;
+        let high = positions().reduce(Vec3::max).unwrap_or_default() + around;
+        Self { low, high, joints, person, ..Self::default() }
     }
 }
 

@@ -179,7 +179,7 @@ mod tests {
         assert!((place(7) - Vec3::new(0.0, 0.9, 1.4)).length() < 1e-12, "the hand goes with the wrist");
         // The right elbow is not reported: the wrist moves with the shoulder.
         assert!((place(8) - Vec3::new(0.0, -0.75, 1.4)).length() < 1e-12);
-        assert_eq!(place(9), Vec3::new(0.0, 0.1, 0.5), "nothing is known of a leg without its hip");
+        assert!((place(9) - Vec3::new(0.0, 0.1, 0.5)).length() < 1e-12, "nothing is known of a leg without its hip");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
-use crate::body::shoulders::{carries_shoulder, raise_shoulders};
+use crate::body::shoulders::raise_shoulders;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 
 /// A motion is taken to go on for at most this many of its own intervals.
@@ -124,7 +124,7 @@ fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predic
                 let before = joint_turn(joint, &previous[*parent], &previous[index]);
                 let now = joint_turn(joint, &current[*parent], &current[index]);
                 // A clavicle moves with its arm.
-                let factor = if carries_shoulder(joint) { 0.0 } else { factor };
+                let factor = if body.roles().is_clavicle(index) { 0.0 } else { factor };
                 place(joint, &predicted[*parent], go_on(before, now, factor))
             }
         };

@@ -23,7 +23,7 @@ impl Backgrounds {
             self.fill();
         }
         self.update(frame, |image: &DepthImage| match expected.searched {
-            Some(_) => (0..0, 0..0),
+            Some(_) => [0..0, 0..0],
             None => image_window(image, &shifted(&image.world_from_sensor, expected.origin), bounds),
         });
     }

@@ -106,9 +106,10 @@ impl Segments {
         for image in frame.images {
             let background = backgrounds.of(image).map_or(&[][..], Background::depth);
             let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
-            let spread = (step * step) as f64 / (image.intrinsics[0] * image.intrinsics[1] * REFERENCE_PATCH);
-            for row in (0..image.height).step_by(step) {
-                for pixel in (row * image.width..(row + 1) * image.width).step_by(step) {
+            let [fx, fy] = image.camera.focal();
+            let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);
+            for row in (0..image.camera.height()).step_by(step) {
+                for pixel in (row * image.camera.width()..(row + 1) * image.camera.width()).step_by(step) {
                     let z = match image.pixels {
                         DepthPixels::U16(pixels) => f32::from(pixels[pixel]),
                         DepthPixels::F32(pixels) => pixels[pixel],

@@ -1,13 +1,11 @@
 //! The colour of somebody's clothes, above and below the waist.
 
-use crate::body::Body;
+use crate::body::{Body, LimbRole};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 use crate::visibility::surface::surface_rows;
 
-/// Limbs that show what is worn above the waist, and below it, by what their names hold.
-const WORN: [&[&str]; 2] = [&["thorax", "upperarm", "torso"], &["thigh", "calf"]];
 /// Where across a limb colours are taken, in shares of its radius from the middle: the rim may show what is behind.
 const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
 /// A depth pixel shows the limb when it lies within this of where the limb's surface is, metres: clothes are thick.
@@ -39,12 +37,12 @@ impl Clothes {
     /// Looks at a posed body, world frame; `own` says of a depth image's number and pixel whether it may be the body's.
     pub(super) fn look(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
         let Self { worn, counts } = self;
-        for (names, histogram) in WORN.iter().zip(worn) {
+        for (half, histogram) in worn.iter_mut().enumerate() {
             counts.clear();
             counts.resize(BINS.iter().product(), 0.0);
             let mut seen = 0;
-            for (limb, pose) in body.limbs().iter().zip(poses) {
-                if !names.iter().any(|name| limb.name.contains(name)) {
+            for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
+                if body.roles().limb(index).and_then(half_of) != Some(half) {
                     continue;
                 }
                 for (number, image) in frame.images.iter().enumerate() {
@@ -80,6 +78,15 @@ impl Clothes {
     }
 }
 
+/// Whether a limb shows what is worn above the waist (0) or below it (1).
+fn half_of(limb: LimbRole) -> Option<usize> {
+    match limb {
+        LimbRole::Thorax | LimbRole::UpperArm(_) => Some(0),
+        LimbRole::Thigh(_) | LimbRole::Calf(_) => Some(1),
+        _ => None,
+    }
+}
+
 impl Histogram {
     fn take(&mut self, counts: &[f32], total: f32) {
         self.shares.resize(counts.len(), 0.0);
@@ -93,7 +100,7 @@ impl Histogram {
 
 /// The point that a depth image shows where a limb's surface is expected, camera frame.
 fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Option<Vec3> {
-    let pixel = pixel_of(image.intrinsics, [image.width, image.height], place)?;
+    let pixel = image.camera.index_of(place)?;
     let z = f64::from(image.pixels.get(pixel)) * image.metres_per_unit;
     ((z - place.z).abs() < SHOWS && own(pixel)).then(|| place * (z / place.z))
 }
@@ -101,15 +108,7 @@ fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Opti
 /// The colour of a place of the world in a picture.
 fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
     let place = picture.world_from_sensor.inverse_transform_point(world);
-    let pixel = pixel_of(picture.intrinsics, [picture.width, picture.height], place)?;
-    Some(picture.pixels.get(pixel))
-}
-
-/// The pixel in which a point of the camera's frame is seen.
-fn pixel_of([fx, fy, cx, cy]: [f64; 4], [width, height]: [usize; 2], point: Vec3) -> Option<usize> {
-    let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
-    let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
-    inside.then(|| v as usize * width + u as usize)
+    Some(picture.pixels.get(picture.camera.index_of(place)?))
 }
 
 /// Counts a colour in the bins about it, by how near it is to their middles.

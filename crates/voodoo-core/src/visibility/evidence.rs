@@ -111,6 +111,7 @@ mod tests {
     use crate::math::{Quat, Vec3};
     use crate::observation::background::Backgrounds;
     use crate::observation::frame::{DepthImage, DepthPixels, Frame};
+    use crate::testing::pinhole;
     use crate::visibility::render::{Rendering, Viewpoint};
 
     const WIDTH: usize = 160;
@@ -120,7 +121,7 @@ mod tests {
     /// What a camera at the origin sees of a body, and `behind` where it sees none of it, millimetres.
     fn shoot(body: &Body, poses: &[Pose], behind: u16) -> Vec<u16> {
         let world_from_sensor = Pose::IDENTITY;
-        let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
+        let view = Viewpoint { camera: pinhole(WIDTH, HEIGHT, INTRINSICS), world_from_sensor };
         let mut image = Rendering::default();
         image.render(body, poses, &view, None).unwrap();
         let millimetres = |depth: &f32| if *depth > 0.0 { (depth * 1000.0).round() as u16 } else { behind };
@@ -131,11 +132,8 @@ mod tests {
     fn seen(pixels: &[u16], body: &Body, poses: &[Pose]) -> Visibility {
         let images = [DepthImage {
             pixels: DepthPixels::U16(pixels),
-            width: WIDTH,
-            height: HEIGHT,
+            camera: pinhole(WIDTH, HEIGHT, INTRINSICS),
             metres_per_unit: 0.001,
-            intrinsics: INTRINSICS,
-            rays: None,
             world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,
@@ -206,11 +204,8 @@ mod tests {
         let pixels = vec![4000_u16; 160 * 120];
         let images = [DepthImage {
             pixels: DepthPixels::U16(&pixels),
-            width: 160,
-            height: 120,
+            camera: pinhole(WIDTH, HEIGHT, INTRINSICS),
             metres_per_unit: 0.001,
-            intrinsics: [140.0, 140.0, 79.5, 59.5],
-            rays: None,
             world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,

@@ -65,9 +65,6 @@ impl SkinSettings {
     }
 }
 
-/// Pixels without the lens, `(x/z, y/z)`; NaN where that is not known.
-pub type Undistort<'a> = dyn Fn(&[[f64; 2]]) -> Result<Vec<[f64; 2]>, TrackError> + Sync + 'a;
-
 /// A picture, and what is known of the body at its time.
 #[derive(Clone, Copy)]
 pub struct SkinInput<'a> {
@@ -78,9 +75,7 @@ pub struct SkinInput<'a> {
     /// Time, seconds.
     pub stamp: f64,
     /// The camera.
-    pub eye: Eye,
-    /// Its lens; none: it does not distort.
-    pub undistort: Option<&'a Undistort<'a>>,
+    pub eye: Eye<'a>,
     /// What a depth camera saw of the body in the picture.
     pub body: Option<&'a Arc<BodyView>>,
     /// What was learnt.
@@ -111,13 +106,8 @@ impl SkinInput<'_> {
     }
 
     /// Unit vectors in the world through the candidates' pixels.
-    fn directions(&self, candidates: &[Candidate]) -> Result<Vec<Vec3>, TrackError> {
-        let pixels = candidates.iter().map(|item| item.pixel);
-        let flat = match self.undistort {
-            Some(undistort) => undistort(&pixels.collect::<Vec<_>>())?,
-            None => pixels.map(|pixel| self.eye.undistorted(pixel)).collect(),
-        };
-        Ok(flat.into_iter().map(|xy| self.eye.direction(xy)).collect())
+    fn directions(&self, candidates: &[Candidate]) -> Vec<Vec3> {
+        candidates.iter().map(|item| self.eye.direction(self.eye.undistorted(item.pixel))).collect()
     }
 
     /// Distances of places from the surfaces of the body's limbs.
@@ -281,7 +271,7 @@ impl SkinCue {
 
     /// The candidates in space, and their depths along the optical axis: as the depth camera has them, else that of the nearest site.
     fn sights(&self, input: &SkinInput, labels: &Labels, nearest: f64) -> Result<(Vec<Sight>, Vec<f64>), TrackError> {
-        let directions = input.directions(&self.candidates)?;
+        let directions = input.directions(&self.candidates);
         let measured = match &self.picture.body {
             Some(body) => {
                 let places: Vec<_> = self.candidates.iter().map(|item| (item.pixel, item.region)).collect();

@@ -21,7 +21,7 @@ from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.people import Followed
 from voodoo.sensors.body_view import BodyView
-from voodoo.sensors.pixels import FloatArray, checked_camera, normalized
+from voodoo.sensors.pixels import FloatArray, checked_camera
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin.regions import Candidate
 from voodoo.sensors.skin.settings import SkinSettings
@@ -163,8 +163,7 @@ class SkinTracker:
             predicted,
             stamp=self._stamp,
             world_from_sensor=pose,
-            intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-            lens=(lambda pixels: normalized(camera, pixels)) if camera.distorted else None,
+            camera=camera,
             body=body,
             settled=self.settled,
             arm_lost=[site in arm_lost for site in self._sites],
@@ -217,8 +216,7 @@ class SkinTracker:
             None if image is self._image else np.ascontiguousarray(image),
             np.array([positions[names.index(site)] if site in names else _NOWHERE for site in self._sites]),
             world_from_sensor=pose,
-            intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-            project=camera.project if camera.distorted else None,
+            camera=camera,
             half_life=self.settings.static_seconds * rate_hz,
             every=self.settings.learn_every,
             settled=self.settings.settled_frames,

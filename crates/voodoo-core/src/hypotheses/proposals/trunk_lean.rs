@@ -216,7 +216,7 @@ impl Propose for TrunkLean {
 mod tests {
     use super::*;
     use crate::association::correspondence::Correspondences;
-    use crate::body::{Body, HumanModel};
+    use crate::body::{Body, HumanModel, LimbRole};
     use crate::config::Config;
     use crate::testing::{depth, turned, with_context};
 
@@ -226,11 +226,11 @@ mod tests {
         let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
         let rest = body.rest_pose(Pose::from_parts(Vec3::ZERO, upright * Quat::from_axis_angle(Vec3::Z, -1.571)));
         let mut poses: Vec<Pose> = Vec::new();
-        for (limb, rest) in body.limbs().iter().zip(&rest) {
-            let angle = match limb.name.as_str() {
-                name if name.ends_with("thigh") => -thigh,
-                name if name.ends_with("calf") => calf,
-                name if name.ends_with("foot") => 0.0,
+        for (index, (limb, rest)) in body.limbs().iter().zip(&rest).enumerate() {
+            let angle = match body.roles().limb(index) {
+                Some(LimbRole::Thigh(_)) => -thigh,
+                Some(LimbRole::Calf(_)) => calf,
+                Some(LimbRole::Foot(_)) => 0.0,
                 _ => bow,
             };
             let rotation = Quat::from_axis_angle(Vec3::X, angle) * rest.rotation;

@@ -1,0 +1,441 @@
+//! What the limbs, joints and sites of a body are on a human, resolved from their names once.
+//!
+//! Names are compared here and nowhere else in the core: the rest asks by index. A body without the names of a human has no roles,
+//! and what needs them stays off.
+
+use super::{Limb, Site};
+use crate::error::BodyError;
+
+/// Side of the body, its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Names that begin with `l_`.
+    Left,
+    /// Names that begin with `r_`.
+    Right,
+}
+
+impl Side {
+    /// Left, right.
+    pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
+}
+
+/// A limb of the human.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimbRole {
+    /// `pelvis`
+    Pelvis,
+    /// `thorax`; or `torso`, the whole trunk.
+    Thorax,
+    /// `neck`
+    Neck,
+    /// `head`
+    Head,
+    /// `l_clavicle`
+    Clavicle(Side),
+    /// `l_upperarm`
+    UpperArm(Side),
+    /// `l_forearm`
+    Forearm(Side),
+    /// `l_hand`
+    Hand(Side),
+    /// `l_thigh`
+    Thigh(Side),
+    /// `l_calf`
+    Calf(Side),
+    /// `l_foot`
+    Foot(Side),
+}
+
+/// A joint of the human, or the site at its center (H-Anim names).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointRole {
+    /// `vl3`
+    Waist,
+    /// `vc7`
+    NeckBase,
+    /// `skullbase`
+    SkullBase,
+    /// `l_sternoclavicular`
+    Sternoclavicular(Side),
+    /// `l_shoulder`
+    Shoulder(Side),
+    /// `l_elbow`
+    Elbow(Side),
+    /// `l_wrist`
+    Wrist(Side),
+    /// `l_hip`
+    Hip(Side),
+    /// `l_knee`
+    Knee(Side),
+    /// `l_ankle`
+    Ankle(Side),
+}
+
+impl LimbRole {
+    fn of(name: &str) -> Option<Self> {
+        let (side, stem) = split(name);
+        Some(match (stem, side) {
+            ("pelvis", None) => Self::Pelvis,
+            ("thorax" | "torso", None) => Self::Thorax,
+            ("neck", None) => Self::Neck,
+            ("head", None) => Self::Head,
+            ("clavicle", Some(side)) => Self::Clavicle(side),
+            ("upperarm", Some(side)) => Self::UpperArm(side),
+            ("forearm", Some(side)) => Self::Forearm(side),
+            ("hand", Some(side)) => Self::Hand(side),
+            ("thigh", Some(side)) => Self::Thigh(side),
+            ("calf", Some(side)) => Self::Calf(side),
+            ("foot", Some(side)) => Self::Foot(side),
+            _ => return None,
+        })
+    }
+
+    /// The side of a limb that there are two of.
+    pub fn side(self) -> Option<Side> {
+        match self {
+            Self::Pelvis | Self::Thorax | Self::Neck | Self::Head => None,
+            Self::Clavicle(side)
+            | Self::UpperArm(side)
+            | Self::Forearm(side)
+            | Self::Hand(side)
+            | Self::Thigh(side)
+            | Self::Calf(side)
+            | Self::Foot(side) => Some(side),
+        }
+    }
+}
+
+impl JointRole {
+    fn of(name: &str) -> Option<Self> {
+        let (side, stem) = split(name);
+        Some(match (stem, side) {
+            ("vl3", None) => Self::Waist,
+            ("vc7", None) => Self::NeckBase,
+            ("skullbase", None) => Self::SkullBase,
+            ("sternoclavicular", Some(side)) => Self::Sternoclavicular(side),
+            ("shoulder", Some(side)) => Self::Shoulder(side),
+            ("elbow", Some(side)) => Self::Elbow(side),
+            ("wrist", Some(side)) => Self::Wrist(side),
+            ("hip", Some(side)) => Self::Hip(side),
+            ("knee", Some(side)) => Self::Knee(side),
+            ("ankle", Some(side)) => Self::Ankle(side),
+            _ => return None,
+        })
+    }
+
+    /// The side of a joint that there are two of.
+    pub fn side(self) -> Option<Side> {
+        match self {
+            Self::Waist | Self::NeckBase | Self::SkullBase => None,
+            Self::Sternoclavicular(side)
+            | Self::Shoulder(side)
+            | Self::Elbow(side)
+            | Self::Wrist(side)
+            | Self::Hip(side)
+            | Self::Knee(side)
+            | Self::Ankle(side) => Some(side),
+        }
+    }
+
+    /// The joint of the same arm or leg that comes before it, and what that asks of a body.
+    fn after(self) -> Option<(Self, &'static str)> {
+        match self {
+            Self::Shoulder(side) => {
+                Some((Self::Sternoclavicular(side), "a shoulder beyond the sternoclavicular joint of its side"))
+            }
+            Self::Elbow(side) => Some((Self::Shoulder(side), "an elbow beyond the shoulder of its side")),
+            Self::Wrist(side) => Some((Self::Elbow(side), "a wrist beyond the elbow of its side")),
+            Self::Knee(side) => Some((Self::Hip(side), "a knee beyond the hip of its side")),
+            Self::Ankle(side) => Some((Self::Knee(side), "an ankle beyond the knee of its side")),
+            _ => None,
+        }
+    }
+}
+
+/// What the limbs, joints and sites of a body are on a human. It follows from their names; sizes do not change it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Roles {
+    human: bool,
+    /// Limb by limb: what it is, what the joint to its parent is, and the site named like that joint.
+    limbs: Vec<Option<LimbRole>>,
+    joints: Vec<Option<JointRole>>,
+    joint_sites: Vec<Option<usize>>,
+    groups: Vec<u16>,
+    /// Site by site.
+    sites: Vec<Option<JointRole>>,
+    /// Pairs of a clavicle and the upper arm that it carries.
+    clavicles: Vec<[usize; 2]>,
+}
+
+impl Roles {
+    /// Resolves the names of a body whose parents stand before their children.
+    ///
+    /// # Errors
+    /// [`BodyError::Value`] when a limb and its joint are named after different sides, or when an arm's or a leg's joint does
+    /// not follow the one before it: detections and statistics of human joints would be taken for the wrong limbs.
+    pub(super) fn resolve<'a>(body: &str, limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
+        let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
+        let site = |name: &str| sites.iter().position(|site| site.name == name);
+        let mut roles = Self {
+            human: body == "human",
+            limbs: limbs.iter().map(|limb| LimbRole::of(&limb.name)).collect(),
+            joints: limbs.iter().map(|limb| joint_name(limb).and_then(JointRole::of)).collect(),
+            joint_sites: limbs.iter().map(|limb| joint_name(limb).and_then(site)).collect(),
+            groups: groups(limbs),
+            sites: sites.iter().map(|site| JointRole::of(&site.name)).collect(),
+            clavicles: Vec::new(),
+        };
+        roles.check(limbs, sites)?;
+        for (limb, description) in limbs.iter().enumerate() {
+            // What else somebody has hung on a clavicle is no arm.
+            if let (Some((parent, _)), Some(JointRole::Shoulder(_))) = (&description.parent, roles.joint(limb))
+                && roles.is_clavicle(*parent)
+            {
+                roles.clavicles.push([*parent, limb]);
+            }
+        }
+        Ok(roles)
+    }
+
+    fn check(&self, limbs: &[Limb], sites: &[Site]) -> Result<(), BodyError> {
+        let parent = |limb: usize| limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
+        let opposite = |limb: usize, role: JointRole| {
+            let sides = self.limb(limb).and_then(LimbRole::side).zip(role.side());
+            sides.is_some_and(|(own, other)| own != other)
+        };
+        for (index, limb) in limbs.iter().enumerate() {
+            let (Some((hangs_on, joint)), Some(role)) = (&limb.parent, self.joints[index]) else { continue };
+            let wrong = |expected, found| {
+                Err(BodyError::Value { key: format!("limbs.{}.joint.name", limb.name), expected, found })
+            };
+            if opposite(index, role) {
+                return wrong("a joint of the limb's own side", joint.name.clone());
+            }
+            // A second joint of the same name is something else that hangs there.
+            let Some((before, expected)) = role.after().filter(|_| self.limb_at(role) == Some(index)) else { continue };
+            let Some(before) = self.limb_at(before) else { continue };
+            if !std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before) {
+                return wrong(expected, format!("{} on {}", joint.name, limbs[*hangs_on].name));
+            }
+        }
+        for (site, role) in sites.iter().zip(&self.sites) {
+            if role.is_some_and(|role| opposite(site.limb, role)) {
+                return Err(BodyError::Value {
+                    key: format!("sites.{}.limb", site.name),
+                    expected: "a limb of the site's own side",
+                    found: limbs[site.limb].name.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the body is said to be a human: statistics of human poses hold for it.
+    pub fn is_human(&self) -> bool {
+        self.human
+    }
+
+    /// What a limb is.
+    pub fn limb(&self, limb: usize) -> Option<LimbRole> {
+        self.limbs.get(limb).copied().flatten()
+    }
+
+    /// What the joint between a limb and its parent is.
+    pub fn joint(&self, limb: usize) -> Option<JointRole> {
+        self.joints.get(limb).copied().flatten()
+    }
+
+    /// The limb that hangs by a joint; the first of several.
+    pub fn limb_at(&self, joint: JointRole) -> Option<usize> {
+        self.joints.iter().position(|role| *role == Some(joint))
+    }
+
+    /// The site at a joint's center.
+    pub fn site_at(&self, joint: JointRole) -> Option<usize> {
+        self.sites.iter().position(|role| *role == Some(joint))
+    }
+
+    /// The site at the center of the joint between a limb and its parent, whatever they are: the one of the joint's name.
+    pub fn joint_site(&self, limb: usize) -> Option<usize> {
+        self.joint_sites.get(limb).copied().flatten()
+    }
+
+    /// Whether a limb hangs by a sternoclavicular joint.
+    pub fn is_clavicle(&self, limb: usize) -> bool {
+        matches!(self.joint(limb), Some(JointRole::Sternoclavicular(_)))
+    }
+
+    /// Pairs of a clavicle and the upper arm on it.
+    pub fn clavicles(&self) -> &[[usize; 2]] {
+        &self.clavicles
+    }
+
+    /// A number for each limb, the same for a limb and its counterpart on the other side; counted from 0, in any body.
+    pub fn groups(&self) -> &[u16] {
+        &self.groups
+    }
+}
+
+/// A name's side, and the rest of it.
+fn split(name: &str) -> (Option<Side>, &str) {
+    match (name.strip_prefix("l_"), name.strip_prefix("r_")) {
+        (Some(stem), _) => (Some(Side::Left), stem),
+        (_, Some(stem)) => (Some(Side::Right), stem),
+        _ => (None, name),
+    }
+}
+
+/// Numbers of the limbs' names without their sides.
+fn groups<'a>(limbs: &'a [Limb]) -> Vec<u16> {
+    let mut stems: Vec<&str> = Vec::new();
+    let number = |limb: &'a Limb| {
+        let own = split(&limb.name).1;
+        let known = stems.iter().position(|stem| *stem == own);
+        known.unwrap_or_else(|| {
+            stems.push(own);
+            stems.len() - 1
+        }) as u16
+    };
+    limbs.iter().map(number).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::{Body, HumanModel, Joint};
+    use crate::math::{Pose, Vec3};
+    use crate::shape::TaperedEllipticCylinder;
+
+    fn human(model: HumanModel) -> Body {
+        Body::human(1.75, model).unwrap()
+    }
+
+    /// A chain of limbs: their names, the names of the joints to the limb before, and sites in the middle of those joints.
+    fn chain(names: &[[&str; 2]]) -> Result<Body, BodyError> {
+        let shape = TaperedEllipticCylinder::new(0.3, 0.05, 0.05, 0.05, 0.05).unwrap();
+        let joint = |name: &str| Joint {
+            name: name.into(),
+            parent_from_joint: Pose::IDENTITY,
+            limb_from_joint: Pose::IDENTITY,
+            semi_axes: [0.0; 2],
+            weight: 1.0,
+            limits: None,
+            motion: 0.3,
+        };
+        let limb = |(index, [name, by]): (usize, &[&str; 2])| Limb {
+            name: (*name).into(),
+            shape,
+            parent: (index > 0).then(|| (index - 1, joint(by))),
+            match_caps: [true; 2],
+        };
+        let site = |(limb, [_, by]): (usize, &[&str; 2])| Site { name: (*by).into(), limb, position: Vec3::ZERO };
+        let sites = names.iter().enumerate().skip(1).map(site).collect();
+        Body::new("thing", names.iter().enumerate().map(limb).collect(), sites)
+    }
+
+    #[test]
+    fn every_limb_and_joint_of_the_human_has_a_role() {
+        for (model, carrier) in [(HumanModel::Full, "l_clavicle"), (HumanModel::Papers, "torso")] {
+            let body = human(model);
+            let roles = body.roles();
+            assert!(roles.is_human());
+            for (limb, description) in body.limbs().iter().enumerate() {
+                assert!(roles.limb(limb).is_some(), "{}", description.name);
+                let Some((_, joint)) = &description.parent else { continue };
+                assert_eq!(roles.limb_at(roles.joint(limb).unwrap()), Some(limb), "{}", joint.name);
+            }
+            let name = |limb: Option<usize>| body.limbs()[limb.unwrap()].name.as_str();
+            assert_eq!(name(roles.limb_at(JointRole::Elbow(Side::Left))), "l_forearm");
+            let upper_arm = roles.limb_at(JointRole::Shoulder(Side::Left)).unwrap();
+            assert_eq!(roles.limb(upper_arm), Some(LimbRole::UpperArm(Side::Left)));
+            assert_eq!(name(body.limbs()[upper_arm].parent.as_ref().map(|(parent, _)| *parent)), carrier);
+            for side in Side::BOTH {
+                for joint in [JointRole::Shoulder, JointRole::Elbow, JointRole::Hip, JointRole::Knee].map(|of| of(side))
+                {
+                    let limb = roles.limb_at(joint).unwrap();
+                    assert_eq!(roles.joint_site(limb), roles.site_at(joint));
+                    assert_eq!(body.sites()[roles.site_at(joint).unwrap()].limb, limb);
+                }
+                assert!(
+                    roles.site_at(JointRole::Wrist(side)).is_some() && roles.site_at(JointRole::Ankle(side)).is_some()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_full_human_raises_two_clavicles_and_that_of_the_papers_none() {
+        let body = human(HumanModel::Full);
+        let named = body.roles().clavicles().iter().map(|pair| pair.map(|limb| body.limbs()[limb].name.as_str()));
+        assert_eq!(named.collect::<Vec<_>>(), [["l_clavicle", "l_upperarm"], ["r_clavicle", "r_upperarm"]]);
+        assert!(human(HumanModel::Papers).roles().clavicles().is_empty());
+    }
+
+    #[test]
+    fn the_two_of_a_pair_are_one_group_and_numbers_leave_no_gap() {
+        let body = human(HumanModel::Full);
+        let groups = body.roles().groups();
+        let of = |name: &str| groups[body.limb_index(name).unwrap()];
+        assert_eq!([of("l_calf"), of("l_hand")], [of("r_calf"), of("r_hand")]);
+        assert_ne!(of("l_calf"), of("l_thigh"));
+        // Four limbs of the trunk and the head, and seven on each side.
+        assert_eq!((groups.len(), groups.iter().max()), (18, Some(&10)));
+    }
+
+    #[test]
+    fn a_lamp_has_no_roles_but_its_joints_have_sites() {
+        let lamp = chain(&[["foot", ""], ["lower_arm", "ankle"], ["upper_arm", "elbow"], ["shade", "ball"]]).unwrap();
+        let roles = lamp.roles();
+        assert!(!roles.is_human() && roles.clavicles().is_empty());
+        assert!((0..4).all(|limb| roles.limb(limb).is_none() && roles.joint(limb).is_none()));
+        assert_eq!([0, 1, 2, 3].map(|limb| roles.joint_site(limb)), [None, Some(0), Some(1), Some(2)]);
+        assert_eq!(roles.groups(), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn a_body_with_one_arm_has_the_roles_of_that_arm() {
+        let (body, _) = human(HumanModel::Full).without_limb("r_upperarm").unwrap();
+        let roles = body.roles();
+        assert_eq!(roles.limb_at(JointRole::Elbow(Side::Right)), None);
+        assert_eq!(roles.site_at(JointRole::Wrist(Side::Right)), None);
+        assert_eq!(roles.clavicles().len(), 1);
+        let hand = roles.limb_at(JointRole::Wrist(Side::Left)).unwrap();
+        assert_eq!(body.limbs()[hand].name, "l_hand");
+        let leg = roles.site_at(JointRole::Knee(Side::Right)).unwrap();
+        assert_eq!(body.sites()[leg].name, "r_knee");
+    }
+
+    #[test]
+    fn what_is_added_has_its_role_and_a_second_joint_of_a_name_takes_none_away() {
+        let body = human(HumanModel::Full);
+        let hand = body.limb_index("r_hand").unwrap();
+        let joint = body.limbs()[hand].parent.as_ref().unwrap().1.clone();
+        let body = body.with_limb("racket", "l_hand", body.limbs()[hand].shape, joint, Vec::new()).unwrap();
+        assert_eq!(body.roles().limb_at(JointRole::Wrist(Side::Right)), Some(hand));
+        assert_eq!(body.roles().limb(body.limbs().len() - 1), None);
+    }
+
+    #[test]
+    fn a_body_that_is_named_wrongly_is_refused() {
+        let refused = |names: &[[&str; 2]]| chain(names).unwrap_err().to_string();
+        assert_eq!(
+            refused(&[["torso", ""], ["l_upperarm", "l_shoulder"], ["r_forearm", "l_elbow"]]),
+            "limbs.r_forearm.joint.name: expected a joint of the limb's own side, found l_elbow"
+        );
+        assert_eq!(
+            refused(&[["torso", ""], ["low", "l_elbow"], ["high", "l_shoulder"]]),
+            "limbs.low.joint.name: expected an elbow beyond the shoulder of its side, found l_elbow on torso"
+        );
+        // Without its shoulder, an elbow may be anywhere.
+        assert!(chain(&[["torso", ""], ["low", "l_elbow"], ["high", "r_shoulder"]]).is_ok());
+        let body = human(HumanModel::Papers);
+        let mut sites = body.sites().to_vec();
+        sites[body.site_index("l_knee").unwrap()].limb = body.limb_index("r_calf").unwrap();
+        assert_eq!(
+            Body::new("human", body.limbs().to_vec(), sites).unwrap_err().to_string(),
+            "sites.l_knee.limb: expected a limb of the site's own side, found r_calf"
+        );
+    }
+}
