@@ -5,7 +5,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use voodoo_core::math::{Points, Pose, Vec3};
-use voodoo_core::shape::{SurfaceBatch, TaperedEllipticCylinder};
+use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 const POINTS: usize = 2000;
 

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use voodoo_core::Body;
-use voodoo_core::body::HumanModel;
-use voodoo_core::detect::{Detect, DetectionQuery, Surroundings};
+use voodoo_core::HumanModel;
+use voodoo_core::{Detect, DetectionQuery, Surroundings};
 use voodoo_detect::Detector;
 
 #[path = "../crates/voodoo-core/tests/scene/mod.rs"]

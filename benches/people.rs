@@ -7,10 +7,10 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use voodoo_core::body::HumanModel;
+use voodoo_core::Frame;
+use voodoo_core::HumanModel;
+use voodoo_core::Options;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::Frame;
-use voodoo_core::people::Options;
 use voodoo_core::{Body, Config, People};
 use voodoo_detect::Detector;
 

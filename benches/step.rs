@@ -9,11 +9,11 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use voodoo_core::body::HumanModel;
-use voodoo_core::config::SolverKind;
+use voodoo_core::HumanModel;
+use voodoo_core::SolverKind;
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{Cloud, DepthImage, Frame};
 use voodoo_core::{Body, Config, Tracker};
+use voodoo_core::{Cloud, DepthImage, Frame};
 use voodoo_detect::Detector;
 
 #[path = "../crates/voodoo-core/tests/scene/mod.rs"]

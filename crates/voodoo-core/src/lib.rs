@@ -53,35 +53,58 @@
 //! Robots, New Developments", 2007). [`Tracker::step`] reads like the list in K06 IV-B. The modules are its stages;
 //! the order in which they may use each other is in ARCHITECTURE.md.
 
-pub mod association;
-pub mod body;
-pub mod camera;
-pub mod config;
-pub mod detect;
-pub mod error;
-pub mod fit;
-pub mod hypotheses;
+mod association;
+mod body;
+mod camera;
+mod config;
+mod detect;
+mod error;
+mod fit;
+mod hypotheses;
 pub mod math;
-pub mod observation;
-pub mod people;
-pub mod regions;
-pub mod relocalize;
-pub mod shape;
-pub mod sizes;
-pub mod solver;
-pub mod terms;
+mod observation;
+mod people;
+mod regions;
+mod relocalize;
+mod shape;
+mod sizes;
+mod solver;
+mod terms;
 #[cfg(test)]
 mod testing;
-pub mod tracker;
-pub mod uncertainty;
-pub mod visibility;
+mod tracker;
+mod uncertainty;
+mod visibility;
 
-pub use body::Body;
-pub use camera::Camera;
-pub use config::Config;
+// The unit tests name the crate as any other program does.
+#[cfg(test)]
+extern crate self as voodoo_core;
+
+#[cfg(test)]
+#[path = "../tests/internal/mod.rs"]
+mod internal;
+
+/// Motions of rigid bodies and joints.
+pub mod kinematics {
+    pub use crate::body::kinematics::{exp, hinge_axis, joint_turn, place};
+}
+
+pub use body::{Body, HumanModel, Joint, JointKind, Limb, Site};
+pub use camera::{Camera, Lens};
+pub use config::{Config, Overlap, RawValue, SolverKind, Value};
+pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 pub use error::{BodyError, CameraError, ConfigError, TrackError};
-pub use observation::frame::Frame;
-pub use people::People;
-pub use shape::TaperedEllipticCylinder;
+pub use observation::frame::{
+    Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
+};
+pub use observation::picture::{ColorImage, ColorPixels};
+pub use observation::sites::{SiteGate, SiteRay};
+pub use people::{Options, People};
+pub use regions::RegionLine;
+pub use shape::ray::RayHit;
+pub use shape::{Region, ShapeError, SurfaceBatch, TaperedEllipticCylinder};
 pub use tracker::Tracker;
-pub use tracker::estimate::{Estimate, Status};
+pub use tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
+pub use tracker::expected::LimbMotion;
+pub use uncertainty::Covariances;
+pub use visibility::render::{NO_LIMB, Rendering, Viewpoint};

@@ -17,9 +17,6 @@ mod render;
 mod shape_batch;
 mod shape_closest;
 mod shape_ray;
-mod status;
-mod terms;
-mod tree;
 
 use voodoo_core::{Body, Config, TrackError, Tracker};
 

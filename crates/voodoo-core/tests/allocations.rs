@@ -7,12 +7,12 @@ mod scene;
 
 use counting::allocations_so_far;
 
-use voodoo_core::body::HumanModel;
+use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{Frame, PositionRelation, RayRelation};
-use voodoo_core::people;
-use voodoo_core::visibility::render::{Rendering, Viewpoint};
-use voodoo_core::{Body, Config, People, Tracker};
+
+use voodoo_core::{Body, Config, Options, People, Tracker};
+use voodoo_core::{Frame, PositionRelation, RayRelation};
+use voodoo_core::{Rendering, Viewpoint};
 
 const WARM_UP: usize = 26;
 const COUNTED: usize = 60;
@@ -61,7 +61,7 @@ fn people_allocations() -> [usize; 2] {
     let camera = scene::DepthCamera { width: 160, height: 124, focal: 110.0 };
     let mut noise = scene::Noise(3);
     let mut pixels = vec![u16::MAX; 160 * 124];
-    let mut people = People::new(body.clone(), Config::default(), people::Options::default()).unwrap();
+    let mut people = People::new(body.clone(), Config::default(), Options::default()).unwrap();
     for aside in [-0.6, 0.6] {
         let shift = Vec3::new(0.3, aside, 0.0);
         let place = |pose: &Pose| Pose::from_parts(pose.translation + shift, pose.rotation);

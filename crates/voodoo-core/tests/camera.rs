@@ -2,8 +2,8 @@
 
 use crate::scene::Noise;
 use voodoo_core::CameraError;
-use voodoo_core::camera::{Camera, Lens};
 use voodoo_core::math::Vec3;
+use voodoo_core::{Camera, Lens};
 
 /// An Azure Kinect's depth camera.
 const AZURE: [f64; 8] = [

@@ -2,19 +2,19 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::scene;
-use voodoo_core::body::HumanModel;
-use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::DepthImage;
+use voodoo_core::HumanModel;
+use voodoo_core::Options;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::DepthImage;
-use voodoo_core::people::Options;
 use voodoo_core::{Body, Config, Frame, People, Status, Tracker};
+use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };
 const FIVE: [&str; 5] = ["humanoid_root", "l_shoulder", "r_shoulder", "l_ankle", "r_ankle"];
 
 /// Sees persons where it is told, if the image shows anything there.
 #[derive(Clone, Debug, Default)]
-pub struct Fixed {
+pub(crate) struct Fixed {
     pub joints: Vec<String>,
     pub lengths: Vec<String>,
     pub found: Vec<(Vec3, Detection)>,
@@ -23,7 +23,7 @@ pub struct Fixed {
 
 impl Fixed {
     /// Sees nobody.
-    pub fn of(joints: &[&str]) -> Self {
+    pub(crate) fn of(joints: &[&str]) -> Self {
         Self { joints: joints.iter().map(|name| (*name).to_owned()).collect(), ..Self::default() }
     }
 

@@ -2,9 +2,9 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::scene;
-use voodoo_core::body::HumanModel;
-use voodoo_core::config::Overlap;
-use voodoo_core::observation::frame::Frame;
+use voodoo_core::Frame;
+use voodoo_core::HumanModel;
+use voodoo_core::Overlap;
 use voodoo_core::{Body, Config};
 
 fn run(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> Vec<Vec<u64>> {

@@ -7,15 +7,13 @@
 use crate::scene;
 use std::time::{Duration, Instant};
 
-use voodoo_core::body::{HumanModel, Joint, Limb, Site};
-use voodoo_core::camera::{Camera, Lens};
-use voodoo_core::config::RawValue;
+use voodoo_core::RawValue;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{
-    Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
-};
-use voodoo_core::visibility::render::{Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Estimate, Status, TaperedEllipticCylinder, Tracker};
+use voodoo_core::{Camera, Lens};
+use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope};
+use voodoo_core::{HumanModel, Joint, Limb, Site};
+use voodoo_core::{Rendering, Viewpoint};
 
 /// Cases when nobody says how many: a few seconds.
 const CASES: u64 = 6_000;

@@ -3,12 +3,12 @@
 
 use crate::scene;
 use proptest::prelude::*;
-use voodoo_core::body::kinematics::{hinge_axis, joint_turn, place};
-use voodoo_core::body::{HumanModel, Joint};
-use voodoo_core::config::SolverKind;
+use voodoo_core::SolverKind;
+use voodoo_core::kinematics::{hinge_axis, joint_turn, place};
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{Cloud, Frame, PositionRelation, RayRelation, Scope};
 use voodoo_core::{Body, Config, Status, TaperedEllipticCylinder, Tracker};
+use voodoo_core::{Cloud, Frame, PositionRelation, RayRelation, Scope};
+use voodoo_core::{HumanModel, Joint};
 
 fn human() -> Body {
     Body::human(1.75, HumanModel::Papers).unwrap()

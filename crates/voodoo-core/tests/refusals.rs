@@ -3,14 +3,12 @@
 
 use crate::detection::Fixed;
 use crate::scene;
-use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
-use voodoo_core::camera::Camera;
-use voodoo_core::config::{RawValue, Value};
+use voodoo_core::Camera;
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{
-    Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
-};
 use voodoo_core::{Body, BodyError, Config, ConfigError, Status, TaperedEllipticCylinder, TrackError, Tracker};
+use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope};
+use voodoo_core::{HumanModel, Joint, JointKind, Limb, Site};
+use voodoo_core::{RawValue, Value};
 
 fn started() -> (Tracker, Vec<[f64; 3]>) {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();

@@ -3,12 +3,12 @@
 
 use crate::color_scene;
 use color_scene::{CAMERAS, HEIGHT, WIDTH, depth_of, depth_picture, picture, shoot, standing, world_from_camera};
-use voodoo_core::body::HumanModel;
-use voodoo_core::camera::{Camera, Lens};
+use voodoo_core::HumanModel;
+use voodoo_core::LimbStatus;
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::observation::picture::{ColorImage, ColorPixels};
-use voodoo_core::tracker::estimate::LimbStatus;
 use voodoo_core::{Body, Config, Estimate, Frame, Status, Tracker};
+use voodoo_core::{Camera, Lens};
+use voodoo_core::{ColorImage, ColorPixels};
 
 const STEP: Vec3 = Vec3::new(0.02, 0.01, 0.0);
 const FRAMES: usize = 8;

@@ -2,9 +2,9 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::scene;
-use voodoo_core::body::HumanModel;
+use voodoo_core::Frame;
+use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::observation::frame::Frame;
 use voodoo_core::{Body, Config, Estimate, Status};
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };

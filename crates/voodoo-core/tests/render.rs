@@ -4,12 +4,12 @@
 use crate::scene;
 use crate::shape_support;
 use shape_support::{Random, hostile, inside, limb_like, random_shape};
-use voodoo_core::body::{HumanModel, Joint, Limb};
-use voodoo_core::camera::Lens;
+use voodoo_core::Lens;
+use voodoo_core::TaperedEllipticCylinder;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::shape::TaperedEllipticCylinder;
-use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
 use voodoo_core::{Body, Camera};
+use voodoo_core::{HumanModel, Joint, Limb};
+use voodoo_core::{NO_LIMB, Rendering, Viewpoint};
 
 fn camera(width: usize, height: usize, focal: f64) -> Viewpoint<'static> {
     let intrinsics = [focal, 1.1 * focal, 0.48 * width as f64, 0.53 * height as f64];

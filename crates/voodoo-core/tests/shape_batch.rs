@@ -4,7 +4,7 @@
 use crate::shape_support;
 use shape_support::{Random, brute_force, hostile, limb_like, random_shape, shape};
 use voodoo_core::math::{Points, Pose, Vec3};
-use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};
+use voodoo_core::{Region, SurfaceBatch, TaperedEllipticCylinder};
 
 const TOLERANCE: f64 = 1e-6;
 

@@ -5,7 +5,7 @@ use crate::shape_support;
 use proptest::prelude::*;
 use shape_support::{Random, brute_force, hostile, inside, limb_like, random_shape, shape};
 use voodoo_core::math::Vec3;
-use voodoo_core::shape::{Region, ShapeError, TaperedEllipticCylinder};
+use voodoo_core::{Region, ShapeError, TaperedEllipticCylinder};
 
 const TOLERANCE: f64 = 1e-6;
 

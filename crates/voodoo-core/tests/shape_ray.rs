@@ -4,7 +4,7 @@
 use crate::shape_support;
 use shape_support::{Random, brute_force, hostile, inside, limb_like, random_shape, shape, surface_point};
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::shape::{Region, TaperedEllipticCylinder};
+use voodoo_core::{Region, TaperedEllipticCylinder};
 
 /// The first stretch of a dense march that goes from outside to inside.
 fn march(shape: &TaperedEllipticCylinder, origin: Vec3, direction: Vec3, max: f64, step: f64) -> Option<f64> {

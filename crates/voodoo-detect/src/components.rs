@@ -378,7 +378,7 @@ fn unlikely(candidate: &Candidate) -> f64 {
 mod tests {
     use super::*;
     use crate::testing::{before_wall, image, put_board, standing};
-    use voodoo_core::detect::Surroundings;
+    use voodoo_core::Surroundings;
 
     /// What may be a person in an image of the unit tests' camera.
     fn candidates(pixels: &[u16]) -> Vec<Candidate> {

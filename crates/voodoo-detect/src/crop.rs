@@ -83,9 +83,9 @@ mod tests {
     use super::*;
     use crate::segmentation::Segmentation;
     use crate::testing::{before_wall, image, standing};
-    use voodoo_core::detect::Surroundings;
+    use voodoo_core::DepthImage;
+    use voodoo_core::Surroundings;
     use voodoo_core::math::{Pose, Quat};
-    use voodoo_core::observation::frame::DepthImage;
 
     #[test]
     fn places_of_the_picture_are_where_the_camera_saw_them() {

@@ -1,8 +1,8 @@
 //! The floor in a depth image where nobody told it: the plane with the most points that has hardly any below it.
 
 use crate::view::View;
+use voodoo_core::Ground;
 use voodoo_core::math::{LANES, Vec3};
-use voodoo_core::observation::frame::Ground;
 
 /// Points that are looked at, about.
 const FLOOR_SAMPLES: usize = 1200;
@@ -180,9 +180,9 @@ impl Draw {
 mod tests {
     use super::*;
     use voodoo_core::Camera;
-    use voodoo_core::detect::Surroundings;
+    use voodoo_core::Surroundings;
     use voodoo_core::math::Pose;
-    use voodoo_core::observation::frame::{DepthImage, DepthPixels};
+    use voodoo_core::{DepthImage, DepthPixels};
 
     /// Edge of the image, and its focal length, pixels.
     const EDGE: usize = 120;

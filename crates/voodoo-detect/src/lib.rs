@@ -1,7 +1,7 @@
 //! Finds persons in depth images: what may be one, what a small network reports of it, and where its joints are.
 //!
 //! ```
-//! use voodoo_core::body::HumanModel;
+//! use voodoo_core::HumanModel;
 //! use voodoo_core::{Body, Config, Tracker};
 //! use voodoo_detect::Detector;
 //!
@@ -37,9 +37,9 @@ use rejections::Rejections;
 use segmentation::Segmentation;
 use std::sync::{Arc, OnceLock};
 use voodoo_core::Body;
-use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use voodoo_core::math::{Aabb, Pose, Vec3};
-use voodoo_core::observation::frame::{DepthImage, Ground};
+use voodoo_core::{DepthImage, Ground};
+use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use weights::WeightsError;
 
 /// Log odds from which on a candidate is taken for a person.

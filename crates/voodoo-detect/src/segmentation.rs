@@ -4,9 +4,9 @@ use crate::components::{Candidate, Components, NONE};
 use crate::crop::Crop;
 use crate::floor::FloorFinder;
 use crate::view::View;
-use voodoo_core::detect::Surroundings;
+use voodoo_core::Surroundings;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::frame::{DepthImage, Ground};
+use voodoo_core::{DepthImage, Ground};
 
 /// Cuts depth images into candidates; keeps its memory between images.
 #[derive(Debug, Default)]

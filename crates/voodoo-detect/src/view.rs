@@ -1,9 +1,9 @@
 //! A depth image as the detector looks at it: thinned out, in metres, without what cannot be a person.
 
 use voodoo_core::Camera;
-use voodoo_core::detect::Surroundings;
+use voodoo_core::Surroundings;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{DepthImage, Ground};
+use voodoo_core::{DepthImage, Ground};
 
 /// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 30 wide and 80 high.
 const MOST_PIXELS: usize = 26_000;

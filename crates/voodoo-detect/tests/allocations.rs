@@ -8,10 +8,10 @@ mod scene;
 
 use counting::allocations_so_far;
 
-use voodoo_core::body::HumanModel;
+use voodoo_core::Frame;
+use voodoo_core::HumanModel;
+use voodoo_core::Options;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::Frame;
-use voodoo_core::people;
 use voodoo_core::{Body, Config, People};
 use voodoo_detect::Detector;
 
@@ -28,7 +28,7 @@ fn people_allocations() -> [usize; 2] {
         let (seen, _) = camera.shoot(&body, &poses, 0.002, &mut noise);
         pixels.iter_mut().zip(seen).for_each(|(all, pixel)| *all = pixel.min(*all));
     }
-    let people = People::new(body, Config::default(), people::Options::default()).unwrap();
+    let people = People::new(body, Config::default(), Options::default()).unwrap();
     let mut people = people.with_detector(Box::new(Detector::new()));
     let mut counts = [0, 0];
     for index in 0..200 {

@@ -2,12 +2,12 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::scene;
-use voodoo_core::body::HumanModel;
+use voodoo_core::Frame;
+use voodoo_core::HumanModel;
+use voodoo_core::Options;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
-use voodoo_core::observation::frame::Frame;
-use voodoo_core::observation::picture::{ColorImage, ColorPixels};
-use voodoo_core::people::Options;
 use voodoo_core::{Body, Config, People, Status};
+use voodoo_core::{ColorImage, ColorPixels};
 use voodoo_detect::Detector;
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 120.0 };

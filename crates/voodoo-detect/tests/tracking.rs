@@ -2,10 +2,10 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::scene;
-use voodoo_core::body::HumanModel;
-use voodoo_core::detect::{Detect, DetectionQuery, Surroundings};
+use voodoo_core::HumanModel;
 use voodoo_core::math::Vec3;
 use voodoo_core::{Body, Config, Frame, Status, TrackError};
+use voodoo_core::{Detect, DetectionQuery, Surroundings};
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };

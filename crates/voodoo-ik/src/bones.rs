@@ -3,7 +3,7 @@
 use super::image::Bone;
 use super::model::Model;
 use super::trunk::{Carrier, Trunk};
-use voodoo_core::body::Body;
+use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 
 /// A limb that the trunk carries starts in it: from this share of its length on it must lie outside.

@@ -13,22 +13,22 @@ pub(super) struct Taken {
 }
 
 impl Taken {
-    pub fn clear(&mut self, n: usize) {
+    pub(crate) fn clear(&mut self, n: usize) {
         self.rows.clear();
         self.n = n;
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Leaves of `row` only what lies in the null space.
-    pub fn project(&self, row: &mut [f64]) {
+    pub(crate) fn project(&self, row: &mut [f64]) {
         orthogonalise(&self.rows, row);
     }
 
     /// Takes the directions of the rows of a matrix.
-    pub fn take(&mut self, rows: &[f64]) {
+    pub(crate) fn take(&mut self, rows: &[f64]) {
         let longest = rows.chunks_exact(self.n).map(|row| dot(row, row)).fold(0.0, f64::max).sqrt();
         for row in rows.chunks_exact(self.n) {
             self.rows.extend_from_slice(row);
@@ -37,7 +37,7 @@ impl Taken {
     }
 
     /// Takes one unknown, which stands at its limit; false when it was taken before.
-    pub fn pin(&mut self, unknown: usize) -> bool {
+    pub(crate) fn pin(&mut self, unknown: usize) -> bool {
         let start = self.rows.len();
         self.rows.resize(start + self.n, 0.0);
         self.rows[start + unknown] = 1.0;
@@ -82,7 +82,7 @@ pub(super) struct Damped {
 
 impl Damped {
     /// `x = A^T (A A^T + damping I)^-1 b = (A^T A + damping I)^-1 A^T b`, whichever side is smaller; zero for a zero matrix.
-    pub fn solve(&mut self, a: &[f64], b: &[f64], damping: f64, x: &mut [f64]) {
+    pub(crate) fn solve(&mut self, a: &[f64], b: &[f64], damping: f64, x: &mut [f64]) {
         let (rows, n) = (b.len(), x.len());
         let size = rows.min(n);
         let mut damping = damping;

@@ -1,9 +1,9 @@
 //! A body, or a part of one, as a chain with exact joints; its unknowns are the vector of joint angles.
 
-use voodoo_core::body::kinematics::hinge_axis;
-use voodoo_core::body::{Body, JointKind};
-use voodoo_core::error::BodyError;
+use voodoo_core::BodyError;
+use voodoo_core::kinematics::hinge_axis;
 use voodoo_core::math::{Mat3, Pose, Vec3};
+use voodoo_core::{Body, JointKind};
 
 use super::twist::turn;
 
@@ -98,7 +98,7 @@ impl Model {
         &mut self,
         limb: usize,
         name: &str,
-        joint: Option<&(usize, voodoo_core::body::Joint)>,
+        joint: Option<&(usize, voodoo_core::Joint)>,
         root: Root,
     ) -> Result<(), BodyError> {
         let start = self.names.len();

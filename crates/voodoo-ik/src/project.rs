@@ -4,9 +4,9 @@ use super::goal::{Aim, Goal};
 use super::model::{Model, Turn};
 use super::solver::{Options, Solver};
 use super::twist::rotation_vector;
-use voodoo_core::body::kinematics::joint_turn;
-use voodoo_core::body::{Body, Joint};
+use voodoo_core::kinematics::joint_turn;
 use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::{Body, Joint};
 
 /// Lever of a limb's turns about its axis against its position, metres: about the radius of an arm.
 const GIRTH: f64 = 0.05;

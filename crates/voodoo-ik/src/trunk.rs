@@ -2,8 +2,8 @@
 //! behind it, and a leg in the other one, too.
 
 use super::model::Kinematics;
+use voodoo_core::TaperedEllipticCylinder;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::shape::TaperedEllipticCylinder;
 
 /// A bone keeps this share of its radius off the trunk: flesh gives way, and the model's limbs are stiffer than a back.
 const CLEARANCE: f64 = 0.5;

@@ -1,4 +1,4 @@
-//! The logarithm of rigid motions (R07 eq. 6-9); its inverse is [`voodoo_core::body::kinematics::exp`].
+//! The logarithm of rigid motions (R07 eq. 6-9); its inverse is [`voodoo_core::exp`].
 
 use nalgebra::Vector6;
 

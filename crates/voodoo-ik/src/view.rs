@@ -1,6 +1,6 @@
 //! One picture of the image criterion: how far a point lies outside of its silhouette, or before what it sees.
 
-use voodoo_core::camera::Camera;
+use voodoo_core::Camera;
 use voodoo_core::math::{Pose, Vec3};
 
 /// Points nearer to the camera plane than this, or behind it, are not seen; metres.

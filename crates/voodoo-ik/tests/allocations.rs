@@ -5,7 +5,7 @@
 mod counting;
 
 use counting::allocations_so_far;
-use voodoo_core::body::HumanModel;
+use voodoo_core::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{Aim, Criterion, Goal, Model, Options, Rest, Root, Solver, View, bones, trunk};

@@ -9,7 +9,7 @@ use crate::errors::{exception, wrong_argument};
 /// Functions for `from_py_with`, each named like its argument.
 macro_rules! arguments {
     ($convert:ident, $type:ty: $($name:ident)*) => {
-        $(pub fn $name(value: &Bound<'_, PyAny>) -> PyResult<$type> {
+        $(pub(crate) fn $name(value: &Bound<'_, PyAny>) -> PyResult<$type> {
             $convert(stringify!($name), value)
         })*
     };

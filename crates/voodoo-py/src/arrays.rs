@@ -4,27 +4,27 @@ use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, Py
 use pyo3::prelude::*;
 use pyo3::type_object::PyTypeInfo;
 use voodoo_core::Body;
-use voodoo_core::body::Limb;
+use voodoo_core::Limb;
+use voodoo_core::PointSlice;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::observation::frame::PointSlice;
 
 use crate::errors::{exception, wrong_argument};
 
 /// Points as they came: single or double precision, contiguous.
-pub enum PointArray {
+pub(crate) enum PointArray {
     F32(Py<PyArray2<f32>>),
     F64(Py<PyArray2<f64>>),
 }
 
 /// A borrow of a [`PointArray`].
-pub enum PointView<'py> {
+pub(crate) enum PointView<'py> {
     F32(PyReadonlyArray2<'py, f32>),
     F64(PyReadonlyArray2<'py, f64>),
 }
 
 impl PointArray {
     /// Takes an `(N, 3)` array of float32 or float64; copies only what is not contiguous and aligned.
-    pub fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+    pub(crate) fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = value.py();
         let wrong = || {
             let found = match value.cast::<PyUntypedArray>() {
@@ -52,7 +52,7 @@ impl PointArray {
         }
     }
 
-    pub fn view<'py>(&self, py: Python<'py>) -> PointView<'py> {
+    pub(crate) fn view<'py>(&self, py: Python<'py>) -> PointView<'py> {
         match self {
             Self::F32(array) => PointView::F32(array.bind(py).readonly()),
             Self::F64(array) => PointView::F64(array.bind(py).readonly()),
@@ -61,7 +61,7 @@ impl PointArray {
 }
 
 impl PointView<'_> {
-    pub fn slice(&self) -> PyResult<PointSlice<'_>> {
+    pub(crate) fn slice(&self) -> PyResult<PointSlice<'_>> {
         Ok(match self {
             Self::F32(view) => PointSlice::F32(view.as_slice()?.as_chunks().0),
             Self::F64(view) => PointSlice::F64(view.as_slice()?.as_chunks().0),
@@ -70,7 +70,7 @@ impl PointView<'_> {
 }
 
 /// Refuses NumPy's masked arrays: below the mask their entries are numbers like any other and would count as measured.
-pub fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
+pub(crate) fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
     if value.hasattr("mask")? {
         let text = format!("{name}: expected an array without a mask, found a masked one; {instead}");
         return Err(exception(value.py(), "MeasurementError", text));
@@ -79,7 +79,7 @@ pub fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult
 }
 
 /// The same array, C-contiguous and aligned.
-pub fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let array = value.cast::<PyUntypedArray>()?;
     if array.is_c_contiguous() && value.getattr("flags")?.getattr("aligned")?.is_truthy()? {
         return Ok(value.clone());
@@ -89,7 +89,7 @@ pub fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>>
 }
 
 /// Rows of three numbers.
-pub fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; N]]> {
+pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; N]]> {
     if array.dims()[1] == N {
         return Ok(array.as_slice()?.as_chunks().0);
     }
@@ -108,7 +108,7 @@ fn entries<const N: usize>(value: &Bound<'_, PyAny>, shape: &[usize]) -> Option<
 }
 
 /// A vector from anything with three numbers.
-pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
+pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
     if let Some(numbers) = entries(value, &[3]) {
         return Ok(Vec3::from_array(numbers));
     }
@@ -119,7 +119,7 @@ pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
 }
 
 /// A pose from a rigid 4x4 matrix; the identity without one.
-pub fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
+pub(crate) fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
     let Some(value) = value else { return Ok(Pose::IDENTITY) };
     let wrong = || wrong_argument(value.py(), name, "a rigid 4x4 transform", value);
     let rows: [[f64; 4]; 4] = match entries::<16>(value, &[4, 4]) {
@@ -145,7 +145,7 @@ pub fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
 }
 
 /// Poses of all limbs of a body, in their order; one that is not rigid is named by its limb.
-pub fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose>> {
+pub(crate) fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose>> {
     let named = |(index, value): (usize, &Bound<'_, PyAny>)| {
         let name = body.limbs().get(index).map_or("?", |limb: &Limb| limb.name.as_str());
         pose(&format!("world_from_limb[{name}]"), Some(value))
@@ -154,7 +154,7 @@ pub fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose
 }
 
 /// The rows of a pose's 4x4 matrix.
-pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
+pub(crate) fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
     let rows = Mat3::from_quat(pose.rotation).transpose().to_cols_array_2d();
     let t = pose.translation;
     let row = |index: usize, shift: f64| [rows[index][0], rows[index][1], rows[index][2], shift];
@@ -162,7 +162,7 @@ pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
 }
 
 /// A read-only array of a given shape.
-pub fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+pub(crate) fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let array = PyArray1::from_vec(py, values).reshape(shape)?;
     array.try_readwrite()?.make_nonwriteable();
     Ok(array)

@@ -2,15 +2,15 @@
 
 use pyo3::prelude::*;
 use voodoo_core::Body;
-use voodoo_core::body::{HumanModel, Joint, Limb, Site};
 use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::{HumanModel, Joint, Limb, Site};
 
 use crate::errors::{IntoPy, exception};
 use crate::shape::PyShape;
 
 /// A rotation as Python says it.
 #[derive(FromPyObject, IntoPyObject)]
-pub enum Rotation {
+pub(crate) enum Rotation {
     /// Radians.
     Vector([f64; 3]),
     /// x, y, z, w; for copies, which have the same bits.
@@ -20,7 +20,7 @@ pub enum Rotation {
 /// Position and rotation of a joint's ellipse.
 type Frame = ([f64; 3], Rotation);
 /// name, ellipse on the parent, ellipse on the limb, semi-axes, weight, limits, motion
-pub type JointParts = (String, Frame, Frame, [f64; 2], f64, Option<[[f64; 2]; 3]>, f64);
+pub(crate) type JointParts = (String, Frame, Frame, [f64; 2], f64, Option<[[f64; 2]; 3]>, f64);
 /// name, parent, shape, joint, match_caps
 type LimbParts = (String, Option<String>, PyShape, Option<JointParts>, [bool; 2]);
 /// name, limb, position
@@ -47,7 +47,7 @@ fn exact(pose: &Pose) -> Frame {
     (pose.translation.to_array(), Rotation::Quaternion(pose.rotation.to_array()))
 }
 
-pub fn joint((name, on_parent, on_limb, semi_axes, weight, limits, motion): JointParts) -> Joint {
+pub(crate) fn joint((name, on_parent, on_limb, semi_axes, weight, limits, motion): JointParts) -> Joint {
     Joint {
         name,
         parent_from_joint: pose(on_parent),

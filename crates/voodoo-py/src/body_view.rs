@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::observation::frame::DepthPixels;
+use voodoo_core::DepthPixels;
 use voodoo_sensors::body_view::{Beside, BodyView, Matrix, StillDepth};
 
 use crate::arrays::contiguous;
@@ -14,7 +14,7 @@ use crate::errors::{IntoPy, exception, wrong_argument};
 type Marks<'py> = Bound<'py, PyArray2<bool>>;
 
 /// The rows of a 4x4 array.
-pub fn rows_of(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Matrix> {
+pub(crate) fn rows_of(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Matrix> {
     let entries: Option<[f64; 16]> = (value.dims() == numpy::Ix2(4, 4)).then(|| {
         let mut entries = value.as_array().iter().copied().collect::<Vec<_>>();
         entries.resize(16, 0.0);
@@ -105,7 +105,7 @@ impl PyStillDepth {
 #[pyfunction]
 #[pyo3(signature = (depth, camera, joints, *, metres_per_unit, world_from_depth, color_from_depth, color_camera, beyond, reach, step, margin, scene))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
-pub fn body_view<'py>(
+pub(crate) fn body_view<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
     camera: &Bound<'py, PyAny>,

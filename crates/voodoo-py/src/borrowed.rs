@@ -5,14 +5,14 @@ use std::sync::Arc;
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
-use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 use voodoo_core::{Body, Camera};
+use voodoo_core::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::{ColorImage, ColorPixels};
 
 use crate::arrays::{PointArray, PointView, contiguous};
 use crate::errors::IntoPy;
 
-pub struct CloudData {
+pub(crate) struct CloudData {
     pub points: PointArray,
     pub world_from_sensor: Pose,
     pub weight: f64,
@@ -21,7 +21,7 @@ pub struct CloudData {
     pub source: u16,
 }
 
-pub enum DepthArray {
+pub(crate) enum DepthArray {
     U16(Py<PyArray2<u16>>),
     F32(Py<PyArray2<f32>>),
 }
@@ -31,7 +31,7 @@ enum BorrowedPixels<'py> {
     F32(PyReadonlyArray2<'py, f32>),
 }
 
-pub struct ImageData {
+pub(crate) struct ImageData {
     pub pixels: DepthArray,
     pub camera: Arc<Camera>,
     pub metres_per_unit: f64,
@@ -109,7 +109,7 @@ impl ColorView<'_, '_> {
     }
 }
 
-pub struct SiteData {
+pub(crate) struct SiteData {
     pub site: String,
     pub position: Vec3,
     pub direction: Option<Vec3>,
@@ -170,7 +170,7 @@ impl Borrowed<'_> {
 
 /// What a `Frame` holds.
 #[derive(Clone, Copy)]
-pub struct Held<'a> {
+pub(crate) struct Held<'a> {
     pub clouds: &'a [CloudData],
     pub images: &'a [ImageData],
     pub sites: &'a [SiteData],
@@ -179,7 +179,7 @@ pub struct Held<'a> {
 
 impl Held<'_> {
     /// Borrows the arrays and looks the names up in `body`.
-    pub fn borrow_for<'py>(self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
+    pub(crate) fn borrow_for<'py>(self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
         let clouds = self
             .clouds
             .iter()

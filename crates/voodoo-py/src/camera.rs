@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
-use voodoo_core::camera::Lens;
+use voodoo_core::Lens;
 use voodoo_core::math::Vec3;
 
 use crate::arrays::rows;
@@ -71,7 +71,7 @@ fn pairs<'py>(py: Python<'py>, found: impl ExactSizeIterator<Item = [f64; 2]>) -
 }
 
 /// The core's camera of a `voodoo.Camera`.
-pub fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
+pub(crate) fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
     let core = camera.getattr("core").ok().and_then(|core| core.cast_into::<PyCamera>().ok());
     core.map(|core| Arc::clone(&core.get().camera)).ok_or_else(|| {
         let found = camera.get_type().name().map_or_else(|_| "something else".into(), |name| name.to_string());

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::Config;
-use voodoo_core::config::{RawValue, Value};
+use voodoo_core::{RawValue, Value};
 
 use crate::errors::{IntoPy, exception};
 
@@ -12,7 +12,7 @@ type Row<'py> = (&'static str, String, &'static str, Bound<'py, PyAny>, Option<(
 
 #[doc = stub!("config_fields")]
 #[pyfunction]
-pub fn config_fields(py: Python<'_>) -> PyResult<Vec<Row<'_>>> {
+pub(crate) fn config_fields(py: Python<'_>) -> PyResult<Vec<Row<'_>>> {
     Config::default()
         .fields()
         .into_iter()
@@ -29,7 +29,7 @@ pub fn config_fields(py: Python<'_>) -> PyResult<Vec<Row<'_>>> {
 }
 
 /// A configuration from the values of a dictionary.
-pub fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
+pub(crate) fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
     let py = values.py();
     let mut config = Config::default();
     for (key, value) in values.iter() {

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::body::HumanModel;
-use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::observation::frame::{DepthImage, DepthPixels, Ground};
 use voodoo_core::{Body, Frame};
+use voodoo_core::{DepthImage, DepthPixels, Ground};
+use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use voodoo_detect::crop::SIZE;
 use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
@@ -238,7 +238,7 @@ impl PyCandidate {
 #[doc = stub!("person_candidates")]
 #[pyfunction]
 #[pyo3(signature = (depth, *, camera, up=None, floor=None, most=8))]
-pub fn person_candidates<'py>(
+pub(crate) fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
     camera: &Bound<'py, PyAny>,

@@ -8,9 +8,9 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
-use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::frame::{DepthImage, Ground};
+use voodoo_core::{DepthImage, Ground};
+use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 
 use crate::arrays::{contiguous, matrix, vector};
 use crate::errors::{exception, wrong_argument};
@@ -21,7 +21,7 @@ const SIGMA: f64 = 0.05;
 const LEAST: f64 = 1e-7;
 
 /// What a caller wants as a detector: "shipped", None, a `voodoo.Detector`, or an object with `joints` and `detect(image)`.
-pub fn detector(wanted: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
+pub(crate) fn detector(wanted: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
     let py = wanted.py();
     if wanted.is_none() {
         return Ok(None);
@@ -52,7 +52,7 @@ fn shipped() -> Option<Box<dyn Detect>> {
 }
 
 /// Says that a detector failed in a step, which went on without it: a warning, or what ends programs (KeyboardInterrupt) itself.
-pub fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>) -> PyResult<()> {
+pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>) -> PyResult<()> {
     let Some(error) = error else { return Ok(()) };
     let cause = error.downcast_ref::<PyErr>();
     if let Some(cause) = cause.filter(|cause| !cause.is_instance_of::<PyException>(py)) {

@@ -1,11 +1,11 @@
 //! Core errors become the exceptions of `voodoo.errors`.
 
 use pyo3::prelude::*;
-use voodoo_core::shape::ShapeError;
+use voodoo_core::ShapeError;
 use voodoo_core::{BodyError, CameraError, ConfigError, TrackError};
 
 /// An exception of `voodoo.errors` by its class name.
-pub fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
+pub(crate) fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
     match py.import("voodoo.errors").and_then(|module| module.getattr(class)).and_then(|class| class.call1((message,)))
     {
         Ok(value) => PyErr::from_value(value),
@@ -14,7 +14,7 @@ pub fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
 }
 
 /// Translation of a core error; a trait because both types are foreign here.
-pub trait IntoPy {
+pub(crate) trait IntoPy {
     fn into_py(self, py: Python<'_>) -> PyErr;
 }
 
@@ -53,7 +53,7 @@ impl IntoPy for TrackError {
 }
 
 /// What was expected of an argument and what it is.
-pub fn wrong_argument(py: Python<'_>, name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
+pub(crate) fn wrong_argument(py: Python<'_>, name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
     let mut found = found.repr().map_or_else(|_| "something without a repr".into(), |text| text.to_string());
     if found.chars().count() > 120 {
         found = found.chars().take(120).chain("...".chars()).collect();

@@ -7,9 +7,9 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
 use voodoo_core::Body;
+use voodoo_core::Covariances;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
-use voodoo_core::uncertainty::Covariances;
+use voodoo_core::{Estimate, LimbStatus, SourceReport, Status};
 
 use crate::arrays::frozen;
 use crate::errors::exception;
@@ -71,7 +71,7 @@ fn rows<'py, 'a>(
     Ok(PyMappingProxy::new(all.py(), dict.as_mapping()))
 }
 
-pub fn status_word(status: Status) -> &'static str {
+pub(crate) fn status_word(status: Status) -> &'static str {
     match status {
         Status::Tracking => "tracking",
         Status::Degraded => "degraded",
@@ -130,7 +130,7 @@ fn covariances((sites, limbs, turns, lengths, girths): Spread) -> Covariances {
 #[doc = stub!("_estimate")]
 #[pyfunction]
 #[pyo3(signature = (head, names, found, spread=None))]
-pub fn _estimate(
+pub(crate) fn _estimate(
     py: Python<'_>,
     head: Head,
     names: AllNames,

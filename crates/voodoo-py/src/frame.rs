@@ -3,8 +3,8 @@
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Body;
+use voodoo_core::Ground;
 use voodoo_core::math::Aabb;
-use voodoo_core::observation::frame::Ground;
 
 use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};

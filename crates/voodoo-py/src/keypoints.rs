@@ -123,7 +123,7 @@ impl PyKeypointLayout {
 
 #[doc = stub!("linear_sum_assignment")]
 #[pyfunction]
-pub fn linear_sum_assignment(costs: PyReadonlyArray2<'_, f64>) -> Vec<(usize, usize)> {
+pub(crate) fn linear_sum_assignment(costs: PyReadonlyArray2<'_, f64>) -> Vec<(usize, usize)> {
     let costs = costs.as_array();
     let table = CostTable::from_fn(costs.nrows(), costs.ncols(), |row, column| costs[[row, column]]);
     voodoo_core::math::linear_sum_assignment(&table)
@@ -132,7 +132,7 @@ pub fn linear_sum_assignment(costs: PyReadonlyArray2<'_, f64>) -> Vec<(usize, us
 #[doc = stub!("carried")]
 #[pyfunction]
 #[pyo3(signature = (points, tracker, *, elapsed, world_from_sensor=None))]
-pub fn carried<'py>(
+pub(crate) fn carried<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
     tracker: TrackedBody<'py>,

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use voodoo_core::Options;
 use voodoo_core::math::{Aabb, Vec3};
-use voodoo_core::observation::frame::{Cloud, PositionRelation, RayRelation};
-use voodoo_core::people::Options;
+use voodoo_core::{Cloud, PositionRelation, RayRelation};
 use voodoo_core::{Frame, People, Tracker};
 
 use crate::body::PyBody;
@@ -29,14 +29,14 @@ pub struct PyPeople {
 
 /// A tracker, or one of several persons by number.
 #[derive(FromPyObject)]
-pub enum TrackedBody<'py> {
+pub(crate) enum TrackedBody<'py> {
     Alone(PyRef<'py, PyTracker>),
     Person(PyRef<'py, PyPeople>, usize),
 }
 
 impl TrackedBody<'_> {
     /// Who follows the body.
-    pub fn tracker(&self) -> PyResult<&Tracker> {
+    pub(crate) fn tracker(&self) -> PyResult<&Tracker> {
         match self {
             Self::Alone(tracker) => Ok(&tracker.tracker),
             Self::Person(people, id) => {

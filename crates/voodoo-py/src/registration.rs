@@ -9,7 +9,7 @@ use crate::errors::{IntoPy, exception};
 #[doc = stub!("nearest_surface")]
 #[pyfunction]
 #[pyo3(signature = (pixels, depths, *, pixel, radius))]
-pub fn nearest_surface(
+pub(crate) fn nearest_surface(
     pixels: PyReadonlyArray2<'_, f64>,
     depths: PyReadonlyArray1<'_, f64>,
     pixel: [f64; 2],

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::visibility::render::{Rendering, Viewpoint};
+use voodoo_core::{Rendering, Viewpoint};
 
 use crate::arrays::{limb_poses, pose};
 use crate::body::PyBody;
@@ -14,7 +14,7 @@ type Images<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i16>>);
 #[doc = stub!("render_depth")]
 #[pyfunction]
 #[pyo3(signature = (body, world_from_limb, *, camera, world_from_sensor=None))]
-pub fn render_depth<'py>(
+pub(crate) fn render_depth<'py>(
     py: Python<'py>,
     body: &PyBody,
     world_from_limb: Vec<Bound<'py, PyAny>>,

@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{Points, Pose};
-use voodoo_core::shape::{Region, SurfaceBatch, TaperedEllipticCylinder};
+use voodoo_core::{Region, SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
 use crate::arrays::{PointArray, vector};
@@ -16,7 +16,7 @@ pub struct PyShape(pub TaperedEllipticCylinder);
 
 #[doc = stub!("ClosestPoints")]
 #[pyclass(name = "ClosestPoints", module = "voodoo", frozen, get_all)]
-pub struct PyClosestPoints {
+pub(crate) struct PyClosestPoints {
     points: Py<PyAny>,
     normals: Py<PyAny>,
     signed_distance: Py<PyAny>,

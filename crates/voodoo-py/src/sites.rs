@@ -4,7 +4,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::sites::{SiteGate, SiteRay};
+use voodoo_core::{SiteGate, SiteRay};
 
 use crate::arrays::vector;
 use crate::errors::IntoPy;
@@ -17,7 +17,10 @@ fn row(py: Python<'_>, place: Vec3) -> Row<'_> {
 }
 
 /// Where some sites are, in a mapping of their names to places; none of those that it lacks.
-pub fn places_of<'a>(places: &Bound<'_, PyAny>, sites: impl Iterator<Item = &'a str>) -> PyResult<Vec<Option<Vec3>>> {
+pub(crate) fn places_of<'a>(
+    places: &Bound<'_, PyAny>,
+    sites: impl Iterator<Item = &'a str>,
+) -> PyResult<Vec<Option<Vec3>>> {
     let dict = places.cast::<PyDict>().ok();
     sites
         .map(|site| {
@@ -32,7 +35,11 @@ pub fn places_of<'a>(places: &Bound<'_, PyAny>, sites: impl Iterator<Item = &'a 
 
 #[doc = stub!("expected_sites")]
 #[pyfunction]
-pub fn expected_sites<'py>(py: Python<'py>, tracker: TrackedBody<'py>, stamp: f64) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn expected_sites<'py>(
+    py: Python<'py>,
+    tracker: TrackedBody<'py>,
+    stamp: f64,
+) -> PyResult<Bound<'py, PyDict>> {
     let tracker = tracker.tracker()?;
     let places = tracker.expected_sites(stamp).map_err(|error| error.into_py(py))?;
     let dict = PyDict::new(py);

@@ -33,7 +33,7 @@ fn told(candidate: &Candidate) -> Place {
 type Before = (Vec<[f64; 3]>, Vec<[f64; 2]>);
 
 /// Places of the world before a camera, metres, and their columns and rows; NaN behind it, and where its lens shows nothing.
-pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> Before {
+pub(crate) fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> Before {
     let inside: Vec<[f64; 3]> = places.map(|place| eye.in_sensor(place).to_array()).collect();
     let pixels = inside.iter().map(|place| eye.pixel(Vec3::from_array(*place))).collect();
     (inside, pixels)

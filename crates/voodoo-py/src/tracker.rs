@@ -6,8 +6,8 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use voodoo_core::ColorImage;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::picture::ColorImage;
 use voodoo_core::{Body, Frame, Tracker};
 
 use crate::arrays::{PointArray, limb_poses, rows, vector};
@@ -34,7 +34,7 @@ pub struct PyTracker {
 }
 
 /// Named positions with the indices of their sites.
-pub fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
+pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
     let place = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let name: String = name.extract()?;
         let site = body.site_index(&name).map_err(|error| error.into_py(joints.py()))?;
@@ -45,7 +45,7 @@ pub fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(
 
 /// Length of body between each of some places (N, 3) and a camera's focal point, metres.
 #[pyfunction]
-pub fn body_before<'py>(
+pub(crate) fn body_before<'py>(
     tracker: TrackedBody<'py>,
     sites: PyReadonlyArray2<'py, f64>,
     camera: [f64; 3],

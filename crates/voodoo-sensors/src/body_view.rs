@@ -7,10 +7,10 @@ use std::sync::Arc;
 use crate::registration::{MeasuredPixels, ProjectedPoints};
 use crate::still::still;
 use crate::window::Window;
-use voodoo_core::camera::Camera;
-use voodoo_core::error::TrackError;
+use voodoo_core::Camera;
+use voodoo_core::DepthPixels;
+use voodoo_core::TrackError;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::frame::DepthPixels;
 
 /// A pose whose entries change by less is that of a camera that stands.
 const CAMERA_STANDS: f64 = 1e-3;

@@ -1,10 +1,10 @@
 //! Where points that were measured some time before the frame are at its time: each goes on with the limb that it lies on.
 
 use crate::body_view::Matrix;
+use voodoo_core::PointSlice;
+use voodoo_core::TrackError;
 use voodoo_core::Tracker;
-use voodoo_core::error::TrackError;
 use voodoo_core::math::matrix;
-use voodoo_core::observation::frame::PointSlice;
 
 /// Points farther than this from every limb are the scene's and stay, metres.
 const NEAR: f64 = 0.20;

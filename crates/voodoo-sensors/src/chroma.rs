@@ -1,7 +1,7 @@
 //! Colours of a picture as numbers of histogram bins, chroma and coarse luma: what skin is told by.
 
 use crate::masks::PIXEL_BLOCK;
-use voodoo_core::error::TrackError;
+use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
 /// Bins of either axis of chroma, Cr and Cb, and of luma: coarse, to part a face from a dark poster of the same hue.

@@ -1,7 +1,7 @@
 //! A camera of pictures and where it stands.
 
 use crate::body_view::Matrix;
-use voodoo_core::camera::Camera;
+use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
 
 /// A camera and its pose.
@@ -60,7 +60,7 @@ impl Eye<'_> {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use voodoo_core::camera::Lens;
+    use voodoo_core::Lens;
 
     #[test]
     fn the_ray_behind_a_pixel_leads_to_what_is_seen_there() {

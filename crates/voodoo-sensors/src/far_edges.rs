@@ -26,7 +26,7 @@ struct Nearest {
 ///
 /// `depth` has so many columns, metres, and is infinite where nothing was measured: the nearest measured one counts there. What is
 /// told of pixels with nothing measured within `reach` rows and columns means nothing.
-pub fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -> Vec<bool> {
+pub(crate) fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -> Vec<bool> {
     let mut edges = vec![false; depth.len()];
     if depth.is_empty() || width == 0 {
         return edges;

@@ -2,7 +2,7 @@
 
 use crate::eye::Eye;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::sites::{SiteGate, SiteRay};
+use voodoo_core::{SiteGate, SiteRay};
 
 /// Standard deviation along a ray of a place on it, where none is told, metres.
 const ALONG_SIGMA: f64 = 0.04;

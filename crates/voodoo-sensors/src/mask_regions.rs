@@ -2,11 +2,11 @@
 
 use crate::chroma;
 use crate::masks::{PIXEL_BLOCK, bounds, closed, cut, is_empty, opened, smooth};
-use voodoo_core::error::TrackError;
+use voodoo_core::TrackError;
 
 /// A region of a mask: pixels that touch, at corners too.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Region {
+pub(crate) struct Region {
     /// First row and column, and one beyond the last.
     pub rows: (usize, usize),
     /// Columns likewise.
@@ -44,7 +44,7 @@ struct Run {
 
 /// The regions of a mask of so many columns, and the number of its region, from 1, in each pixel; they are numbered by the first
 /// two by two pixels that hold something of them.
-pub fn regions(mask: &[u8], width: usize) -> (Vec<Region>, Vec<i32>) {
+pub(crate) fn regions(mask: &[u8], width: usize) -> (Vec<Region>, Vec<i32>) {
     let mut runs = joined_runs(mask, width);
     for index in 0..runs.len() {
         runs[index].parent = first(&runs, index);
@@ -111,7 +111,7 @@ fn first(runs: &[Run], mut index: usize) -> usize {
 }
 
 /// A mask of so many columns with gaps of two pixels closed between regions whose boxes' diagonals are no longer than `longest`.
-pub fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
+pub(crate) fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
     let mut result = mask.to_vec();
     let [rows, columns] = bounds(mask, width);
     let part = cut(mask, width, &rows, &columns);
@@ -131,7 +131,7 @@ pub fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
 
 /// What skin is looked for in: a picture, and where it may be.
 #[derive(Clone, Copy, Debug)]
-pub struct SkinPicture<'a> {
+pub(crate) struct SkinPicture<'a> {
     /// Of each pixel's colour, see [`chroma::bins`].
     pub bins: &'a [u16],
     /// Columns.
@@ -152,7 +152,7 @@ impl SkinPicture<'_> {
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when sizes do not fit together.
-    pub fn find(&self, longest: f64, seen: &mut Vec<u8>, skin: &mut Vec<u8>) -> Result<(), TrackError> {
+    pub(crate) fn find(&self, longest: f64, seen: &mut Vec<u8>, skin: &mut Vec<u8>) -> Result<(), TrackError> {
         let count = self.bins.len();
         let whole = if self.width > 0 { count.is_multiple_of(self.width) } else { count == 0 };
         let masks = [self.body, self.before].into_iter().flatten().map(<[_]>::len);

@@ -3,17 +3,17 @@
 use voodoo_core::math::widest;
 
 /// 1 wherever a mask of so many columns has something within `reach` rows and columns.
-pub fn grown(mask: &[u8], width: usize, reach: usize) -> Vec<u8> {
+pub(crate) fn grown(mask: &[u8], width: usize, reach: usize) -> Vec<u8> {
     around(mask, width, reach, |a, b| a | b)
 }
 
 /// A mask without what is narrower than three pixels.
-pub fn opened(mask: &[u8], width: usize) -> Vec<u8> {
+pub(crate) fn opened(mask: &[u8], width: usize) -> Vec<u8> {
     around(&around(mask, width, 1, |a, b| a & b), width, 1, |a, b| a | b)
 }
 
 /// A mask with gaps of up to two pixels filled.
-pub fn closed(mask: &[u8], width: usize) -> Vec<u8> {
+pub(crate) fn closed(mask: &[u8], width: usize) -> Vec<u8> {
     around(&around(mask, width, 1, |a, b| a | b), width, 1, |a, b| a & b)
 }
 
@@ -39,7 +39,7 @@ fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) 
 }
 
 /// What most of each pixel and its eight neighbours are, into `found`; beyond the border a picture goes on as it ends.
-pub fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
+pub(crate) fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
     found.resize(mask.len(), 0);
     fill_rows(
         found,
@@ -81,10 +81,15 @@ fn fill_rows(found: &mut [u8], width: usize, mut make: impl FnMut(usize, &mut [u
 }
 
 /// Pixels that are passed over together where none of them holds anything: two registers of AVX2.
-pub const PIXEL_BLOCK: usize = 64;
+pub(crate) const PIXEL_BLOCK: usize = 64;
 
 /// A part of a mask of so many columns.
-pub fn cut(mask: &[u8], width: usize, rows: &std::ops::Range<usize>, columns: &std::ops::Range<usize>) -> Vec<u8> {
+pub(crate) fn cut(
+    mask: &[u8],
+    width: usize,
+    rows: &std::ops::Range<usize>,
+    columns: &std::ops::Range<usize>,
+) -> Vec<u8> {
     let mut part = Vec::with_capacity(rows.len() * columns.len());
     for row in rows.clone() {
         part.extend_from_slice(&mask[row * width..][columns.clone()]);
@@ -93,12 +98,12 @@ pub fn cut(mask: &[u8], width: usize, rows: &std::ops::Range<usize>, columns: &s
 }
 
 /// Whether a row of a mask holds nothing; all of it is read at once, which is faster than to look for the first pixel.
-pub fn is_empty(row: &[u8]) -> bool {
+pub(crate) fn is_empty(row: &[u8]) -> bool {
     row.iter().fold(0, |any, pixel| any | pixel) == 0
 }
 
 /// Smallest range of rows and of columns that holds all of a mask.
-pub fn bounds(mask: &[u8], width: usize) -> [std::ops::Range<usize>; 2] {
+pub(crate) fn bounds(mask: &[u8], width: usize) -> [std::ops::Range<usize>; 2] {
     let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
     for (index, row) in mask.chunks_exact(width.max(1)).enumerate().filter(|(_, row)| !is_empty(row)) {
         if let Some(first) = row.iter().position(|pixel| *pixel != 0) {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::far_edges::far_edges;
 use crate::masks::grown;
-use voodoo_core::error::TrackError;
+use voodoo_core::TrackError;
 
 /// Sums with numbers of a picture's size have no digits left for fractions of them: three times 2^51.
 const NO_FRACTION: f64 = (1_u64 << 52) as f64 + (1_u64 << 51) as f64;

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use voodoo_core::error::TrackError;
+use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
 /// What lies so far behind is another surface: metres, and share of the depth.
@@ -17,7 +17,7 @@ const STAYS: [f32; 2] = [0.02, 0.015];
 ///
 /// # Errors
 /// [`TrackError::Measurement`] when the images are not of one size, or have not these rows and columns.
-pub fn still(
+pub(crate) fn still(
     now: &[f32],
     farthest: &[f32],
     then: &[f32],

@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use voodoo_core::camera::Camera;
-use voodoo_core::error::TrackError;
+use voodoo_core::Camera;
+use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
 /// Part of a depth image (metres, along the optical axis) in which the body is expected.
 #[derive(Clone, Debug)]
-pub struct Window<'a> {
+pub(crate) struct Window<'a> {
     /// Depths, row by row; what is not finite and above zero is no return.
     pub depth: &'a [f32],
     /// Rows and columns of that image.
@@ -53,7 +53,7 @@ impl Window<'_> {
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when sizes do not fit together.
-    pub fn within(
+    pub(crate) fn within(
         &self,
         low: [f64; 3],
         high: [f64; 3],
@@ -144,7 +144,7 @@ fn gate<'a>(
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use voodoo_core::camera::Lens;
+    use voodoo_core::Lens;
 
     const LOW: [f64; 3] = [-0.8, -0.6, 1.0];
     const HIGH: [f64; 3] = [0.7, 0.9, 2.4];

@@ -10,7 +10,7 @@ use crate::shape::Region;
 
 /// Working memory of the assignment.
 #[derive(Debug, Default)]
-pub struct Assignment {
+pub(crate) struct Assignment {
     /// Candidates of each limb, ascending.
     members: Vec<Vec<u32>>,
     search: Nearest,
@@ -23,7 +23,7 @@ pub struct Assignment {
 impl Assignment {
     /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; those of `buried` limbs to
     /// others.
-    pub fn assign(
+    pub(crate) fn assign(
         &mut self,
         body: &Body,
         poses: &[Pose],
@@ -79,7 +79,13 @@ impl Assignment {
     }
 
     /// Step 3: samples the candidates of a limb.
-    pub fn sample_limb(&self, index: usize, candidates: &Candidates, config: &Config, matches: &mut LimbMatches) {
+    pub(crate) fn sample_limb(
+        &self,
+        index: usize,
+        candidates: &Candidates,
+        config: &Config,
+        matches: &mut LimbMatches,
+    ) {
         let members = &self.members[index];
         let kept = sampled_count(members.len(), config);
         matches.candidate.clear();
@@ -111,7 +117,7 @@ fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
 
 /// Step 4: finds the closest points of a limb's sampled candidates; those too far or on a cap that faces a joint get weight
 /// zero.
-pub fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, matches: &mut LimbMatches) {
+pub(crate) fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, matches: &mut LimbMatches) {
     limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
     let (refused, limit) = (refused_regions(limb), max_distance as f32);
     let LimbMatches { weight, base_weight, surface, .. } = matches;

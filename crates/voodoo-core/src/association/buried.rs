@@ -13,7 +13,7 @@ const DEEP: f64 = 0.03;
 
 /// Which limbs of a body lie inside others.
 #[derive(Debug, Default)]
-pub struct Buried {
+pub(crate) struct Buried {
     limbs: Vec<bool>,
     /// A sphere around each limb.
     spheres: Vec<(Vec3, f64)>,
@@ -22,7 +22,7 @@ pub struct Buried {
 impl Buried {
     /// Finds the limbs most of whose axis lies inside other limbs; those that are joined, or joined to the same parent, overlap in
     /// any pose.
-    pub fn find(&mut self, body: &Body, poses: &[Pose]) -> &[bool] {
+    pub(crate) fn find(&mut self, body: &Body, poses: &[Pose]) -> &[bool] {
         let Self { limbs, spheres } = self;
         let parts = body.limbs();
         spheres.clear();

@@ -32,7 +32,7 @@ const NEAREST_STEP: f64 = 0.1;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub(crate) struct Edge {
     /// Direction in which the edge was looked for, limb frame, length one: across the limb at right angles to the line of
     /// sight, or along its axis.
     pub side: Vec3,
@@ -47,7 +47,7 @@ pub struct Edge {
 }
 
 /// Looks for the edges on both sides of a limb, and at its tip when it ends free.
-pub fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
+pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
@@ -143,7 +143,7 @@ impl ContourSearch {
 
 /// The contours of all limbs in all depth images of a frame, and working memory.
 #[derive(Debug, Default)]
-pub struct Contours {
+pub(crate) struct Contours {
     edges: Vec<Found>,
     places: Points,
     distance: Vec<f32>,
@@ -164,12 +164,12 @@ struct Found {
 
 impl Contours {
     /// Forgets all edges.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.edges.clear();
     }
 
     /// Looks for the edges at `poses`.
-    pub fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = DepthView<'a>>) {
+    pub(crate) fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = DepthView<'a>>) {
         self.edges.clear();
         self.places.clear();
         for view in views {
@@ -217,14 +217,14 @@ impl Contours {
     }
 
     /// The edges on the sides of a limb that were found apart from other limbs.
-    pub fn sides(&self, limb: usize) -> impl Iterator<Item = Edge> {
+    pub(crate) fn sides(&self, limb: usize) -> impl Iterator<Item = Edge> {
         let own =
             move |found: &&Found| found.limb == limb && found.stranger >= OTHERS_EDGE && found.edge.side != Vec3::Z;
         self.edges.iter().filter(own).map(|found| found.edge)
     }
 
     /// The rims at `poses` and the edges that were found, as pairs.
-    pub fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
+    pub(crate) fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
         pairs.clear();
         pairs.extend(self.edges.iter().map(|Found { limb, edge, target, .. }| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);

@@ -7,7 +7,7 @@ use crate::shape::SurfaceBatch;
 
 /// Surface matches of one limb: measured points and their closest points. Rejected pairs stay with weight zero.
 #[derive(Debug, Default)]
-pub struct LimbMatches {
+pub(crate) struct LimbMatches {
     /// Index of each point among the candidates.
     pub candidate: Vec<u32>,
     /// Measured points.
@@ -22,7 +22,7 @@ pub struct LimbMatches {
 
 /// A site with a target: a measured position, or the closest point of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SitePair {
+pub(crate) struct SitePair {
     /// The limb that carries the site.
     pub limb: usize,
     /// The site.
@@ -45,7 +45,7 @@ pub struct SitePair {
 
 /// A point of a limb's rim and the edge that an image shows there: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContourPair {
+pub(crate) struct ContourPair {
     /// The limb.
     pub limb: usize,
     /// The rim's point.
@@ -58,7 +58,7 @@ pub struct ContourPair {
 
 /// A point of a limb's contour and the edge of its colours in a picture: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RegionPair {
+pub(crate) struct RegionPair {
     /// The limb.
     pub limb: usize,
     /// The contour's point.
@@ -75,7 +75,7 @@ pub struct RegionPair {
 
 /// What pictures say of a limb, by its lines: shares of those that can tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RegionSupport {
+pub(crate) struct RegionSupport {
     /// Its colours end at its contour: of the whole limb, each line weighted with its distance from the proximal joint, and of
     /// its outer part.
     pub own: [f64; 2],
@@ -93,7 +93,7 @@ pub struct RegionSupport {
 
 /// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Band {
+pub(crate) struct Band {
     /// Parent limb.
     pub parent: usize,
     /// Child limb.
@@ -110,7 +110,7 @@ pub struct Band {
 
 /// All correspondences of one ICP step.
 #[derive(Debug, Default)]
-pub struct Correspondences {
+pub(crate) struct Correspondences {
     /// Surface matches, limb by limb.
     pub limbs: Vec<LimbMatches>,
     /// Sites with positions and rays.
@@ -136,7 +136,7 @@ impl LimbMatches {
     }
 
     /// Sum of the weights, and weighted sum of the squared distances.
-    pub fn weighed(&self) -> (f64, f64) {
+    pub(crate) fn weighed(&self) -> (f64, f64) {
         let square = |weight, distance| f64::from(weight) * f64::from(distance) * f64::from(distance);
         let (weight, distance) = (&self.weight, &self.surface.signed_distance);
         let both = |weight, distance| [f64::from(weight), square(weight, distance)];
@@ -148,7 +148,7 @@ impl LimbMatches {
     }
 
     /// Sum of the weights.
-    pub fn total_weight(&self) -> f64 {
+    pub(crate) fn total_weight(&self) -> f64 {
         let [total] = widest(
             #[inline(always)]
             || in_lanes(&self.weight, &self.weight, |weight, _| [f64::from(weight)]),
@@ -157,7 +157,7 @@ impl LimbMatches {
     }
 
     /// Number of accepted pairs and weighted sum of their squared distances.
-    pub fn accepted(&self) -> (usize, f64) {
+    pub(crate) fn accepted(&self) -> (usize, f64) {
         (self.weight.iter().filter(|weight| **weight > 0.0).count(), self.weighed().1)
     }
 }
@@ -185,7 +185,7 @@ fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, 
 
 impl Correspondences {
     /// Makes as much room for surface matches and edges as `other` has.
-    pub fn reserve_as(&mut self, other: &Self) {
+    pub(crate) fn reserve_as(&mut self, other: &Self) {
         self.regions.reserve(other.regions.capacity().saturating_sub(self.regions.len()));
         self.region_support.reserve(other.region_support.capacity().saturating_sub(self.region_support.len()));
         self.limbs.resize_with(other.limbs.len(), LimbMatches::default);
@@ -195,14 +195,14 @@ impl Correspondences {
     }
 
     /// Measured weight of a limb: its points and its sites.
-    pub fn measured_weight(&self, limb: usize) -> f64 {
+    pub(crate) fn measured_weight(&self, limb: usize) -> f64 {
         let sites: f64 = self.sites.iter().filter(|pair| pair.limb == limb).map(|pair| pair.weight).sum();
         self.limbs[limb].total_weight() + sites
     }
 
     /// Mean squared distance of the surface points that fit, metres squared: Geman-McClure's weights of `scale` leave out those
     /// that belong to something else.
-    pub fn scatter(&self, scale: f64) -> Option<f64> {
+    pub(crate) fn scatter(&self, scale: f64) -> Option<f64> {
         let (mut weight, mut sum) = (0.0, 0.0);
         let inverse_square = 1.0 / (scale * scale);
         for limb in &self.limbs {
@@ -223,7 +223,7 @@ impl Correspondences {
     }
 
     /// Weighted mean of the squared distances of all measured pairs (K06 III-B step 2), `None` without any.
-    pub fn mean_squared_distance(&self) -> Option<f64> {
+    pub(crate) fn mean_squared_distance(&self) -> Option<f64> {
         let (mut weight, mut sum) = (0.0, 0.0);
         for limb in &self.limbs {
             let (total, squares) = limb.weighed();
@@ -238,7 +238,7 @@ impl Correspondences {
     }
 
     /// Mean of the squared distances of the edges of colour regions by what they tell, `None` without any.
-    pub fn mean_squared_edge(&self) -> Option<f64> {
+    pub(crate) fn mean_squared_edge(&self) -> Option<f64> {
         let weight: f64 = self.regions.iter().map(|pair| pair.information).sum();
         let sum: f64 = self.regions.iter().map(|pair| pair.information * pair.distance * pair.distance).sum();
         (weight > 0.0).then(|| sum / weight)

@@ -17,7 +17,7 @@ fn beyond(bias: f64, distance: f64) -> f64 {
 
 impl Correspondences {
     /// Point-to-point relations, and for every ray the closest point on it (K06 IV-B.4 and 5).
-    pub fn add_sites(&mut self, body: &Body, poses: &[Pose], frame: &Frame, origin: Vec3) {
+    pub(crate) fn add_sites(&mut self, body: &Body, poses: &[Pose], frame: &Frame, origin: Vec3) {
         self.sites.clear();
         let place = |site: usize| {
             let site = &body.sites()[site];
@@ -64,7 +64,7 @@ impl Correspondences {
 
     /// The bands of all joints at their current lengths. A limb's bands together weigh `ratio` times its measurements, each
     /// joint by its own weight (K07 4.3: the ratio of artificial to measured stays constant).
-    pub fn add_bands(&mut self, body: &Body, poses: &[Pose], ratio: f64, measured: &mut Vec<f64>) {
+    pub(crate) fn add_bands(&mut self, body: &Body, poses: &[Pose], ratio: f64, measured: &mut Vec<f64>) {
         self.bands.clear();
         measured.clear();
         for limb in 0..poses.len() {

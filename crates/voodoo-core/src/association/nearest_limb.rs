@@ -8,7 +8,7 @@ use crate::math::{LANES, Pose, Vec3, widest};
 use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
 
 /// The limb of a point that lies in no box.
-pub const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 /// Squared distance of a point that lies outside a limb's box.
 const OUTSIDE: f32 = f32::INFINITY;
 /// What single precision may err in the place of a box, metres, and as a share of the coordinates it was computed from; bounds
@@ -23,7 +23,7 @@ type Squares = [f32; CLUSTER];
 
 /// The limbs in their poses, and working memory.
 #[derive(Debug, Default)]
-pub struct Nearest {
+pub(crate) struct Nearest {
     limbs: Vec<LimbBox>,
     groups: Vec<Group>,
     least: Vec<Lanes>,
@@ -33,7 +33,7 @@ pub struct Nearest {
 
 impl Nearest {
     /// Puts the limbs where they are, their boxes enlarged by `margin`; those that are `buried` hold no point. Empty: none is.
-    pub fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
+    pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
         self.limbs.clear();
         self.limbs.extend(body.limbs().iter().zip(poses).enumerate().map(|(index, (limb, pose))| {
             let open = LimbBox::new(limb, pose, margin);
@@ -50,7 +50,7 @@ impl Nearest {
     /// The nearest limb of every point, or [`NONE`], into `nearest`.
     ///
     /// `inside` gets for every point and limb whether the limb's box holds it, if it has room for that; otherwise it is empty.
-    pub fn find(&mut self, clusters: &Clusters, nearest: &mut [u32], inside: &mut [bool]) {
+    pub(crate) fn find(&mut self, clusters: &Clusters, nearest: &mut [u32], inside: &mut [bool]) {
         self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
         self.expected.resize(clusters.iter().len(), [0; 2]);
         widest(

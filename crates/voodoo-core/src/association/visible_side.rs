@@ -13,7 +13,7 @@ use crate::observation::candidates::Candidates;
 use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
 
 /// Turns the matches of depth pixels inside a limb that face away from their camera to the near side.
-pub fn match_visible_side(
+pub(crate) fn match_visible_side(
     shape: &TaperedEllipticCylinder,
     pose: &Pose,
     candidates: &Candidates,

@@ -6,7 +6,7 @@ use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Limbs that are of one length: the two of a pair, or one of the trunk.
-pub type Pair = Vec<usize>;
+pub(crate) type Pair = Vec<usize>;
 
 impl Body {
     /// The body with all lengths multiplied by `factor`.

@@ -70,7 +70,7 @@ impl Joint {
     }
 
     /// Pose of the limb in its parent when the bands have length zero and the joint is not turned.
-    pub fn parent_from_limb_at_rest(&self) -> Pose {
+    pub(crate) fn parent_from_limb_at_rest(&self) -> Pose {
         self.parent_from_joint * self.limb_from_joint.inverse()
     }
 }

@@ -7,7 +7,7 @@ use crate::math::{Pose, Quat, Vec3};
 
 /// Where the unknowns of each limb's joint stand in the vector of all unknowns; the root has six.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Chain {
+pub(crate) struct Chain {
     /// First unknown of each limb.
     pub start: Vec<usize>,
     /// Number of unknowns of each limb: 6 for the root, 1 for a hinge, else 3.
@@ -20,7 +20,7 @@ pub struct Chain {
 
 impl Chain {
     /// Lays out the unknowns of `body`.
-    pub fn layout(&mut self, body: &Body) {
+    pub(crate) fn layout(&mut self, body: &Body) {
         self.start.clear();
         self.count.clear();
         self.parent.clear();
@@ -39,7 +39,7 @@ impl Chain {
 }
 
 /// Number of a joint's freedoms: 1 of a hinge, else 3.
-pub fn freedoms(joint: &Joint) -> usize {
+pub(crate) fn freedoms(joint: &Joint) -> usize {
     if joint.kind() == JointKind::Hinge { 1 } else { 3 }
 }
 
@@ -52,7 +52,7 @@ pub fn hinge_axis(joint: &Joint) -> Vec3 {
 }
 
 /// Axes of a joint's freedoms in the world (`exp` of their combination turns the child), and how many they are.
-pub fn joint_axes(joint: &Joint, world_from_parent: &Pose) -> ([Vec3; 3], usize) {
+pub(crate) fn joint_axes(joint: &Joint, world_from_parent: &Pose) -> ([Vec3; 3], usize) {
     let rotation = world_from_parent.rotation * joint.parent_from_joint.rotation;
     match joint.kind() {
         JointKind::Hinge => ([rotation * hinge_axis(joint), Vec3::ZERO, Vec3::ZERO], 1),
@@ -61,7 +61,7 @@ pub fn joint_axes(joint: &Joint, world_from_parent: &Pose) -> ([Vec3; 3], usize)
 }
 
 /// The spatial twist of a turn about `axis` through `centre` (a screw without pitch, R07 eq. 14).
-pub fn screw(axis: Vec3, centre: Vec3) -> Vector6<f64> {
+pub(crate) fn screw(axis: Vec3, centre: Vec3) -> Vector6<f64> {
     let v = centre.cross(axis);
     Vector6::new(axis.x, axis.y, axis.z, v.x, v.y, v.z)
 }

@@ -4,20 +4,20 @@ mod edit;
 mod fit;
 mod human;
 mod joint;
-pub mod kinematics;
+pub(crate) mod kinematics;
 mod model;
 mod pose_prior;
 mod pose_statistics;
 mod roles;
 pub(crate) mod shoulders;
-pub mod two_bone;
+pub(crate) mod two_bone;
 
-pub use edit::Pair;
+pub(crate) use edit::Pair;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
-pub use model::Model;
-pub use pose_prior::unusual;
-pub use roles::{JointRole, LimbRole, Roles, Side};
+pub(crate) use model::Model;
+pub(crate) use pose_prior::unusual;
+pub(crate) use roles::{JointRole, LimbRole, Roles, Side};
 
 use crate::error::BodyError;
 use crate::math::{Pose, Vec3, is_place, is_rigid};
@@ -83,7 +83,7 @@ impl Body {
     }
 
     /// What its limbs, joints and sites are on a human.
-    pub fn roles(&self) -> &Roles {
+    pub(crate) fn roles(&self) -> &Roles {
         &self.roles
     }
 
@@ -98,7 +98,7 @@ impl Body {
     }
 
     /// True when one of the two limbs is the parent of the other.
-    pub fn adjacent(&self, first: usize, second: usize) -> bool {
+    pub(crate) fn adjacent(&self, first: usize, second: usize) -> bool {
         let joins =
             |child: usize, parent: usize| self.limbs[child].parent.as_ref().is_some_and(|(index, _)| *index == parent);
         joins(first, second) || joins(second, first)
@@ -143,7 +143,7 @@ impl Body {
 
     /// The limb whose surface lies nearest to a point (about, see
     /// [`TaperedEllipticCylinder::approximate_distance`]); the first of equals.
-    pub fn closest_limb(&self, world_from_limb: &[Pose], point: Vec3) -> usize {
+    pub(crate) fn closest_limb(&self, world_from_limb: &[Pose], point: Vec3) -> usize {
         let (mut closest, mut least) = (0, f64::INFINITY);
         for (index, (limb, pose)) in self.limbs.iter().zip(world_from_limb).enumerate() {
             let distance = limb.shape.approximate_distance(pose.inverse_transform_point(point));

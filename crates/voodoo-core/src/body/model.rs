@@ -8,7 +8,7 @@ use crate::shape::TaperedEllipticCylinder;
 
 /// The tracked body. It changes when sizes are fitted and when limbs are edited, never with the pose.
 #[derive(Clone, Debug)]
-pub struct Model {
+pub(crate) struct Model {
     /// The body in its current sizes.
     pub body: Body,
     /// The body in the sizes it was given in: every start is fitted from these.
@@ -19,18 +19,18 @@ pub struct Model {
 
 impl Model {
     /// The model of `body`.
-    pub fn new(body: Body) -> Self {
+    pub(crate) fn new(body: Body) -> Self {
         Self { reference_body: body.clone(), extremities: TwoBone::of(&body), body }
     }
 
     /// Takes the body in other sizes, or with other limbs.
-    pub fn adopt(&mut self, body: Body) {
+    pub(crate) fn adopt(&mut self, body: Body) {
         self.extremities = TwoBone::of(&body);
         self.body = body;
     }
 
     /// Sizes and world poses that put named sites (index, world position) where they are; see [`Body::fit`].
-    pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Body, Vec<Pose>), TrackError> {
+    pub(crate) fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Body, Vec<Pose>), TrackError> {
         if let Some((site, _)) = positions.iter().find(|(site, _)| *site >= self.body.sites().len()) {
             return Err(TrackError::measurement("joints", "the index of a site", site.to_string()));
         }
@@ -39,17 +39,17 @@ impl Model {
     }
 
     /// Scales the whole body.
-    pub fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
+    pub(crate) fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
         self.edit(|body| body.scaled(factor))
     }
 
     /// Changes the dimensions of one limb.
-    pub fn set_shape(&mut self, limb: &str, shape: TaperedEllipticCylinder) -> Result<(), BodyError> {
+    pub(crate) fn set_shape(&mut self, limb: &str, shape: TaperedEllipticCylinder) -> Result<(), BodyError> {
         self.edit(|body| body.with_shape(limb, shape))
     }
 
     /// Adds a limb to `parent`.
-    pub fn add_limb(
+    pub(crate) fn add_limb(
         &mut self,
         name: &str,
         parent: &str,
@@ -61,7 +61,7 @@ impl Model {
     }
 
     /// Removes a limb with all that hangs on it; returns the indices of those that stay.
-    pub fn remove_limb(&mut self, name: &str) -> Result<Vec<usize>, BodyError> {
+    pub(crate) fn remove_limb(&mut self, name: &str) -> Result<Vec<usize>, BodyError> {
         let (_, kept) = self.body.without_limb(name)?;
         self.edit(|body| body.without_limb(name).map(|(body, _)| body))?;
         Ok(kept)

@@ -23,7 +23,7 @@ const JOINTS: [(JointRole, usize, usize); 9] = [
 /// Number of components of all joints.
 const SIZE: usize = MEAN.len();
 /// How unusual a pose is: the squared Mahalanobis distance from the mean; 0 for bodies of which nothing is known.
-pub fn unusual(body: &Body, poses: &[Pose]) -> f64 {
+pub(crate) fn unusual(body: &Body, poses: &[Pose]) -> f64 {
     let mut off = [0.0; SIZE];
     each_turn(body, poses, |component, value| off[component] = value);
     let mut rest = PRECISION.as_slice();

@@ -8,21 +8,22 @@ use crate::error::BodyError;
 
 /// Side of the body, its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub(crate) enum Side {
     /// Names that begin with `l_`.
     Left,
     /// Names that begin with `r_`.
     Right,
 }
 
+#[cfg(test)]
 impl Side {
     /// Left, right.
-    pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
+    pub(crate) const BOTH: [Self; 2] = [Self::Left, Self::Right];
 }
 
 /// A limb of the human.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LimbRole {
+pub(crate) enum LimbRole {
     /// `pelvis`
     Pelvis,
     /// `thorax`; or `torso`, the whole trunk.
@@ -49,7 +50,7 @@ pub enum LimbRole {
 
 /// A joint of the human, or the site at its center (H-Anim names).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointRole {
+pub(crate) enum JointRole {
     /// `vl3`
     Waist,
     /// `vc7`
@@ -92,7 +93,7 @@ impl LimbRole {
     }
 
     /// The side of a limb that there are two of.
-    pub fn side(self) -> Option<Side> {
+    pub(crate) fn side(self) -> Option<Side> {
         match self {
             Self::Pelvis | Self::Thorax | Self::Neck | Self::Head => None,
             Self::Clavicle(side)
@@ -125,7 +126,7 @@ impl JointRole {
     }
 
     /// The side of a joint that there are two of.
-    pub fn side(self) -> Option<Side> {
+    pub(crate) fn side(self) -> Option<Side> {
         match self {
             Self::Waist | Self::NeckBase | Self::SkullBase => None,
             Self::Sternoclavicular(side)
@@ -155,7 +156,7 @@ impl JointRole {
 
 /// What the limbs, joints and sites of a body are on a human. It follows from their names; sizes do not change it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Roles {
+pub(crate) struct Roles {
     human: bool,
     /// Limb by limb: what it is, what the joint to its parent is, and the site named like that joint.
     limbs: Vec<Option<LimbRole>>,
@@ -232,47 +233,48 @@ impl Roles {
     }
 
     /// Whether the body is said to be a human: statistics of human poses hold for it.
-    pub fn is_human(&self) -> bool {
+    pub(crate) fn is_human(&self) -> bool {
         self.human
     }
 
     /// What a limb is.
-    pub fn limb(&self, limb: usize) -> Option<LimbRole> {
+    pub(crate) fn limb(&self, limb: usize) -> Option<LimbRole> {
         self.limbs.get(limb).copied().flatten()
     }
 
     /// What the joint between a limb and its parent is.
-    pub fn joint(&self, limb: usize) -> Option<JointRole> {
+    pub(crate) fn joint(&self, limb: usize) -> Option<JointRole> {
         self.joints.get(limb).copied().flatten()
     }
 
     /// The limb that hangs by a joint; the first of several.
-    pub fn limb_at(&self, joint: JointRole) -> Option<usize> {
+    pub(crate) fn limb_at(&self, joint: JointRole) -> Option<usize> {
         self.joints.iter().position(|role| *role == Some(joint))
     }
 
     /// The site at a joint's center.
-    pub fn site_at(&self, joint: JointRole) -> Option<usize> {
+    #[cfg(test)]
+    pub(crate) fn site_at(&self, joint: JointRole) -> Option<usize> {
         self.sites.iter().position(|role| *role == Some(joint))
     }
 
     /// The site at the center of the joint between a limb and its parent, whatever they are: the one of the joint's name.
-    pub fn joint_site(&self, limb: usize) -> Option<usize> {
+    pub(crate) fn joint_site(&self, limb: usize) -> Option<usize> {
         self.joint_sites.get(limb).copied().flatten()
     }
 
     /// Whether a limb hangs by a sternoclavicular joint.
-    pub fn is_clavicle(&self, limb: usize) -> bool {
+    pub(crate) fn is_clavicle(&self, limb: usize) -> bool {
         matches!(self.joint(limb), Some(JointRole::Sternoclavicular(_)))
     }
 
     /// Pairs of a clavicle and the upper arm on it.
-    pub fn clavicles(&self) -> &[[usize; 2]] {
+    pub(crate) fn clavicles(&self) -> &[[usize; 2]] {
         &self.clavicles
     }
 
     /// A number for each limb, the same for a limb and its counterpart on the other side; counted from 0, in any body.
-    pub fn groups(&self) -> &[u16] {
+    pub(crate) fn groups(&self) -> &[u16] {
         &self.groups
     }
 }

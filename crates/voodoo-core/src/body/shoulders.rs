@@ -12,7 +12,7 @@ const RHYTHM: f64 = 0.3;
 
 /// Turns the clavicles of `predicted` by what arms have risen beyond the horizontal from `previous` to `current`, or sunk again. The
 /// arms keep their directions, and joints stay closed.
-pub fn raise_shoulders(body: &Body, previous: &[Pose], current: &[Pose], predicted: &mut [Pose]) {
+pub(crate) fn raise_shoulders(body: &Body, previous: &[Pose], current: &[Pose], predicted: &mut [Pose]) {
     let limbs = body.limbs();
     let mut raised = false;
     for [clavicle, arm] in body.roles().clavicles() {

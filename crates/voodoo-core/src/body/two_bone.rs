@@ -15,7 +15,7 @@ const STRETCHED: f64 = 0.05;
 
 /// A ball joint with a hinge behind it: an arm or a leg.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TwoBone {
+pub(crate) struct TwoBone {
     /// The limb on the ball joint.
     pub upper: usize,
     /// The limb on the hinge.
@@ -30,7 +30,7 @@ pub struct TwoBone {
 
 impl TwoBone {
     /// All arms and legs of a body.
-    pub fn of(body: &Body) -> Vec<Self> {
+    pub(crate) fn of(body: &Body) -> Vec<Self> {
         let limbs = body.limbs();
         let mut found = Vec::new();
         for (lower, limb) in limbs.iter().enumerate() {
@@ -60,12 +60,12 @@ impl TwoBone {
     }
 
     /// All limbs of the chain.
-    pub fn limbs(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn limbs(&self) -> impl Iterator<Item = usize> + '_ {
         [self.upper, self.lower].into_iter().chain(self.ends.iter().copied())
     }
 
     /// Centre of the ball joint.
-    pub fn root(&self, body: &Body, poses: &[Pose]) -> Vec3 {
+    pub(crate) fn root(&self, body: &Body, poses: &[Pose]) -> Vec3 {
         match &body.limbs()[self.upper].parent {
             Some((parent, joint)) => poses[*parent] * joint.parent_from_joint.translation,
             None => poses[self.upper].translation,
@@ -73,13 +73,13 @@ impl TwoBone {
     }
 
     /// Stretched length.
-    pub fn stretched_length(&self) -> f64 {
+    pub(crate) fn stretched_length(&self) -> f64 {
         self.lengths[0] + self.lengths[1]
     }
 
     /// Puts the chain so that its end is at `target` as nearly as it reaches, with the bend turned by `swivel` radians about
     /// the line to it; the joints stay closed.
-    pub fn reach(&self, body: &Body, poses: &mut [Pose], target: Vec3, swivel: f64) {
+    pub(crate) fn reach(&self, body: &Body, poses: &mut [Pose], target: Vec3, swivel: f64) {
         let root = self.root(body, poses);
         let [first, second] = self.lengths;
         let line = target - root;
@@ -95,12 +95,12 @@ impl TwoBone {
     }
 
     /// Where the chain ends.
-    pub fn end(&self, poses: &[Pose]) -> Vec3 {
+    pub(crate) fn end(&self, poses: &[Pose]) -> Vec3 {
         poses[self.lower] * (Vec3::Z * self.lengths[1])
     }
 
     /// Puts the chain so that it bends towards one place and ends in the direction of another one; the joints stay closed.
-    pub fn put(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
+    pub(crate) fn put(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
         let root = self.root(body, poses);
         let (Some((_, ball)), Some((_, hinge))) = (&body.limbs()[self.upper].parent, &body.limbs()[self.lower].parent)
         else {

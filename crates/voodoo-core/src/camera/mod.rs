@@ -11,9 +11,9 @@ use crate::math::Vec3;
 pub use lens::Lens;
 
 /// Pixels of an image at most, those of an 8K picture: more would be a mistyped size, and memory by the gigabyte.
-pub const MOST_PIXELS: usize = 1 << 25;
+pub(crate) const MOST_PIXELS: usize = 1 << 25;
 /// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
-pub const NEAREST_SEEN: f64 = 0.05;
+pub(crate) const NEAREST_SEEN: f64 = 0.05;
 /// Parts into which a side of a rectangle is cut to follow its picture through a lens.
 const SIDE_PARTS: usize = 16;
 

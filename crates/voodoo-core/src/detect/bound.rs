@@ -7,7 +7,7 @@ use crate::observation::frame::DepthImage;
 
 /// A detection, and where it puts the body.
 #[derive(Clone, Debug)]
-pub struct PlacedDetection {
+pub(crate) struct PlacedDetection {
     /// Its number among those of its image, for [`Detect::reject`].
     pub index: usize,
     /// The body's root, world frame, metres.
@@ -18,7 +18,7 @@ pub struct PlacedDetection {
 
 /// No detector, or one with its names resolved on a body. What it reports is checked.
 #[derive(Debug, Default)]
-pub struct BoundDetector {
+pub(crate) struct BoundDetector {
     detector: Option<Box<dyn Detect>>,
     map: JointMap,
     knows: bool,
@@ -27,13 +27,13 @@ pub struct BoundDetector {
 
 impl BoundDetector {
     /// Takes a detector for this body.
-    pub fn set(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
+    pub(crate) fn set(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
         self.detector = detector;
         self.bind(body);
     }
 
     /// The body has changed.
-    pub fn bind(&mut self, body: &Body) {
+    pub(crate) fn bind(&mut self, body: &Body) {
         let detector = self.detector.as_deref();
         self.map = detector
             .map_or_else(JointMap::default, |detector| JointMap::new(body, &detector.joints(), &detector.lengths()));
@@ -41,33 +41,33 @@ impl BoundDetector {
     }
 
     /// Whether there is a detector, and it can find the body.
-    pub fn knows(&self) -> bool {
+    pub(crate) fn knows(&self) -> bool {
         self.knows
     }
 
     /// What its joints are on the body.
-    pub fn map(&self) -> &JointMap {
+    pub(crate) fn map(&self) -> &JointMap {
         &self.map
     }
 
     /// Another detector of the same kind that has seen nothing.
-    pub fn fresh(&self) -> Option<Box<dyn Detect>> {
+    pub(crate) fn fresh(&self) -> Option<Box<dyn Detect>> {
         self.detector.as_ref().map(|detector| detector.fresh())
     }
 
     /// The last error since [`Self::clear_error`].
-    pub fn error(&self) -> Option<&DetectError> {
+    pub(crate) fn error(&self) -> Option<&DetectError> {
         self.error.as_ref()
     }
 
     /// Forgets the last error.
-    pub fn clear_error(&mut self) {
+    pub(crate) fn clear_error(&mut self) {
         self.error = None;
     }
 
     /// The persons that it reports of an image; of [`DetectionQuery::Near`] the nearest alone. Nobody where it fails or reports what
     /// cannot be meant, see [`Self::error`].
-    pub fn look(
+    pub(crate) fn look(
         &mut self,
         body: &Body,
         image: &DepthImage,
@@ -101,12 +101,12 @@ impl BoundDetector {
     }
 
     /// See [`Detect::nearest`].
-    pub fn nearest(&self) -> Option<(f64, Aabb)> {
+    pub(crate) fn nearest(&self) -> Option<(f64, Aabb)> {
         self.detector.as_ref().filter(|_| self.error.is_none())?.nearest()
     }
 
     /// See [`Detect::reject`].
-    pub fn reject(&mut self, index: usize) {
+    pub(crate) fn reject(&mut self, index: usize) {
         if let Some(detector) = &mut self.detector {
             detector.reject(index);
         }

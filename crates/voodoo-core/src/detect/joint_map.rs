@@ -25,7 +25,7 @@ const STATURE: &str = "stature";
 
 /// What a detector's joints and lengths are on a body. Joints and lengths are numbered as the detector does.
 #[derive(Clone, Debug, Default)]
-pub struct JointMap {
+pub(crate) struct JointMap {
     /// The body's site with the name of each joint.
     pub(super) sites: Vec<Option<usize>>,
     /// Number of lengths.
@@ -46,7 +46,7 @@ pub struct JointMap {
 
 impl JointMap {
     /// The joints and lengths with these names on a body.
-    pub fn new(body: &Body, joints: &[String], lengths: &[String]) -> Self {
+    pub(crate) fn new(body: &Body, joints: &[String], lengths: &[String]) -> Self {
         let sites: Vec<Option<usize>> = joints.iter().map(|name| body.site_index(name).ok()).collect();
         let number = |name: &str| joints.iter().position(|joint| joint == name);
         let joint = |name: &str| number(name).filter(|index| sites[*index].is_some());
@@ -89,32 +89,32 @@ impl JointMap {
     }
 
     /// The body's site of a joint.
-    pub fn site(&self, joint: usize) -> Option<usize> {
+    pub(crate) fn site(&self, joint: usize) -> Option<usize> {
         self.sites.get(joint).copied().flatten()
     }
 
     /// Joints that tell where the trunk is and which way round; of a body without shoulders and hips all that it has.
-    pub fn trunk(&self) -> &[usize] {
+    pub(crate) fn trunk(&self) -> &[usize] {
         &self.trunk
     }
 
     /// Knees and ankles.
-    pub fn legs(&self) -> &[usize] {
+    pub(crate) fn legs(&self) -> &[usize] {
         &self.legs
     }
 
     /// Elbows and wrists.
-    pub fn arms(&self) -> &[usize] {
+    pub(crate) fn arms(&self) -> &[usize] {
         &self.arms
     }
 
     /// The length of every limb of the body, if the detector reports it; the parts of the trunk share one.
-    pub fn length_of_limb(&self) -> &[Option<usize>] {
+    pub(crate) fn length_of_limb(&self) -> &[Option<usize>] {
         &self.length_of_limb
     }
 
     /// The stature, if the detector reports it.
-    pub fn stature(&self) -> Option<usize> {
+    pub(crate) fn stature(&self) -> Option<usize> {
         self.stature
     }
 
@@ -126,7 +126,7 @@ impl JointMap {
 
 /// A detection, and what its joints are on the body.
 #[derive(Clone, Copy, Debug)]
-pub struct Detected<'a> {
+pub(crate) struct Detected<'a> {
     /// The detection.
     pub detection: &'a Detection,
     /// Its joints and lengths on the body.
@@ -135,27 +135,27 @@ pub struct Detected<'a> {
 
 impl<'a> Detected<'a> {
     /// A joint by its number.
-    pub fn joint(&self, index: usize) -> Option<&'a DetectedJoint> {
+    pub(crate) fn joint(&self, index: usize) -> Option<&'a DetectedJoint> {
         self.detection.joints.get(index)?.as_ref()
     }
 
     /// The joint that a limb hangs by.
-    pub fn hangs_by(&self, limb: usize) -> Option<&'a DetectedJoint> {
+    pub(crate) fn hangs_by(&self, limb: usize) -> Option<&'a DetectedJoint> {
         self.joint(self.map.hangs_by.get(limb).copied().flatten()?)
     }
 
     /// The first joint found on a limb that is not the one that it hangs by.
-    pub fn on_limb(&self, limb: usize) -> Option<&'a DetectedJoint> {
+    pub(crate) fn on_limb(&self, limb: usize) -> Option<&'a DetectedJoint> {
         self.map.on_limb.get(limb)?.iter().find_map(|joint| self.joint(*joint))
     }
 
     /// The ankles that were found.
-    pub fn ankles(&self) -> impl Iterator<Item = &'a DetectedJoint> + '_ {
+    pub(crate) fn ankles(&self) -> impl Iterator<Item = &'a DetectedJoint> + '_ {
         self.map.ankles.iter().filter_map(|joint| self.joint(*joint))
     }
 
     /// A length and its relative standard deviation, by its number.
-    pub fn length(&self, index: usize) -> Option<[f64; 2]> {
+    pub(crate) fn length(&self, index: usize) -> Option<[f64; 2]> {
         self.detection.lengths.get(index).copied()
     }
 }

@@ -8,8 +8,8 @@ mod joint_map;
 mod placement;
 mod skeleton;
 
-pub use bound::{BoundDetector, PlacedDetection};
-pub use joint_map::{Detected, JointMap};
+pub(crate) use bound::{BoundDetector, PlacedDetection};
+pub(crate) use joint_map::{Detected, JointMap};
 pub(crate) use placement::{is_sized_like, place, posed, sized};
 
 use crate::body::Body;

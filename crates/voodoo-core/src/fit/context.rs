@@ -12,7 +12,7 @@ const LATE: f64 = 2.5;
 
 /// One frame of one body. Cheap to copy.
 #[derive(Clone, Copy, Debug)]
-pub struct Context<'a> {
+pub(crate) struct Context<'a> {
     /// Parameters.
     pub config: &'a Config,
     /// What is tracked.
@@ -27,12 +27,12 @@ pub struct Context<'a> {
 
 impl Context<'_> {
     /// The same with fewer points, where there are many.
-    pub fn roughly(self) -> Self {
+    pub(crate) fn roughly(self) -> Self {
         Self { seen: self.seen.with(self.seen.candidates.rough()), ..self }
     }
 
     /// Whether edges of colours tell more of a limb than what else there is: depth blurs arms, and knows legs better.
-    pub fn wants_edges(&self, limb: usize) -> bool {
+    pub(crate) fn wants_edges(&self, limb: usize) -> bool {
         self.pictures_alone() || {
             let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
             arms.flat_map(TwoBone::limbs).any(|own| own == limb)
@@ -40,12 +40,12 @@ impl Context<'_> {
     }
 
     /// Whether the body may have moved as nobody expects: two frames show how it moves, and a long time may change that.
-    pub fn moves_unknown(&self) -> bool {
+    pub(crate) fn moves_unknown(&self) -> bool {
         self.time_scale > LATE
     }
 
     /// Whether colours are all that shows the body.
-    pub fn pictures_alone(&self) -> bool {
+    pub(crate) fn pictures_alone(&self) -> bool {
         let frame = self.seen.frame();
         self.config.regions && !frame.colors.is_empty() && frame.images.is_empty() && frame.clouds.is_empty()
     }
@@ -53,7 +53,7 @@ impl Context<'_> {
 
 /// A frame before it is said what is tracked: for those who change the model meanwhile.
 #[derive(Clone, Copy, Debug)]
-pub struct Setting<'a> {
+pub(crate) struct Setting<'a> {
     /// As in [`Context`].
     pub config: &'a Config,
     /// As in [`Context`].
@@ -66,7 +66,7 @@ pub struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     /// The frame of this model.
-    pub fn of<'b>(self, model: &'b Model) -> Context<'b>
+    pub(crate) fn of<'b>(self, model: &'b Model) -> Context<'b>
     where
         'a: 'b,
     {
@@ -77,7 +77,7 @@ impl<'a> Setting<'a> {
 
 /// Correspondences and the poses at which they were found.
 #[derive(Clone, Copy, Debug)]
-pub struct Matched<'a> {
+pub(crate) struct Matched<'a> {
     /// The correspondences.
     pub correspondences: &'a Correspondences,
     /// The poses, working frame.

@@ -6,24 +6,24 @@ use crate::regions::{Posed, Regions, steps};
 
 impl Fit {
     /// Colours of limbs and surroundings.
-    pub fn regions(&self) -> &Regions {
+    pub(crate) fn regions(&self) -> &Regions {
         &self.regions
     }
 
     /// The same, to change.
-    pub fn regions_mut(&mut self) -> &mut Regions {
+    pub(crate) fn regions_mut(&mut self) -> &mut Regions {
         &mut self.regions
     }
 
     /// Learns the colours of new cameras where the body is expected.
-    pub fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
+    pub(crate) fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
         if context.config.regions {
             self.regions.begin(context.seen.frame(), posed(context, poses));
         }
     }
 
     /// Looks for every edge of colours by itself, both sides of a limb apart: pairs that tell how wide it is.
-    pub fn match_outline(&mut self, context: Context, poses: &[Pose]) {
+    pub(crate) fn match_outline(&mut self, context: Context, poses: &[Pose]) {
         let Self { regions, correspondences, .. } = self;
         correspondences.regions.clear();
         if context.config.regions {
@@ -33,7 +33,7 @@ impl Fit {
     }
 
     /// Learns colours where the body was found.
-    pub fn learn_regions(&mut self, context: Context) {
+    pub(crate) fn learn_regions(&mut self, context: Context) {
         if context.config.regions {
             self.regions.learn(context.seen.frame());
         }

@@ -4,8 +4,8 @@ mod context;
 mod edges;
 mod motion;
 
-pub use context::{Context, Matched, Setting};
-pub use motion::{Motion, REFERENCE_RATE, UNKNOWN_MOTION};
+pub(crate) use context::{Context, Matched, Setting};
+pub(crate) use motion::{Motion, REFERENCE_RATE, UNKNOWN_MOTION};
 
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -23,11 +23,11 @@ use crate::regions;
 use crate::solver::{Gate, Problem, Reassociation, Schedule, Solver, WarmStartInput, solver};
 
 /// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
-pub const CONTOUR_FROM: usize = 2;
+pub(crate) const CONTOUR_FROM: usize = 2;
 
 /// Finds the pose that fits a frame, from one that is near. Keeps what was matched last.
 #[derive(Debug)]
-pub struct Fit {
+pub(crate) struct Fit {
     solver: Box<dyn Solver>,
     assignment: Assignment,
     buried: Buried,
@@ -42,7 +42,7 @@ pub struct Fit {
 
 impl Fit {
     /// The solver and the threads of a configuration.
-    pub fn new(config: &Config) -> Result<Self, TrackError> {
+    pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
         let threads = match config.threads {
             1 => None,
             count => Some(rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(|error| {
@@ -63,27 +63,27 @@ impl Fit {
     }
 
     /// What the solver wants of the loop.
-    pub fn schedule(&self, config: &Config) -> Schedule {
+    pub(crate) fn schedule(&self, config: &Config) -> Schedule {
         self.solver.schedule(config)
     }
 
     /// What was matched last.
-    pub fn correspondences(&self) -> &Correspondences {
+    pub(crate) fn correspondences(&self) -> &Correspondences {
         &self.correspondences
     }
 
     /// What was matched last, and where.
-    pub fn matched<'a>(&'a self, poses: &'a [Pose]) -> Matched<'a> {
+    pub(crate) fn matched<'a>(&'a self, poses: &'a [Pose]) -> Matched<'a> {
         Matched { correspondences: &self.correspondences, poses }
     }
 
     /// Exchanges what was matched last: another pose can be tried in between.
-    pub fn exchange(&mut self, matched: &mut Correspondences) {
+    pub(crate) fn exchange(&mut self, matched: &mut Correspondences) {
         std::mem::swap(&mut self.correspondences, matched);
     }
 
     /// Forgets what was matched.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
         self.correspondences.contour.clear();
@@ -94,7 +94,7 @@ impl Fit {
 
     /// Warm start, then steps 2 to 7 until they settle; the matches at the end are those of the found poses. Returns the
     /// number of steps.
-    pub fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
+    pub(crate) fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.warm_start(context, poses);
         let schedule = self.schedule(context.config);
         let edges = regions::steps(self.far);
@@ -123,7 +123,7 @@ impl Fit {
     }
 
     /// The same where nobody knows how the body moves: edges of colours are looked for farther away at first.
-    pub fn run_far(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
+    pub(crate) fn run_far(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.far = true;
         let steps = self.run(context, predicted, poses);
         self.far = false;
@@ -131,13 +131,13 @@ impl Fit {
     }
 
     /// One ICP step (2 to 7) with all associations made anew.
-    pub fn step(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
+    pub(crate) fn step(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
         self.match_all(context, poses, step);
         self.solve(context, predicted, poses, step);
     }
 
     /// Steps 2 to 5 at `poses`: everything measured becomes a correspondence.
-    pub fn match_all(&mut self, context: Context, poses: &[Pose], step: usize) {
+    pub(crate) fn match_all(&mut self, context: Context, poses: &[Pose], step: usize) {
         let gate = self.schedule(context.config).gate(step);
         // 2 Assign points to limbs.
         self.assign(context, poses, &gate);
@@ -151,7 +151,7 @@ impl Fit {
     }
 
     /// The same after the last step, but for the contour: it moves nothing any more.
-    pub fn match_last(&mut self, context: Context, poses: &[Pose]) {
+    pub(crate) fn match_last(&mut self, context: Context, poses: &[Pose]) {
         self.match_end(context, poses, true);
     }
 
@@ -168,24 +168,24 @@ impl Fit {
     }
 
     /// Points alone, within `gate`, wherever on a limb they are closest: for poses that somebody set.
-    pub fn match_points(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
+    pub(crate) fn match_points(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         self.assign(context, poses, gate);
         self.match_surface(context, poses, gate, true, false);
     }
 
     /// Looks for the edges of limbs in depth images, as pairs at `poses`.
-    pub fn match_contour(&mut self, context: Context, poses: &[Pose]) {
+    pub(crate) fn match_contour(&mut self, context: Context, poses: &[Pose]) {
         self.find_contour(context, poses);
         self.contours.pairs(poses, &mut self.correspondences.contour);
     }
 
     /// The edges that were looked for last.
-    pub fn contours(&self) -> &Contours {
+    pub(crate) fn contours(&self) -> &Contours {
         &self.contours
     }
 
     /// Relative changes of length, one a pair of limbs, that the matches ask for; see [`Solver::lengths`].
-    pub fn lengths(
+    pub(crate) fn lengths(
         &mut self,
         context: Context,
         predicted: &[Pose],
@@ -220,7 +220,7 @@ impl Fit {
     }
 
     /// Steps 3 to 5: points stay with their limbs, contours with their edges.
-    pub fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
+    pub(crate) fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
         let gate = self.schedule(context.config).gate(step);
         self.match_assigned(context, poses, &gate, false);
         self.find_regions(context, poses, step);
@@ -275,7 +275,7 @@ impl Fit {
     }
 
     /// Steps 6 and 7: moves the body to what was matched.
-    pub fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
+    pub(crate) fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
         let bands = self.schedule(context.config).bands;
         let Self { solver, correspondences, band_weights, .. } = self;
         // 6 Elastic bands on both limbs.

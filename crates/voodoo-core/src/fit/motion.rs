@@ -10,15 +10,15 @@ use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 const LONGEST_PREDICTION: f64 = 2.0;
 /// In the second frame after a reset, and where a body is tried elsewhere, its motion is not known yet: this many times as much of it
 /// is unexpected.
-pub const UNKNOWN_MOTION: f64 = 4.0;
+pub(crate) const UNKNOWN_MOTION: f64 = 4.0;
 /// Motion priors are standard deviations for one frame of this rate, 1/s.
-pub const REFERENCE_RATE: f64 = 30.0;
+pub(crate) const REFERENCE_RATE: f64 = 30.0;
 /// Shortest and longest interval that they are scaled to, in frames of that rate.
 const TIME_SCALES: [f64; 2] = [0.1, 10.0];
 
 /// The poses of the body over time. All in the working frame: world axes, origin near the body.
 #[derive(Debug, Default)]
-pub struct Motion {
+pub(crate) struct Motion {
     /// Current poses, one a limb; none before the first reset.
     pub poses: Vec<Pose>,
     /// Poses of the frame before; none after a reset.
@@ -35,7 +35,7 @@ pub struct Motion {
 
 impl Motion {
     /// Starts anew at these world poses.
-    pub fn restart(&mut self, world_from_limb: Vec<Pose>) {
+    pub(crate) fn restart(&mut self, world_from_limb: Vec<Pose>) {
         self.poses = world_from_limb;
         self.origin = Vec3::ZERO;
         self.stamp = None;
@@ -43,7 +43,7 @@ impl Motion {
     }
 
     /// Forgets how the body moves, not where it is.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.previous.clear();
         self.interval = None;
     }
@@ -60,7 +60,7 @@ impl Motion {
     /// Goes on to the time of a new frame: the current poses become the previous ones, and with `start` the predicted ones the
     /// current ones; `damping` is the share of the last motion that is expected to go on. Returns the time since the last
     /// frame in units of 1/30 s, held to what a motion prior can say.
-    pub fn advance(&mut self, body: &Body, stamp: f64, damping: f64, start: bool) -> f64 {
+    pub(crate) fn advance(&mut self, body: &Body, stamp: f64, damping: f64, start: bool) -> f64 {
         self.follow();
         let step = self.stamp.map(|last| stamp - last);
         let ratio = match (step, self.interval) {
@@ -86,7 +86,7 @@ impl Motion {
     }
 
     /// Poses expected at a time to come, world frame, into `expected`; nothing changes.
-    pub fn expect(&self, body: &Body, stamp: f64, damping: f64, expected: &mut Vec<Pose>) {
+    pub(crate) fn expect(&self, body: &Body, stamp: f64, damping: f64, expected: &mut Vec<Pose>) {
         let ratio = match (self.stamp, self.interval) {
             (Some(last), Some(interval)) if self.previous.len() == self.poses.len() => {
                 ((stamp - last) / interval).min(LONGEST_PREDICTION)
@@ -99,13 +99,13 @@ impl Motion {
     }
 
     /// The frame is done.
-    pub fn commit(&mut self, stamp: f64) {
+    pub(crate) fn commit(&mut self, stamp: f64) {
         self.interval = self.stamp.map(|last| stamp - last);
         self.stamp = Some(stamp);
     }
 
     /// Current poses in the world.
-    pub fn world_from_limb(&self) -> impl Iterator<Item = Pose> + '_ {
+    pub(crate) fn world_from_limb(&self) -> impl Iterator<Item = Pose> + '_ {
         self.poses.iter().map(|pose| shifted(pose, -self.origin))
     }
 }

@@ -6,11 +6,11 @@ use crate::fit::Matched;
 use crate::math::{Pose, Vec3};
 
 /// What is this far from where it was seen, or expected, is not there, metres: about a hand's length.
-pub const APART: f64 = 0.10;
+pub(crate) const APART: f64 = 0.10;
 
 /// Cost of the sites on an arm or leg that are not where they were seen, in unexplained patches: one for each unit of weight.
 /// The sites were matched at `matched.poses`, and are looked at where `poses` would put them.
-pub fn extremity_landmark_cost(matched: Matched, chain: &TwoBone, poses: &[Pose]) -> f64 {
+pub(super) fn extremity_landmark_cost(matched: Matched, chain: &TwoBone, poses: &[Pose]) -> f64 {
     let pairs = matched.correspondences.sites.iter().filter(|pair| chain.limbs().any(|limb| limb == pair.limb));
     pairs
         .map(|pair| landmark_cost(pair, poses[pair.limb] * matched.poses[pair.limb].inverse_transform_point(pair.x)))
@@ -18,7 +18,7 @@ pub fn extremity_landmark_cost(matched: Matched, chain: &TwoBone, poses: &[Pose]
 }
 
 /// The same of all sites, where they were matched.
-pub fn body_landmark_cost(matched: Matched) -> f64 {
+pub(crate) fn body_landmark_cost(matched: Matched) -> f64 {
     matched.correspondences.sites.iter().map(|pair| landmark_cost(pair, pair.x)).sum()
 }
 

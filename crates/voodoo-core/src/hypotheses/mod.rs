@@ -13,12 +13,12 @@ mod second;
 mod suspicion;
 mod unexplained;
 
-pub use landmark_cost::{APART, body_landmark_cost};
-pub use persistence::PATIENCE;
-pub use proposals::SWIVELS;
-pub use refined::REFINE;
-pub use score::{Cost, GAIN, ROUGH_SAMPLE, SURE_GAIN, explain, limit_strain, overall_cost};
-pub use unexplained::CLUTTER;
+pub(crate) use landmark_cost::{APART, body_landmark_cost};
+pub(crate) use persistence::PATIENCE;
+pub(crate) use proposals::SWIVELS;
+pub(crate) use refined::REFINE;
+pub(crate) use score::{GAIN, ROUGH_SAMPLE, SURE_GAIN, explain, limit_strain, overall_cost};
+pub(crate) use unexplained::CLUTTER;
 
 use crate::association::correspondence::RegionSupport;
 use crate::body::{Body, Model};
@@ -42,7 +42,7 @@ use unexplained::Unexplained;
 
 /// Looks at every arm and leg in every frame. Remembers what past frames said of each.
 #[derive(Debug, Default)]
-pub struct Hypotheses {
+pub(crate) struct Hypotheses {
     history: Vec<History>,
     unexplained: Unexplained,
     suspicion: Suspicion,
@@ -60,7 +60,7 @@ pub struct Hypotheses {
 
 impl Hypotheses {
     /// Forgets everything and makes room for another body.
-    pub fn restart(&mut self, model: &Model) {
+    pub(crate) fn restart(&mut self, model: &Model) {
         let limbs = model.body.limbs().len();
         self.history.clear();
         self.history.resize_with(model.extremities.len(), || History {
@@ -79,19 +79,19 @@ impl Hypotheses {
     }
 
     /// Follows a second body in what few cameras see, before the first one is. Returns the number of ICP steps.
-    pub fn follow_second(&mut self, context: Context, fit: &mut Fit) -> usize {
+    pub(crate) fn follow_second(&mut self, context: Context, fit: &mut Fit) -> usize {
         self.second.follow(context, fit)
     }
 
     /// How far from the far end of the body's limb, world frame, that of a second body lies, metres; none without a second body.
-    pub fn differs(&self, body: &Body, limb: usize, world_from_limb: &Pose) -> Option<f64> {
+    pub(crate) fn differs(&self, body: &Body, limb: usize, world_from_limb: &Pose) -> Option<f64> {
         self.second.differs(limb, body.limbs()[limb].shape.length(), world_from_limb)
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others, and takes what explains the frame better.
     /// `detection` is what a detector says of this frame, and `detected` the poses there, world frame. Returns the number of ICP
     /// steps.
-    pub fn improve(
+    pub(crate) fn improve(
         &mut self,
         context: Context,
         fit: &mut Fit,
@@ -137,7 +137,7 @@ impl Hypotheses {
     }
 
     /// Remembers where the arms and legs end that this frame proves right; a lost body has been anywhere.
-    pub fn remember(&mut self, model: &Model, motion: &Motion, lost: bool, measured: impl Fn(usize) -> bool) {
+    pub(crate) fn remember(&mut self, model: &Model, motion: &Motion, lost: bool, measured: impl Fn(usize) -> bool) {
         if lost {
             self.history.iter_mut().for_each(|own| own.last_good_end = None);
         }
@@ -149,7 +149,7 @@ impl Hypotheses {
     }
 
     /// The body, world, as this frame wants it where the next one has to ask for it as well.
-    pub fn rivals(&self) -> impl Iterator<Item = &[Pose]> {
+    pub(crate) fn rivals(&self) -> impl Iterator<Item = &[Pose]> {
         let asking = self.history.iter().filter(|own| own.persistence.asks() && !own.last_proposal.is_empty());
         asking.map(|own| &own.last_proposal[..])
     }

@@ -4,7 +4,7 @@ use crate::fit::REFERENCE_RATE;
 
 /// Frames in a row that have to speak against an arm or leg, or against the whole body, and twice as many against an arm by nothing but
 /// unexplained points: a single frame may be disturbed.
-pub const PATIENCE: usize = 2;
+pub(crate) const PATIENCE: usize = 2;
 /// A chain is tried in every second 1/30 s only after so many refusals in a row, in every third after twice as many, and so on, but at
 /// least in every `REST`th: a hidden arm is refused for seconds. That is as well the next one where nothing came near to what the frame
 /// shows.

@@ -11,7 +11,7 @@ use crate::math::Pose;
 use crate::regions::{self, Backdrop, Posed};
 
 /// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
-pub const REFINE: usize = 8;
+pub(crate) const REFINE: usize = 8;
 /// After so many of them a hypothesis is given up that costs clearly more than the current pose: of 63 that were taken in the
 /// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
 const GIVE_UP_AFTER: usize = 6;

@@ -18,20 +18,20 @@ const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
 /// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
-pub const GAIN: f64 = 25.0;
+pub(crate) const GAIN: f64 = 25.0;
 /// So many of them it must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump. Fewer
 /// flicker: so many more than the current pose a hypothesis may cost on its way.
-pub const SEEN_GAIN: f64 = 10.0;
+pub(super) const SEEN_GAIN: f64 = 10.0;
 /// An area of eight by eight centimetres makes an arm suspect whatever else speaks for it.
-pub const CLEAR_GAIN: f64 = 40.0;
+pub(super) const CLEAR_GAIN: f64 = 40.0;
 /// Of one direction over the opposite one so many are asked.
-pub const SURE_GAIN: f64 = 100.0;
+pub(crate) const SURE_GAIN: f64 = 100.0;
 /// Points looked at when rough poses are compared, at most: costs time in proportion.
-pub const ROUGH_SAMPLE: usize = 400;
+pub(crate) const ROUGH_SAMPLE: usize = 400;
 
 /// Cost of a pose in unexplained patches.
 #[derive(Clone, Copy, Debug)]
-pub struct Cost {
+pub(crate) struct Cost {
     /// What cameras say against it: points that no limb explains, and surface that they see past.
     pub evidence: f64,
     /// That, what hides, and the strain of all arms and legs.
@@ -40,13 +40,13 @@ pub struct Cost {
 
 impl Cost {
     /// Whether a hypothesis that costs so much is worth a jump.
-    pub fn is_better_than(&self, current: &Self) -> bool {
+    pub(crate) fn is_better_than(&self, current: &Self) -> bool {
         self.total < current.total - GAIN && self.evidence < current.evidence - SEEN_GAIN
     }
 }
 
 /// What the matched poses cost.
-pub fn overall_cost(context: Context, matched: Matched) -> Cost {
+pub(crate) fn overall_cost(context: Context, matched: Matched) -> Cost {
     let Context { model, seen, .. } = context;
     let mut visible = Visibility::default();
     for (limb, pose) in model.body.limbs().iter().zip(matched.poses) {
@@ -60,7 +60,7 @@ pub fn overall_cost(context: Context, matched: Matched) -> Cost {
 
 /// Cost of broken joint limits, of axes inside other limbs, of missed sites and of motion since the last frame, of one arm or
 /// leg at `poses`, in unexplained patches.
-pub fn strain(context: Context, matched: Matched, chain: &TwoBone, poses: &[Pose]) -> f64 {
+pub(super) fn strain(context: Context, matched: Matched, chain: &TwoBone, poses: &[Pose]) -> f64 {
     let (body, previous) = (&context.model.body, context.previous);
     let mut cost = 0.0;
     for limb in [chain.upper, chain.lower] {
@@ -102,7 +102,7 @@ fn overlap_cost(body: &Body, floor: Option<Ground>, chain: &TwoBone, poses: &[Po
 }
 
 /// Cost of the broken limits of the joint of a limb, in unexplained patches.
-pub fn limit_strain(body: &Body, poses: &[Pose], limb: usize) -> f64 {
+pub(crate) fn limit_strain(body: &Body, poses: &[Pose], limb: usize) -> f64 {
     let Some((parent, joint)) = &body.limbs()[limb].parent else { return 0.0 };
     let Some(limits) = &joint.limits else { return 0.0 };
     let turn = joint_turn(joint, &poses[*parent], &poses[limb]).to_scaled_axis_shortest();
@@ -113,7 +113,14 @@ pub fn limit_strain(body: &Body, poses: &[Pose], limb: usize) -> f64 {
 }
 
 /// Lowers the least distances of points to the limbs of a pose by those to one more limb; `distances` is working memory.
-pub fn explain(body: &Body, limb: usize, poses: &[Pose], points: &Points, least: &mut [f32], distances: &mut Vec<f32>) {
+pub(crate) fn explain(
+    body: &Body,
+    limb: usize,
+    poses: &[Pose],
+    points: &Points,
+    least: &mut [f32],
+    distances: &mut Vec<f32>,
+) {
     body.limbs()[limb].shape.approximate_distances(&poses[limb], points, distances);
     for (least, distance) in least.iter_mut().zip(distances.iter()) {
         *least = least.min(distance.abs());
@@ -121,7 +128,7 @@ pub fn explain(body: &Body, limb: usize, poses: &[Pose], points: &Points, least:
 }
 
 /// Lowest and highest coordinates of points.
-pub fn bounds(points: &Points) -> [Vec3; 2] {
+pub(super) fn bounds(points: &Points) -> [Vec3; 2] {
     let least =
         |values: &[f32]| values.iter().fold(f32::INFINITY, |least, value| if *value < least { *value } else { least });
     let most =
@@ -131,7 +138,7 @@ pub fn bounds(points: &Points) -> [Vec3; 2] {
 }
 
 /// Whether a limb can explain any point within such bounds, however roughly.
-pub fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, [low, high]: [Vec3; 2]) -> bool {
+pub(super) fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, [low, high]: [Vec3; 2]) -> bool {
     let (middle, radius) = shape.sphere(pose);
     let gap = (middle - middle.max(low).min(high)).length() - radius;
     // The approximate distance falls below the true one where a slice is flat.
@@ -141,7 +148,7 @@ pub fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, [low, high]: [V
 
 /// Cost of points at these distances from the nearest limb of a rough pose, which explains what the camera does not see past: it is
 /// drawn in when the pose is refined.
-pub fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
+pub(super) fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
     distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / (2.0 * EXPLAINED)).powi(2).min(1.0)).sum()
 }
 

@@ -5,7 +5,7 @@ use crate::math::{Vec3, WeightedPoints};
 use crate::visibility::evidence::EXPLAINED;
 
 /// A larger share of the frame's weight than this unexplained is clutter: a heap of points in it says nothing.
-pub const CLUTTER: f64 = 0.15;
+pub(crate) const CLUTTER: f64 = 0.15;
 
 /// What the current matches leave unexplained.
 #[derive(Debug, Default)]
@@ -103,7 +103,7 @@ mod tests {
                 "{hand} of the hand, {arm} of the arm, {all} in all"
             );
             unexplained.near(root - 2.0 * (end - root), 0.15, &mut near);
-            assert!(near.is_empty());
+            assert!(near.len() == 0);
         });
     }
 }

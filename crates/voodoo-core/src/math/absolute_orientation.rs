@@ -6,7 +6,7 @@ use crate::math::{Mat3, Pose, Quat, Vec3};
 
 /// Weighted moments of point pairs `(x, p)`: everything absolute orientation needs. A multiplicity is one multiplication.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moments {
+pub(crate) struct Moments {
     /// Sum of the weights.
     pub weight: f64,
     /// Weighted sum of the model points.
@@ -26,19 +26,11 @@ impl Default for Moments {
 
 impl Moments {
     /// Adds one pair.
-    pub fn add(&mut self, weight: f64, x: Vec3, p: Vec3) {
+    pub(crate) fn add(&mut self, weight: f64, x: Vec3, p: Vec3) {
         self.weight += weight;
         self.x += weight * x;
         self.p += weight * p;
         self.px += Mat3::from_cols((weight * x.x) * p, (weight * x.y) * p, (weight * x.z) * p);
-    }
-
-    /// Adds other moments `multiplicity` times (K07 4.3: one multiplication, whatever the number of pairs).
-    pub fn merge(&mut self, other: &Self, multiplicity: f64) {
-        self.weight += multiplicity * other.weight;
-        self.x += multiplicity * other.x;
-        self.p += multiplicity * other.p;
-        self.px += other.px * multiplicity;
     }
 
     /// The rigid motion `p_from_x` with the least weighted sum of squared distances, `None` without weight.
@@ -46,7 +38,7 @@ impl Moments {
     /// `stay` (metres) is the lever of a faint wish not to turn: pairs that fix no rotation (one point, points on a line)
     /// turn the free directions not at all, and the others by less than `1e-6` of their due when the points spread farther
     /// than `stay`.
-    pub fn absolute_orientation(&self, stay: f64) -> Option<Pose> {
+    pub(crate) fn absolute_orientation(&self, stay: f64) -> Option<Pose> {
         if self.weight.is_nan() || self.weight <= 0.0 {
             return None;
         }
@@ -128,19 +120,6 @@ mod tests {
             let found = moments.absolute_orientation(0.1).unwrap();
             prop_assert!(found.rotation.angle_between(turn) < 1e-4);
         }
-    }
-
-    #[test]
-    fn multiplicity_is_repetition() {
-        let mut once = Moments::default();
-        once.add(1.0, Vec3::X, Vec3::Y);
-        once.add(2.0, Vec3::Z, Vec3::ONE);
-        let (mut merged, mut repeated) = (Moments::default(), Moments::default());
-        merged.merge(&once, 7.0);
-        for _ in 0..7 {
-            repeated.merge(&once, 1.0);
-        }
-        assert!((merged.weight - repeated.weight).abs() < 1e-12 && (merged.x - repeated.x).length() < 1e-12);
     }
 
     #[test]

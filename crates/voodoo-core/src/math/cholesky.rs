@@ -12,7 +12,7 @@ pub fn solve_in_place(h: &mut [f64], b: &mut [f64], n: usize) -> bool {
 }
 
 /// The first half of [`solve_in_place`], for several right-hand sides: `h` becomes `L`.
-pub fn factor(h: &mut [f64], n: usize) -> bool {
+pub(crate) fn factor(h: &mut [f64], n: usize) -> bool {
     widest(
         #[inline(always)]
         || factor_lanes(h, n),
@@ -21,7 +21,7 @@ pub fn factor(h: &mut [f64], n: usize) -> bool {
 
 /// Half of the second half, for every right-hand side: `b` becomes `y` with `L^T y = b`, of what [`factor`] left as `l`. Of two
 /// of them `y_1^T y_2 = b_1^T h^-1 b_2`.
-pub fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
+pub(crate) fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
     widest(
         #[inline(always)]
         || half_substitute_lanes(l, b, n),

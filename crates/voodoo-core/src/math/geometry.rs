@@ -74,7 +74,7 @@ impl Pose {
 
     /// A direction, rotated back.
     #[inline]
-    pub fn inverse_transform_vector(&self, vector: Vec3) -> Vec3 {
+    pub(crate) fn inverse_transform_vector(&self, vector: Vec3) -> Vec3 {
         self.rotation.inverse() * vector
     }
 
@@ -132,7 +132,7 @@ pub struct Aabb {
 
 impl Aabb {
     /// Holds nothing: the box about it and another one is the other one.
-    pub const EMPTY: Self = Self { mins: Vec3::MAX, maxs: Vec3::MIN };
+    pub(crate) const EMPTY: Self = Self { mins: Vec3::MAX, maxs: Vec3::MIN };
 
     /// The box between two corners.
     #[inline]
@@ -154,7 +154,7 @@ impl Aabb {
 
     /// Lengths of the sides.
     #[inline]
-    pub fn extents(&self) -> Vec3 {
+    pub(crate) fn extents(&self) -> Vec3 {
         self.maxs - self.mins
     }
 
@@ -176,15 +176,15 @@ impl Aabb {
 
 /// No place lies farther from its origin, metres: three times as far as the Moon. Beyond, squares and products of coordinates
 /// have no digits left for a body, and at last are infinite.
-pub const FARTHEST: f64 = 1e9;
+pub(crate) const FARTHEST: f64 = 1e9;
 
 /// Whether a place can be meant: no coordinate is NaN or beyond [`FARTHEST`].
-pub fn is_place(place: Vec3) -> bool {
+pub(crate) fn is_place(place: Vec3) -> bool {
     place.abs().cmple(Vec3::splat(FARTHEST)).all()
 }
 
 /// Whether a pose can be meant: a place, and a unit quaternion.
-pub fn is_rigid(pose: &Pose) -> bool {
+pub(crate) fn is_rigid(pose: &Pose) -> bool {
     is_place(pose.translation) && pose.rotation.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6
 }
 
@@ -275,6 +275,6 @@ impl ShortestAxis for Quat {
 }
 
 /// The transform into the working frame, whose origin is `origin` in the world.
-pub fn shifted(world_from_sensor: &Pose, origin: Vec3) -> Pose {
+pub(crate) fn shifted(world_from_sensor: &Pose, origin: Vec3) -> Pose {
     Pose::from_parts(world_from_sensor.translation - origin, world_from_sensor.rotation)
 }

@@ -4,7 +4,7 @@ use super::{Points, Vec3};
 
 /// Points in single precision, each with a weight. Metres.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct WeightedPoints {
+pub(crate) struct WeightedPoints {
     /// Where they are.
     pub points: Points,
     /// What they weigh.
@@ -13,35 +13,30 @@ pub struct WeightedPoints {
 
 impl WeightedPoints {
     /// Number of points.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// True when there is no point.
-    pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
-    }
-
     /// Removes all points and keeps the memory.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.points.clear();
         self.weights.clear();
     }
 
     /// Makes room for `len` points in all.
-    pub fn reserve(&mut self, len: usize) {
+    pub(crate) fn reserve(&mut self, len: usize) {
         self.points.reserve(len);
         self.weights.reserve(len.saturating_sub(self.weights.len()));
     }
 
     /// Appends a point.
-    pub fn push(&mut self, point: [f32; 3], weight: f64) {
+    pub(crate) fn push(&mut self, point: [f32; 3], weight: f64) {
         self.points.push(point);
         self.weights.push(weight);
     }
 
     /// Appends all points of `other`.
-    pub fn extend(&mut self, other: &Self) {
+    pub(crate) fn extend(&mut self, other: &Self) {
         self.points.x.extend_from_slice(&other.points.x);
         self.points.y.extend_from_slice(&other.points.y);
         self.points.z.extend_from_slice(&other.points.z);
@@ -49,7 +44,7 @@ impl WeightedPoints {
     }
 
     /// Becomes a set of points with single-precision weights.
-    pub fn assign(&mut self, points: &Points, weights: &[f32]) {
+    pub(crate) fn assign(&mut self, points: &Points, weights: &[f32]) {
         self.clear();
         self.points.x.extend_from_slice(&points.x);
         self.points.y.extend_from_slice(&points.y);
@@ -58,17 +53,17 @@ impl WeightedPoints {
     }
 
     /// Sum of the weights.
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.weights.iter().sum()
     }
 
     /// Point and weight at `index`.
-    pub fn get(&self, index: usize) -> (Vec3, f64) {
+    pub(crate) fn get(&self, index: usize) -> (Vec3, f64) {
         (self.points.get(index), self.weights[index])
     }
 
     /// Keeps about `most` of the points, evenly, and their total weight.
-    pub fn subsample(&mut self, most: usize) {
+    pub(crate) fn subsample(&mut self, most: usize) {
         let count = self.len();
         if count <= most {
             return;

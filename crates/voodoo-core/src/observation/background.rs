@@ -24,7 +24,7 @@ pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 
 /// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
 #[derive(Clone, Debug, Default)]
-pub struct Background {
+pub(crate) struct Background {
     pub(super) world_from_sensor: Option<Pose>,
     pub(super) width: usize,
     pub(super) depth: Vec<f32>,
@@ -35,7 +35,7 @@ pub struct Background {
 
 /// The backgrounds of all depth images, in the order of the frame.
 #[derive(Clone, Debug, Default)]
-pub struct Backgrounds {
+pub(crate) struct Backgrounds {
     pub(super) images: Vec<Background>,
     /// Of the points of each cloud whether another person explains them; nobody does where there is none.
     others: Vec<Vec<bool>>,
@@ -54,13 +54,13 @@ fn stands(a: &Pose, b: &Pose) -> bool {
 
 impl Background {
     /// Learnt depth, row by row; empty when nothing was learnt.
-    pub fn depth(&self) -> &[f32] {
+    pub(crate) fn depth(&self) -> &[f32] {
         &self.depth
     }
 
     /// Whether a return at `z` metres in pixel `index` belongs to the background.
     #[inline(always)]
-    pub fn holds(depth: f32, z: f32) -> bool {
+    pub(crate) fn holds(depth: f32, z: f32) -> bool {
         depth > 0.0 && z > depth - SCENE_MARGIN.0 - SCENE_MARGIN.1 * depth
     }
 
@@ -106,7 +106,7 @@ fn learnt(depth: f32, z: f32) -> f32 {
 
 impl Backgrounds {
     /// The background of this image, if its camera has not moved.
-    pub fn of(&self, image: &DepthImage) -> Option<&Background> {
+    pub(crate) fn of(&self, image: &DepthImage) -> Option<&Background> {
         self.images.iter().find(|background| background.fits(image))
     }
 
@@ -156,18 +156,18 @@ impl Backgrounds {
     }
 
     /// Whether no depth image was ever seen.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.images.is_empty()
     }
 
     /// Forgets everything.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.images.clear();
     }
 
     /// Starts from a frame whose body pose is known: `forget_body` sets those of all depths to 0 that may be the body's, the
     /// others are scene.
-    pub fn start(&mut self, frame: &Frame, mut forget_body: impl FnMut(&DepthImage, &mut [f32])) {
+    pub(crate) fn start(&mut self, frame: &Frame, mut forget_body: impl FnMut(&DepthImage, &mut [f32])) {
         self.images.clear();
         for image in frame.images {
             let depths = (0..image.pixels.len()).map(|index| image.pixels.get(index) * image.metres_per_unit as f32);
@@ -185,7 +185,7 @@ impl Backgrounds {
 
     /// Guesses what lies where the body has hidden the scene since the start: what lies beside it in the same row, linearly
     /// between its two sides, and the deeper one where they are far apart.
-    pub fn fill(&mut self) {
+    pub(crate) fn fill(&mut self) {
         for background in &mut self.images {
             for row in background.depth.chunks_mut(background.width.max(1)) {
                 fill_row(row);
@@ -195,7 +195,7 @@ impl Backgrounds {
 
     /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. What a
     /// camera learnt that moved since is carried along; one that is silent in this frame is remembered.
-    pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> [Range<usize>; 2]) {
+    pub(crate) fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> [Range<usize>; 2]) {
         for image in frame.images {
             let known = self.images.iter().position(|background| background.fits(image));
             let index = known.unwrap_or_else(|| self.carry(image, frame).0);

@@ -9,11 +9,11 @@ use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
 use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
 
 /// Mark of a point that may belong to any limb.
-pub const ANY_LIMB: u16 = u16::MAX;
+pub(crate) const ANY_LIMB: u16 = u16::MAX;
 
 /// Measured points that may lie on the body, in the working frame: world axes, origin near the body, single precision.
 #[derive(Debug, Default)]
-pub struct Candidates {
+pub(crate) struct Candidates {
     /// Where they are.
     pub points: Points,
     /// What they weigh.
@@ -36,7 +36,7 @@ pub struct Candidates {
 const ROUGH_POINTS: usize = 700;
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
-pub fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
+pub(crate) fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
     let mut total = Aabb::EMPTY;
     for (limb, pose) in body.limbs().iter().zip(poses) {
         let bounds = limb.shape.aabb(pose);
@@ -48,18 +48,25 @@ pub fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
 
 impl Candidates {
     /// Number of candidates.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.points.len()
     }
 
     /// True when there is none.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
     /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
     /// whole-body box in the working frame; pixels of the learnt backgrounds are left out.
-    pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, backgrounds: &Backgrounds, config: &Config) {
+    pub(crate) fn gather(
+        &mut self,
+        frame: &Frame,
+        origin: Vec3,
+        bounds: &Aabb,
+        backgrounds: &Backgrounds,
+        config: &Config,
+    ) {
         self.clear();
         let (up, floor) = match frame.ground {
             Some(ground) => (ground.normal, ground.about(origin).offset + config.ground_clearance),
@@ -82,7 +89,7 @@ impl Candidates {
     }
 
     /// Where depth images show many, about [`ROUGH_POINTS`] of them that weigh as much together; else all.
-    pub fn rough(&self) -> &Self {
+    pub(crate) fn rough(&self) -> &Self {
         self.fewer.as_deref().filter(|fewer| !fewer.is_empty()).unwrap_or(self)
     }
 
@@ -218,10 +225,14 @@ const NEAREST_BODY: f64 = 0.3;
 const VISIBLE_AREA: f64 = 0.6;
 /// A depth pixel that stands for this much surface has weight one: 12 mm squared, that of a 160x124 time-of-flight camera
 /// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
-pub const REFERENCE_PATCH: f64 = 0.012 * 0.012;
+pub(crate) const REFERENCE_PATCH: f64 = 0.012 * 0.012;
 
 /// Columns and rows that can show anything inside the box, see [`crate::Camera::window`].
-pub fn image_window(image: &DepthImage, working_from_sensor: &Pose, bounds: &Aabb) -> [std::ops::Range<usize>; 2] {
+pub(crate) fn image_window(
+    image: &DepthImage,
+    working_from_sensor: &Pose,
+    bounds: &Aabb,
+) -> [std::ops::Range<usize>; 2] {
     image.camera.window(bounds.corners().into_iter().map(|corner| working_from_sensor.inverse_transform_point(corner)))
 }
 

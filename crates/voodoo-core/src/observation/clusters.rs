@@ -3,7 +3,7 @@
 use crate::math::{LANES, Points, widest};
 
 /// Points of a cluster: a whole number of SIMD lanes.
-pub const CLUSTER: usize = 32;
+pub(crate) const CLUSTER: usize = 32;
 /// Cells along each axis of the grid that sorts the points: a power of two, so that a mask keeps a cell inside.
 const CELLS: usize = 16;
 /// The last cell along an axis.
@@ -15,7 +15,7 @@ const SMALLEST_CELL: f32 = 0.08;
 
 /// Points in an order in which neighbours stand together, cut into clusters.
 #[derive(Debug, Default)]
-pub struct Clusters {
+pub(crate) struct Clusters {
     /// Which point stands where, and the points in this order, the last one repeated to whole clusters.
     order: Vec<u32>,
     points: Points,
@@ -27,7 +27,7 @@ pub struct Clusters {
 
 /// A box around points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// Its middle.
     pub centre: [f32; 3],
     /// Half its size.
@@ -36,7 +36,7 @@ pub struct Bounds {
 
 /// The points of one cluster, with those that repeat the last one.
 #[derive(Clone, Copy, Debug)]
-pub struct Cluster<'a> {
+pub(crate) struct Cluster<'a> {
     /// First coordinates.
     pub x: &'a [f32; CLUSTER],
     /// Second coordinates.
@@ -51,7 +51,7 @@ pub struct Cluster<'a> {
 
 impl Clusters {
     /// Sorts points into clusters.
-    pub fn arrange(&mut self, points: &Points) {
+    pub(crate) fn arrange(&mut self, points: &Points) {
         self.order.clear();
         self.order.resize(points.len(), 0);
         self.bounds.clear();
@@ -124,7 +124,7 @@ impl Clusters {
 
     /// The clusters in order.
     #[inline(always)]
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = Cluster<'_>> {
+    pub(crate) fn iter(&self) -> impl ExactSizeIterator<Item = Cluster<'_>> {
         let Points { x, y, z } = &self.points;
         let columns = [x, y, z].map(|column| column.as_chunks::<CLUSTER>().0);
         self.bounds.iter().zip(self.order.chunks(CLUSTER)).enumerate().map(move |(index, (bounds, which))| Cluster {

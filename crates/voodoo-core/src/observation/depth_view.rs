@@ -7,7 +7,7 @@ use crate::observation::frame::{DepthImage, Frame};
 
 /// A depth image as a witness: what lies in a pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct DepthView<'a> {
+pub(crate) struct DepthView<'a> {
     /// The image.
     pub image: &'a DepthImage<'a>,
     /// What is known of the scene behind the body.
@@ -20,7 +20,7 @@ pub struct DepthView<'a> {
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pixel {
+pub(crate) enum Pixel {
     /// Outside the image, or no return where that means nothing.
     Unknown,
     /// The scene behind the body, or nothing where the body was segmented; with its depth, infinite when nothing returned.
@@ -38,7 +38,7 @@ const SEGMENTED_STEP: usize = 97;
 
 /// The depth images of a frame as witnesses.
 #[derive(Clone, Copy, Debug)]
-pub struct DepthViews<'a> {
+pub(crate) struct DepthViews<'a> {
     /// The frame.
     pub frame: &'a Frame<'a>,
     /// What is known of the scene behind the body.
@@ -51,7 +51,7 @@ pub struct DepthViews<'a> {
 
 impl<'a> DepthViews<'a> {
     /// One after the other.
-    pub fn iter(self) -> impl Iterator<Item = DepthView<'a>> {
+    pub(crate) fn iter(self) -> impl Iterator<Item = DepthView<'a>> {
         let images = self.frame.images.iter().zip(self.segmented);
         images.map(move |(image, segmented)| DepthView {
             image,
@@ -65,7 +65,7 @@ impl<'a> DepthViews<'a> {
 impl DepthView<'_> {
     /// What the pixel that a point (camera frame) falls in shows.
     #[inline(always)]
-    pub fn at(&self, point: Vec3) -> Pixel {
+    pub(crate) fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
         if point.z < NEAREST_SEEN {
             return Pixel::Unknown;
@@ -90,7 +90,7 @@ impl DepthView<'_> {
 }
 
 /// In which images of a frame the body was segmented, into `found`.
-pub fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
+pub(crate) fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
     found.clear();
     found.extend(frame.images.iter().map(|image| {
         let (mut none, mut all) = (0_u32, 0_u32);

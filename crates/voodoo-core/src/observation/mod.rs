@@ -6,16 +6,16 @@
 //! another camera, with `far_edges` between surfaces, `chroma` tells colours, `masks` and `mask_regions` where skin's are, and
 //! `still` what stands. `sites` knows where named sites will be, and which measurements of them are believed.
 
-pub mod background;
+pub(crate) mod background;
 mod background_moved;
 mod background_update;
-pub mod candidates;
+pub(crate) mod candidates;
 pub(crate) mod clusters;
-pub mod depth_view;
-pub mod frame;
-pub mod observer;
-pub mod picture;
+pub(crate) mod depth_view;
+pub(crate) mod frame;
+pub(crate) mod observer;
+pub(crate) mod picture;
 pub(crate) mod pixels;
 pub(crate) mod segments;
-pub mod share;
-pub mod sites;
+pub(crate) mod share;
+pub(crate) mod sites;

@@ -11,7 +11,7 @@ use crate::math::{Aabb, Pose, Vec3};
 
 /// What a frame shows of the body. Cheap to copy; everything is in the working frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Observation<'a> {
+pub(crate) struct Observation<'a> {
     /// The points that may be on the body.
     pub candidates: &'a Candidates,
     /// The frame, and its depth images as witnesses.
@@ -20,29 +20,29 @@ pub struct Observation<'a> {
 
 impl<'a> Observation<'a> {
     /// The frame.
-    pub fn frame(&self) -> &'a Frame<'a> {
+    pub(crate) fn frame(&self) -> &'a Frame<'a> {
         self.views.frame
     }
 
     /// The working frame's origin in the world.
-    pub fn origin(&self) -> Vec3 {
+    pub(crate) fn origin(&self) -> Vec3 {
         self.views.origin
     }
 
     /// The floor in the working frame, where it is known.
-    pub fn floor(&self) -> Option<Ground> {
+    pub(crate) fn floor(&self) -> Option<Ground> {
         self.frame().ground.map(|ground| ground.about(self.origin()))
     }
 
     /// The same frame with other candidates.
-    pub fn with(self, candidates: &'a Candidates) -> Self {
+    pub(crate) fn with(self, candidates: &'a Candidates) -> Self {
         Self { candidates, ..self }
     }
 }
 
 /// Where the body is expected when a frame comes.
 #[derive(Clone, Copy, Debug)]
-pub struct Expectation<'a> {
+pub(crate) struct Expectation<'a> {
     /// The body.
     pub body: &'a Body,
     /// Its expected poses, working frame.
@@ -59,7 +59,7 @@ pub struct Expectation<'a> {
 
 /// Pixels of one depth image that show the body: the number of the image in the frame, and their indices.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Own<'a> {
+pub(crate) struct Own<'a> {
     /// Number of the image.
     pub image: usize,
     /// Indices of pixels.
@@ -68,7 +68,7 @@ pub struct Own<'a> {
 
 /// Keeps what is learnt of the scene, and the candidates of the current frame.
 #[derive(Debug, Default)]
-pub struct Observer {
+pub(crate) struct Observer {
     backgrounds: Backgrounds,
     segmented: Vec<bool>,
     candidates: Candidates,
@@ -76,18 +76,18 @@ pub struct Observer {
 
 impl Observer {
     /// Forgets scene and candidates.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.candidates = Candidates::default();
         self.backgrounds.clear();
     }
 
     /// Notes which images of a frame are segmented; nothing is learnt.
-    pub fn face(&mut self, frame: &Frame) {
+    pub(crate) fn face(&mut self, frame: &Frame) {
         find_segmented(frame, &mut self.segmented);
     }
 
     /// Step 1 (K06 IV-B.1): learns the background, and keeps the points in the enlarged box of the whole body.
-    pub fn observe(&mut self, frame: &Frame, expected: Expectation, config: &Config) {
+    pub(crate) fn observe(&mut self, frame: &Frame, expected: Expectation, config: &Config) {
         find_segmented(frame, &mut self.segmented);
         let bounds = body_box(expected.body, expected.poses, config.body_box_margin);
         if config.background {
@@ -97,7 +97,7 @@ impl Observer {
     }
 
     /// The same for one of several persons: the scene is known, and what others explain is theirs.
-    pub fn observe_share(&mut self, frame: &Frame, expected: Expectation, share: Share, config: &Config) {
+    pub(crate) fn observe_share(&mut self, frame: &Frame, expected: Expectation, share: Share, config: &Config) {
         find_segmented(frame, &mut self.segmented);
         let bounds = body_box(expected.body, expected.poses, config.body_box_margin);
         self.backgrounds.adopt(frame, share.scene, |image, depth| {
@@ -110,33 +110,33 @@ impl Observer {
     }
 
     /// Pixels that were taken for the scene may show the body; what was learnt there, for `restore`.
-    pub fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
+    pub(crate) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
         self.backgrounds.release(frame, own)
     }
 
     /// They do not.
-    pub fn restore(&mut self, frame: &Frame, own: Own, learnt: &[f32]) {
+    pub(crate) fn restore(&mut self, frame: &Frame, own: Own, learnt: &[f32]) {
         self.backgrounds.restore(frame, own, learnt);
     }
 
     /// The candidates in another box.
-    pub fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, config: &Config) {
+    pub(crate) fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, config: &Config) {
         self.candidates.gather(frame, origin, bounds, &self.backgrounds, config);
     }
 
     /// What was observed of `frame`.
-    pub fn seen<'a>(&'a self, frame: &'a Frame<'a>, origin: Vec3) -> Observation<'a> {
+    pub(crate) fn seen<'a>(&'a self, frame: &'a Frame<'a>, origin: Vec3) -> Observation<'a> {
         let views = DepthViews { frame, backgrounds: &self.backgrounds, segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
 
     /// Whether depth cameras that have been there gave no image this time: no sign that the body went.
-    pub fn silent(&self, frame: &Frame) -> bool {
+    pub(crate) fn silent(&self, frame: &Frame) -> bool {
         frame.images.is_empty() && !self.backgrounds.is_empty()
     }
 
     /// The candidates of the last frame.
-    pub fn candidates(&self) -> &Candidates {
+    pub(crate) fn candidates(&self) -> &Candidates {
         &self.candidates
     }
 }

@@ -14,7 +14,7 @@ pub(super) struct PointGate {
 
 impl PointGate {
     #[inline(always)]
-    pub fn passes(&self, p: [f32; 3]) -> bool {
+    pub(super) fn passes(&self, p: [f32; 3]) -> bool {
         let inside = |axis: usize| (p[axis] >= self.low[axis]) & (p[axis] <= self.high[axis]);
         inside(0) & inside(1) & inside(2) & (p[0] * self.up[0] + p[1] * self.up[1] + p[2] * self.up[2] >= self.floor)
     }
@@ -32,7 +32,7 @@ pub(super) struct Grid {
 
 impl Grid {
     /// About one pixel in `share`, as evenly as whole numbers allow.
-    pub fn new(share: f64) -> Self {
+    pub(super) fn new(share: f64) -> Self {
         let within = |apart: f64| if apart >= 1.0 { apart.min(MOST_APART) } else { 1.0 };
         let rows = within(share.sqrt().floor());
         let columns = within((share / rows).round());
@@ -40,7 +40,7 @@ impl Grid {
     }
 
     /// First column of a row: where columns are wider than rows, those of one row stand between those of the next.
-    pub fn offset(self, row: usize) -> usize {
+    pub(super) fn offset(self, row: usize) -> usize {
         if self.columns == self.rows { 0 } else { row / self.rows * (self.columns / 2) % self.columns }
     }
 }
@@ -67,7 +67,14 @@ pub(super) struct Stretch {
 
 impl Stretch {
     #[inline(always)]
-    pub fn load(image: &DepthImage, background: &[f32], row: usize, start: usize, end: usize, stride: usize) -> Self {
+    pub(super) fn load(
+        image: &DepthImage,
+        background: &[f32],
+        row: usize,
+        start: usize,
+        end: usize,
+        stride: usize,
+    ) -> Self {
         let count = STRETCH.min((end - start).div_ceil(stride));
         let first = row * image.camera.width() + start;
         let scale = image.metres_per_unit as f32;
@@ -91,13 +98,13 @@ impl Stretch {
 
     /// Whether any pixel returned anything that is not the background.
     #[inline(always)]
-    pub fn returned(&self) -> bool {
+    pub(super) fn returned(&self) -> bool {
         self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
     }
 
     /// Appends the points that returned and lie inside the gate, in order.
     #[inline(always)]
-    pub fn gather(&self, m: &[[f32; 3]; 4], gate: &PointGate, points: &mut Points) {
+    pub(super) fn gather(&self, m: &[[f32; 3]; 4], gate: &PointGate, points: &mut Points) {
         let mut p = [[0.0; STRETCH]; 3];
         let mut passes = [false; STRETCH];
         for i in 0..STRETCH {

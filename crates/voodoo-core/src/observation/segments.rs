@@ -17,7 +17,7 @@ const HALF_KEY: f64 = (1_u64 << 20) as f64;
 
 /// What hangs together; working frame, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
+pub(crate) struct Segment {
     /// Mean of the samples.
     pub centre: Vec3,
     /// Corners of its box.
@@ -45,7 +45,7 @@ struct Cell {
 
 /// Working memory, and the segments of the last frame, largest first.
 #[derive(Debug, Default)]
-pub struct Segments {
+pub(crate) struct Segments {
     samples: Vec<Sample>,
     cells: Vec<Cell>,
     found: Vec<Segment>,
@@ -55,12 +55,12 @@ pub struct Segments {
 
 impl Segments {
     /// The segments, largest first.
-    pub fn found(&self) -> &[Segment] {
+    pub(crate) fn found(&self) -> &[Segment] {
         &self.found
     }
 
     /// Looks through a whole frame. `origin` is the working frame's origin in the world.
-    pub fn find(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds, config: &Config) {
+    pub(crate) fn find(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds, config: &Config) {
         self.samples.clear();
         self.sample_images(frame, origin, backgrounds);
         for cloud in frame.clouds {

@@ -3,11 +3,11 @@
 use super::background::Backgrounds;
 
 /// Mark of a pixel that no person's surface explains.
-pub const NOBODY: u16 = u16::MAX;
+pub(crate) const NOBODY: u16 = u16::MAX;
 
 /// A frame as one of several persons sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct Share<'a> {
+pub(crate) struct Share<'a> {
     /// Image after image, who explains each pixel: the number of a person, or [`NOBODY`].
     pub owners: &'a [Vec<u16>],
     /// Cloud after cloud, the same of each point.
@@ -20,12 +20,12 @@ pub struct Share<'a> {
 
 impl<'a> Share<'a> {
     /// The owners of an image's pixels.
-    pub fn owners(&self, image: usize) -> &'a [u16] {
+    pub(crate) fn owners(&self, image: usize) -> &'a [u16] {
         self.owners.get(image).map_or(&[], Vec::as_slice)
     }
 
     /// Whether a pixel with this owner shows another person.
-    pub fn is_others(&self, owner: u16) -> bool {
+    pub(crate) fn is_others(&self, owner: u16) -> bool {
         owner != NOBODY && owner != self.own
     }
 }

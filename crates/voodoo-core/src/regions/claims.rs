@@ -22,7 +22,7 @@ const BACKDROP_BITS: u32 = 2;
 
 /// What pictures say of a limb, in patches, the mean of all cameras.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Claim {
+pub(crate) struct Claim {
     /// What it explains better than what would be seen without it, less what it explains worse: of a limb whose colours are
     /// certain, all that shows.
     pub gained: f64,
@@ -39,14 +39,14 @@ impl std::ops::AddAssign for Claim {
 
 /// What each camera sees of some limbs.
 #[derive(Debug, Default)]
-pub struct Backdrop {
+pub(crate) struct Backdrop {
     planes: Vec<Labels>,
     camera_from_limb: Vec<Pose>,
 }
 
 impl Backdrop {
     /// Makes room for the pictures of a frame and so many limbs.
-    pub fn make_room(&mut self, frame: &Frame, limbs: usize) {
+    pub(crate) fn make_room(&mut self, frame: &Frame, limbs: usize) {
         self.planes.resize_with(frame.colors.len(), Labels::default);
         for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
             labels.make_room(BACKDROP_BITS, picture.camera.width(), picture.camera.height());
@@ -58,7 +58,7 @@ impl Backdrop {
 
 impl Regions {
     /// Draws the limbs that are `shown` before what the cameras see.
-    pub fn draw(&self, frame: &Frame, posed: Posed, shown: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
+    pub(crate) fn draw(&self, frame: &Frame, posed: Posed, shown: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
         let Backdrop { planes, camera_from_limb } = backdrop;
         planes.resize_with(frame.colors.len(), Labels::default);
         for (picture, labels) in frame.colors.iter().zip(planes) {
@@ -70,14 +70,20 @@ impl Regions {
     }
 
     /// What a limb, which is not drawn, would explain of what is seen.
-    pub fn claim(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> Claim {
+    pub(crate) fn claim(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> Claim {
         self.look_at(frame, posed, limb, backdrop, |(label, behind), depth| {
             (label == NOTHING || behind > depth - f64::from(NEARER_BY)).then_some(label)
         })
     }
 
     /// What every limb of the arms and legs explains that nothing else does, into `supports`.
-    pub fn claim_all(&mut self, frame: &Frame, posed: Posed, chains: &[TwoBone], supports: &mut [RegionSupport]) {
+    pub(crate) fn claim_all(
+        &mut self,
+        frame: &Frame,
+        posed: Posed,
+        chains: &[TwoBone],
+        supports: &mut [RegionSupport],
+    ) {
         let mut backdrop = std::mem::take(&mut self.backdrop);
         for chain in chains {
             self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut backdrop);
@@ -92,7 +98,7 @@ impl Regions {
     }
 
     /// How well a body explains what is seen, every pixel by the limb that shows there; all of it is drawn.
-    pub fn explained(&self, frame: &Frame, posed: Posed, backdrop: &Backdrop) -> f64 {
+    pub(crate) fn explained(&self, frame: &Frame, posed: Posed, backdrop: &Backdrop) -> f64 {
         let own = |limb: usize| {
             let show = |(label, _): (u16, f64), _| (usize::from(label) == limb).then_some(NOTHING);
             self.look_at(frame, posed, limb, backdrop, show).gained

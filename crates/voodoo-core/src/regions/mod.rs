@@ -23,7 +23,7 @@ use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
-pub use claims::{Backdrop, Claim};
+pub(crate) use claims::{Backdrop, Claim};
 use evidence::Evidence;
 use histogram::Kind;
 use labels::Labels;
@@ -75,13 +75,13 @@ struct Learned {
 }
 
 /// So many steps are enough where nothing but edges is measured, and where nobody knows how the body moves.
-pub fn steps(unknown_motion: bool) -> usize {
+pub(crate) fn steps(unknown_motion: bool) -> usize {
     SEARCHES.len() - if unknown_motion { 0 } else { WIDE_SEARCHES }
 }
 
 /// Colours of the body and its surroundings, camera by camera, and the lines of the last look.
 #[derive(Debug, Default)]
-pub struct Regions {
+pub(crate) struct Regions {
     cameras: Vec<Learned>,
     /// Group of every limb: those of one group have the same colours.
     groups: Vec<u16>,
@@ -96,7 +96,7 @@ pub struct Regions {
 
 /// The body at the time of a frame, in the working frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Posed<'a> {
+pub(crate) struct Posed<'a> {
     /// The body.
     pub body: &'a Body,
     /// Its poses.
@@ -124,20 +124,24 @@ pub struct RegionLine {
 
 impl Regions {
     /// Forgets what bodies and surroundings look like.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         (self.stamp, self.turn) = (None, 0);
         self.cameras.iter_mut().for_each(|camera| camera.known = false);
     }
 
     /// Keeps what a camera sees without anybody: pictures with their heights and widths; none: forgets it.
-    pub fn set_background(&mut self, camera: u16, pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
+    pub(crate) fn set_background(
+        &mut self,
+        camera: u16,
+        pictures: &[(ColorPixels, [usize; 2])],
+    ) -> Result<(), TrackError> {
         let scene = if pictures.is_empty() { None } else { Some(Scene::of(pictures)?) };
         self.camera(camera).scene = scene;
         Ok(())
     }
 
     /// Refuses pictures with distortion, and those that cannot be compared with those of the empty scene.
-    pub fn check(&self, frame: &Frame) -> Result<(), TrackError> {
+    pub(crate) fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         for (index, picture) in frame.colors.iter().enumerate() {
             if picture.camera.distorts() {
                 let found = format!("{:?}", picture.camera.lens());
@@ -151,7 +155,7 @@ impl Regions {
     }
 
     /// Learns the colours of cameras that are new at the pose where the body is thought to be.
-    pub fn begin(&mut self, frame: &Frame, posed: Posed) {
+    pub(crate) fn begin(&mut self, frame: &Frame, posed: Posed) {
         if self.groups != posed.body.roles().groups() {
             posed.body.roles().groups().clone_into(&mut self.groups);
             self.cameras.iter_mut().for_each(|camera| camera.known = false);
@@ -172,7 +176,7 @@ impl Regions {
     }
 
     /// The edges of the limbs that are `wanted` in all pictures, in a step of a frame after which so many are `left`.
-    pub fn find(
+    pub(crate) fn find(
         &mut self,
         frame: &Frame,
         posed: Posed,
@@ -189,7 +193,7 @@ impl Regions {
     }
 
     /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
-    pub fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
+    pub(crate) fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
         self.find_within(frame, posed, OUTLINE, None, pairs);
     }
 
@@ -243,7 +247,7 @@ impl Regions {
     }
 
     /// The lines of the last look at a camera's picture.
-    pub fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
+    pub(crate) fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         let camera = self.cameras.iter().find(|known| known.number == camera);
         camera.into_iter().flat_map(|camera| {
             let unit = camera.unit;
@@ -261,7 +265,7 @@ impl Regions {
     }
 
     /// Learns colours where the body was found: of every second camera in turn, a frame is like the one before.
-    pub fn learn(&mut self, frame: &Frame) {
+    pub(crate) fn learn(&mut self, frame: &Frame) {
         let turn = self.turn;
         frame.colors.iter().skip(turn).step_by(2).for_each(|picture| self.teach(picture));
         self.turn = 1 - turn;

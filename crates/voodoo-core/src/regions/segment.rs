@@ -29,13 +29,13 @@ struct Near {
 impl Regions {
     /// How likely each pixel of a frame's pictures shows the body, picture after picture, row by row: 0 to 1. Cameras that are
     /// new learn its colours at this pose first.
-    pub fn segment(&mut self, frame: &Frame, posed: Posed) -> Vec<Vec<f32>> {
+    pub(crate) fn segment(&mut self, frame: &Frame, posed: Posed) -> Vec<Vec<f32>> {
         self.begin(frame, posed);
         frame.colors.iter().map(|picture| self.segment_picture(frame, picture, posed)).collect()
     }
 
     /// Learns the body's colours and those about it where it is.
-    pub fn learn_at(&mut self, frame: &Frame, posed: Posed) {
+    pub(crate) fn learn_at(&mut self, frame: &Frame, posed: Posed) {
         self.begin(frame, posed);
         self.find(frame, posed, 0, |_| true, &mut Correspondences::default());
         self.learn(frame);

@@ -21,7 +21,7 @@ const NOBODY: f64 = 12.0;
 
 /// What a detection says of where the body is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seen {
+pub(crate) enum Seen {
     /// It is there.
     There,
     /// It is not, and it is too early to try the detection's place.

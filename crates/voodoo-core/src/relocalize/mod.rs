@@ -24,17 +24,17 @@ use crate::observation::observer::Own;
 use crate::observation::share::Share;
 use belief::Belief;
 pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
-pub use doubt::Seen;
+pub(crate) use doubt::Seen;
 use doubt::{Doubt, SIGMAS};
 use people::People;
 use search::Search;
 use trials::Trials;
-pub use watch::Sighting;
+pub(crate) use watch::Sighting;
 use watch::Watch;
 
 /// Finds bodies. Remembers what a detector said, and how long the body has been lost.
 #[derive(Debug, Default)]
-pub struct Relocalizer {
+pub(crate) struct Relocalizer {
     watch: Watch,
     candidates: Candidates,
     matched: Correspondences,
@@ -47,32 +47,32 @@ pub struct Relocalizer {
 
 impl Relocalizer {
     /// Takes the detector that finds this body.
-    pub fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
+    pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
         self.people.set_detector(detector, body);
     }
 
     /// The body's limbs or sites have changed.
-    pub fn bind(&mut self, body: &Body) {
+    pub(crate) fn bind(&mut self, body: &Body) {
         self.people.bind(body);
     }
 
     /// What the detector's joints are on the body.
-    pub fn map(&self) -> &JointMap {
+    pub(crate) fn map(&self) -> &JointMap {
         self.people.map()
     }
 
     /// Why the detector could not look, since [`Self::clear_error`].
-    pub fn error(&self) -> Option<&DetectError> {
+    pub(crate) fn error(&self) -> Option<&DetectError> {
         self.people.error()
     }
 
     /// Forgets the detector's last error.
-    pub fn clear_error(&mut self) {
+    pub(crate) fn clear_error(&mut self) {
         self.people.clear_error();
     }
 
     /// Forgets everything that was remembered of an earlier track.
-    pub fn restart(&mut self, model: &Model, poses: &[Pose]) {
+    pub(crate) fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.watch.restart();
         self.doubt.restart();
         self.belief = Belief::default();
@@ -82,17 +82,17 @@ impl Relocalizer {
     }
 
     /// Whether the body can be found without a pose.
-    pub fn finds(&self) -> bool {
+    pub(crate) fn finds(&self) -> bool {
         self.people.know()
     }
 
     /// A body of a detected person's sizes, or with `known` ones that the model has, and its poses, world frame.
-    pub fn placed(&self, model: &Model, detected: Detected, known: bool) -> Option<(Body, Vec<Pose>)> {
+    pub(crate) fn placed(&self, model: &Model, detected: Detected, known: bool) -> Option<(Body, Vec<Pose>)> {
         if known { Some((model.body.clone(), posed(&model.body, detected)?)) } else { sized(model, detected) }
     }
 
     /// Body and poses of the surest person in a frame.
-    pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
+    pub(crate) fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
         self.people.look(&model.body, frame, None, DetectionQuery::Any);
         let place = self.people.place()?;
         if !self.belief.observe(Some(place)) {
@@ -103,29 +103,29 @@ impl Relocalizer {
     }
 
     /// The track was started: `itself` where a detector saw somebody, and nobody had said where.
-    pub fn take_note_of_start(&mut self, itself: bool) {
+    pub(crate) fn take_note_of_start(&mut self, itself: bool) {
         self.doubt.found_itself(itself);
         self.people.keep_floor(itself);
     }
 
     /// The floor under a body that was found, where nobody tells it; world frame.
-    pub fn floor(&self) -> Option<Ground> {
+    pub(crate) fn floor(&self) -> Option<Ground> {
         self.people.floor
     }
 
     /// Whether nobody had said where the track starts.
-    pub fn found_itself(&self) -> bool {
+    pub(crate) fn found_itself(&self) -> bool {
         self.doubt.itself()
     }
 
     /// Whether the track was started less than a second ago.
-    pub fn young(&self, stamp: f64) -> bool {
+    pub(crate) fn young(&self, stamp: f64) -> bool {
         self.doubt.young(stamp)
     }
 
     /// The pose of a body that fits best what a detector saw in this frame, world frame; the body is that of a start, or has the
     /// sizes that the detector saw where they are surely others.
-    pub fn posed(&self, model: &Model, set: &Body) -> Option<(Body, Vec<Pose>)> {
+    pub(crate) fn posed(&self, model: &Model, set: &Body) -> Option<(Body, Vec<Pose>)> {
         let detected = self.people.seen()?;
         if is_sized_like(set, detected, SIGMAS) {
             return Some((set.clone(), posed(set, detected)?));
@@ -134,13 +134,13 @@ impl Relocalizer {
     }
 
     /// The pose in which a detector saw this body in this frame, world frame.
-    pub fn shown(&self, body: &Body) -> Option<Vec<Pose>> {
+    pub(crate) fn shown(&self, body: &Body) -> Option<Vec<Pose>> {
         posed(body, self.people.seen()?)
     }
 
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
     /// was not where it should be in the frame before, or it is `unsure` whether one was, or the body `lost`.
-    pub fn look(&mut self, body: &Body, frame: &Frame, root: Vec3, doubtful: bool, unsure: bool, lost: bool) {
+    pub(crate) fn look(&mut self, body: &Body, frame: &Frame, root: Vec3, doubtful: bool, unsure: bool, lost: bool) {
         // A body that was found a moment ago may face the other way.
         let often = lost || self.watch.open();
         if self.doubt.due(frame.stamp, doubtful, unsure, often) && self.people.know() {
@@ -154,7 +154,7 @@ impl Relocalizer {
     }
 
     /// The same for one of several persons: good tracks are looked at, too, and who is lost is not looked for here.
-    pub fn look_at_share(&mut self, body: &Body, frame: &Frame, share: Share, root: Vec3, lost: bool) {
+    pub(crate) fn look_at_share(&mut self, body: &Body, frame: &Frame, share: Share, root: Vec3, lost: bool) {
         if self.doubt.due(frame.stamp, true, false, false) && !lost && self.people.know() {
             self.people.look(body, frame, Some(share), DetectionQuery::Near(root));
             self.people.leave_out(|place| place.distance(root) > SAME_PERSON);
@@ -164,28 +164,34 @@ impl Relocalizer {
     }
 
     /// What a detector saw in this frame counts for nothing.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.people.forget();
     }
 
     /// What a detector saw in this frame, if it looked.
-    pub fn detected(&self) -> Option<Detected<'_>> {
+    pub(crate) fn detected(&self) -> Option<Detected<'_>> {
         self.people.seen()
     }
 
     /// The pixels in which it saw it.
-    pub fn own(&self) -> Own<'_> {
+    pub(crate) fn own(&self) -> Own<'_> {
         self.people.own()
     }
 
     /// Notes what a frame shows where the body's joints are, the root's first, world frame: what hides the body is somebody else.
-    pub fn look_out(&mut self, views: DepthViews, joints: impl Iterator<Item = Vec3>, tracked: bool, lost: bool) {
+    pub(crate) fn look_out(
+        &mut self,
+        views: DepthViews,
+        joints: impl Iterator<Item = Vec3>,
+        tracked: bool,
+        lost: bool,
+    ) {
         self.watch.hidden.observe(views, joints, tracked, !lost);
     }
 
     /// What a detector that looked at this frame says of a body at these poses, world frame; of a `young` track and of one `among`
     /// several persons also of its arms and legs.
-    pub fn weigh(
+    pub(crate) fn weigh(
         &mut self,
         body: &Body,
         world_from_limb: &[Pose],
@@ -203,13 +209,19 @@ impl Relocalizer {
     }
 
     /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.
-    pub fn nobody(&mut self, stamp: f64, lost: bool) -> bool {
+    pub(crate) fn nobody(&mut self, stamp: f64, lost: bool) -> bool {
         self.doubt.nobody(stamp, lost, self.people.verdict())
     }
 
     /// The poses that a detector saw in this frame, refined, where they are no worse than the present ones; working frame. What
     /// `fit` has matched is as before when it returns.
-    pub fn try_detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> Option<&[Pose]> {
+    pub(crate) fn try_detected(
+        &mut self,
+        context: Context,
+        fit: &mut Fit,
+        present: &[Pose],
+        lost: bool,
+    ) -> Option<&[Pose]> {
         let detected = self.people.seen()?;
         let origin = context.seen.origin();
         let mut place = posed(&context.model.body, detected)?;
@@ -233,12 +245,12 @@ impl Relocalizer {
     }
 
     /// In how many of the last frames the body was lost, from the one on in which that is no blur; `None` otherwise.
-    pub fn searched(&self) -> Option<usize> {
+    pub(crate) fn searched(&self) -> Option<usize> {
         self.watch.searched()
     }
 
     /// Notes what a frame said of the body at these poses.
-    pub fn observe(&mut self, sighting: Sighting, poses: &[Pose]) {
+    pub(crate) fn observe(&mut self, sighting: Sighting, poses: &[Pose]) {
         self.watch.observe(sighting);
         if sighting.tracked {
             self.search.remember(poses);
@@ -247,7 +259,7 @@ impl Relocalizer {
 
     /// Looks for a lost body that no detector sees; its poses where it explains the frame better than at `present`. What `fit` has
     /// matched is as before when it returns.
-    pub fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
+    pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
         let (frame, origin) = (context.seen.frame(), context.seen.origin());
         if self.searched().is_none() || self.people.know() && !frame.images.is_empty() {
             return None;

@@ -6,7 +6,7 @@ use crate::hypotheses::PATIENCE;
 
 /// What a frame said of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sighting {
+pub(crate) struct Sighting {
     /// Time of the frame, seconds.
     pub stamp: f64,
     /// The body is lost.

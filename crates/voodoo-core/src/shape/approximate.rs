@@ -35,7 +35,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// [`Self::approximate_distance`] of every query in the frame `world`, in single precision, into `out`.
-    pub fn approximate_distances(&self, world_from_limb: &Pose, queries: &Points, out: &mut Vec<f32>) {
+    pub(crate) fn approximate_distances(&self, world_from_limb: &Pose, queries: &Points, out: &mut Vec<f32>) {
         out.resize(queries.len(), 0.0);
         let rough = Rough::new(self, world_from_limb);
         widest(

@@ -28,7 +28,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// Middle and radius, metres, of a sphere around the solid in the frame `world`.
-    pub fn sphere(&self, world_from_limb: &Pose) -> (Vec3, f64) {
+    pub(crate) fn sphere(&self, world_from_limb: &Pose) -> (Vec3, f64) {
         let half = 0.5 * self.length;
         let radius = self.a0.max(self.a1).max(self.b0).max(self.b1);
         (*world_from_limb * (Vec3::Z * half), half.hypot(radius))

@@ -16,7 +16,7 @@ const ALIKE: f64 = 1e-9;
 
 /// A point of the contour, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContourPoint {
+pub(crate) struct ContourPoint {
     /// The point, metres.
     pub point: Vec3,
     /// Outward normal of the surface there, any length above zero: the ray from the camera lies in the tangent plane.
@@ -26,7 +26,7 @@ pub struct ContourPoint {
 impl TaperedEllipticCylinder {
     /// The two points of the contour at the share `t` of the length, seen from `camera` (limb frame, metres); `None` where one
     /// looks along the limb, or from within it. The first lies to the side of smaller angles about the axis.
-    pub fn contour(&self, t: f64, camera: Vec3) -> Option<[ContourPoint; 2]> {
+    pub(crate) fn contour(&self, t: f64, camera: Vec3) -> Option<[ContourPoint; 2]> {
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
         let (a, b) = (self.a0 + t * da, self.b0 + t * db);
         if a.min(b) < super::MIN_SIZE {
@@ -59,7 +59,7 @@ impl TaperedEllipticCylinder {
 
     /// The point of an end's rim at an angle given by its cosine and sine, and the direction of the rim there, where it is on
     /// the contour seen from `camera` (limb frame, metres): one of the two faces that meet there is seen, the other is not.
-    pub fn rim_contour(&self, distal: bool, [c, s]: [f64; 2], camera: Vec3) -> Option<[Vec3; 2]> {
+    pub(crate) fn rim_contour(&self, distal: bool, [c, s]: [f64; 2], camera: Vec3) -> Option<[Vec3; 2]> {
         let (a, b, z) = if distal { (self.a1, self.b1, self.length) } else { (self.a0, self.b0, 0.0) };
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
         let point = Vec3::new(a * c, b * s, z);

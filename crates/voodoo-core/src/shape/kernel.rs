@@ -25,9 +25,9 @@ pub(super) struct Block<const N: usize> {
 }
 
 impl<const N: usize> Block<N> {
-    pub const ZERO: Self = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
+    pub(super) const ZERO: Self = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
 
-    pub fn get(&self, at: usize) -> [f32; 3] {
+    pub(super) fn get(&self, at: usize) -> [f32; 3] {
         [self.x[at], self.y[at], self.z[at]]
     }
 }
@@ -43,7 +43,7 @@ pub(super) struct BlockResult<const N: usize> {
 }
 
 impl<const N: usize> BlockResult<N> {
-    pub const ZERO: Self =
+    pub(super) const ZERO: Self =
         Self { points: Block::ZERO, normals: Block::ZERO, signed_distance: [0.0; N], region: [0; N], doubtful: [0; N] };
 }
 
@@ -70,7 +70,7 @@ pub(super) struct Constants {
 }
 
 impl Constants {
-    pub fn new(shape: &TaperedEllipticCylinder, world_from_limb: &Pose) -> Self {
+    pub(super) fn new(shape: &TaperedEllipticCylinder, world_from_limb: &Pose) -> Self {
         let rotation = Mat3::from_quat(world_from_limb.rotation);
         let single = |v: Vec3| v.as_vec3().to_array();
         let origin = world_from_limb.translation.as_vec3();

@@ -23,7 +23,7 @@ mod closest;
 mod contour;
 mod kernel;
 mod lanes;
-mod ray;
+pub(crate) mod ray;
 mod ruling;
 mod section;
 
@@ -31,17 +31,15 @@ use crate::math::Vec3;
 use thiserror::Error;
 
 pub use batch::SurfaceBatch;
-pub use contour::ContourPoint;
-pub use ray::RayHit;
-pub use section::{FacingSection, Section};
+pub(crate) use section::FacingSection;
 
 /// A length below this, metres, is taken for a mistake: it is the accuracy of the queries.
-pub const MIN_SIZE: f64 = 1e-6;
+pub(crate) const MIN_SIZE: f64 = 1e-6;
 /// A length above this, metres, is taken for a mistake (of units, most likely).
-pub const MAX_SIZE: f64 = 1e3;
+pub(crate) const MAX_SIZE: f64 = 1e3;
 /// On a rim the normal is the direction to the query when it is farther than this, metres, and the mean of the two adjacent
 /// faces' normals when it is nearer.
-pub const RIM_NORMAL_DISTANCE: f64 = 1e-4;
+pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
 
 /// Why a shape was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]

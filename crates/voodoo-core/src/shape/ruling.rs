@@ -11,12 +11,12 @@ pub(super) struct Angle {
 }
 
 impl Angle {
-    pub const ZERO: Self = Self { c: 1.0, s: 0.0 };
-    pub const RIGHT: Self = Self { c: 0.0, s: 1.0 };
+    pub(super) const ZERO: Self = Self { c: 1.0, s: 0.0 };
+    pub(super) const RIGHT: Self = Self { c: 0.0, s: 1.0 };
 
     /// The angle of the vector `(x, y)`, `None` for the zero vector.
     #[inline(always)]
-    pub fn of(x: f64, y: f64) -> Option<Self> {
+    pub(super) fn of(x: f64, y: f64) -> Option<Self> {
         // Lengths and their products: far from where the squares overflow or vanish, so no need for the slower `hypot`.
         let norm = (x * x + y * y).sqrt();
         (norm > 0.0 && norm.is_finite()).then(|| Self { c: x / norm, s: y / norm })
@@ -24,19 +24,19 @@ impl Angle {
 
     /// Sine of `other - self`: positive when `other` is the larger angle.
     #[inline(always)]
-    pub fn to(self, other: Self) -> f64 {
+    pub(super) fn to(self, other: Self) -> f64 {
         self.c * other.s - self.s * other.c
     }
 
     /// The angle half-way to `other`.
     #[inline(always)]
-    pub fn middle(self, other: Self) -> Self {
+    pub(super) fn middle(self, other: Self) -> Self {
         Self::of(self.c + other.c, self.s + other.s).unwrap_or(self)
     }
 
     /// This angle plus `atan(d)`.
     #[inline(always)]
-    pub fn turned(self, d: f64) -> Self {
+    pub(super) fn turned(self, d: f64) -> Self {
         Self::of(self.c - d * self.s, self.s + d * self.c).unwrap_or(self)
     }
 }

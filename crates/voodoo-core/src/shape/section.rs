@@ -5,7 +5,7 @@ use crate::math::{Pose, Vec3};
 
 /// The ellipse in which a plane across the axis cuts the side, limb frame, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Section {
+pub(crate) struct Section {
     /// Semi-axis along x.
     pub a: f64,
     /// Semi-axis along y.
@@ -16,7 +16,7 @@ pub struct Section {
 
 /// A section and the directions in which a camera sees it, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FacingSection {
+pub(crate) struct FacingSection {
     /// The section.
     pub section: Section,
     /// From its centre to the camera, metres.
@@ -32,7 +32,7 @@ pub struct FacingSection {
 impl TaperedEllipticCylinder {
     /// The section at the share `t` of the length, 0 at the proximal end and 1 at the distal one.
     #[inline]
-    pub fn section(&self, t: f64) -> Section {
+    pub(crate) fn section(&self, t: f64) -> Section {
         Section { a: self.a0 + t * (self.a1 - self.a0), b: self.b0 + t * (self.b1 - self.b0), z: t * self.length }
     }
 }
@@ -40,13 +40,13 @@ impl TaperedEllipticCylinder {
 impl Section {
     /// Its centre, on the axis.
     #[inline]
-    pub fn centre(&self) -> Vec3 {
+    pub(crate) fn centre(&self) -> Vec3 {
         Vec3::new(0.0, 0.0, self.z)
     }
 
     /// What of it faces a camera; `None` when the camera looks along the axis.
     #[inline]
-    pub fn facing(self, camera_from_limb: &Pose) -> Option<FacingSection> {
+    pub(crate) fn facing(self, camera_from_limb: &Pose) -> Option<FacingSection> {
         let to_camera = camera_from_limb.inverse_transform_vector(-(*camera_from_limb * self.centre()));
         let across = to_camera.with_z(0.0);
         let ahead = across.try_normalize()?;
@@ -56,14 +56,14 @@ impl Section {
 
     /// How far the ellipse reaches along a unit vector across the axis, metres: the distance of its tangent from the centre.
     #[inline]
-    pub fn extent(&self, direction: Vec3) -> f64 {
+    pub(crate) fn extent(&self, direction: Vec3) -> f64 {
         let (x, y) = (self.a * direction.x, self.b * direction.y);
         (x * x + y * y).sqrt()
     }
 
     /// The point of the ellipse that reaches farthest along a unit vector across the axis, metres.
     #[inline]
-    pub fn farthest_point(&self, direction: Vec3) -> Vec3 {
+    pub(crate) fn farthest_point(&self, direction: Vec3) -> Vec3 {
         let extent = self.extent(direction);
         Vec3::new(self.a * self.a * direction.x / extent, self.b * self.b * direction.y / extent, self.z)
     }
@@ -73,7 +73,7 @@ impl FacingSection {
     /// The point on the rim that lies the share `s`, from -1 to 1, across as the camera sees it: 0 is the middle, in units of
     /// the semi-axes.
     #[inline]
-    pub fn point(&self, s: f64) -> Vec3 {
+    pub(crate) fn point(&self, s: f64) -> Vec3 {
         let place = self.ahead * (1.0 - s * s).sqrt() + self.side * s;
         Vec3::new(self.section.a * place.x, self.section.b * place.y, self.section.z)
     }

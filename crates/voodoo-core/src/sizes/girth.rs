@@ -25,7 +25,7 @@ const EDGE_SIGMA: f64 = 0.01;
 /// How far the axis of a tracked limb is off across the line of sight, metres.
 const ASIDE_SIGMA: f64 = 0.01;
 /// Edges of following frames err alike: this many frames tell as much as one.
-pub const ALIKE: f64 = 10.0;
+pub(crate) const ALIKE: f64 = 10.0;
 /// So many frames are remembered: clothes move.
 pub(super) const REMEMBERED: f64 = 100.0;
 /// Fewer matched points than this tell nothing.
@@ -33,7 +33,7 @@ const ENOUGH: usize = 15;
 
 /// Change of a limb's surface in its own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GirthFit {
+pub(crate) struct GirthFit {
     /// Shift across the axis, metres; z is 0.
     pub shift: Vec3,
     /// Factors of the semi-axes along x, of those along y, and of both at the distal end. Three, not four: both axes taper
@@ -51,7 +51,7 @@ impl Default for GirthFit {
 ///
 /// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb
 /// frame), asks for `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, `e` the relative changes. Robust (Cauchy); `total`, the change made so far, is drawn to none.
-pub fn girth_step(
+pub(crate) fn girth_step(
     shape: &TaperedEllipticCylinder,
     matches: &LimbMatches,
     working_from_limb: &Pose,
@@ -114,7 +114,7 @@ pub(super) fn kernel(distance: f64) -> f64 {
 
 /// What is known about the girth of one limb since it was fitted.
 #[derive(Clone, Copy, Debug)]
-pub struct Girth {
+pub(crate) struct Girth {
     information: Matrix3<f64>,
     total: GirthFit,
 }
@@ -129,7 +129,11 @@ impl Girth {
     /// Factors of the semi-axes after one more frame: a Kalman filter of the three relative changes. `edges` lie on the sides
     /// of the limb; how far its axis is off across them in this frame is eliminated, so that edges on both sides tell the
     /// most. The thickness along the line of sight stays: the surface there is where it was seen.
-    pub fn follow(&mut self, shape: &TaperedEllipticCylinder, edges: impl Iterator<Item = Edge>) -> Option<[f64; 4]> {
+    pub(crate) fn follow(
+        &mut self,
+        shape: &TaperedEllipticCylinder,
+        edges: impl Iterator<Item = Edge>,
+    ) -> Option<[f64; 4]> {
         let mut aside = Matrix2::identity() / (ASIDE_SIGMA * ASIDE_SIGMA * ALIKE);
         let (mut mixed, mut pull) = (Matrix3x2::zeros(), Vector2::zeros());
         let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());
@@ -173,7 +177,7 @@ impl Girth {
 
 impl Girth {
     /// Standard deviation of the mean radius of a limb of this shape, metres.
-    pub fn sigma(&self, shape: &TaperedEllipticCylinder) -> f64 {
+    pub(crate) fn sigma(&self, shape: &TaperedEllipticCylinder) -> f64 {
         let radii = 0.25 * Vector3::new(shape.a0() + shape.a1(), shape.b0() + shape.b1(), shape.a1() + shape.b1());
         let known = self.information.cholesky().map(|factor| factor.solve(&radii));
         known.map_or(f64::NAN, |known| radii.dot(&known).max(0.0).sqrt())
@@ -182,13 +186,13 @@ impl Girth {
 
 impl GirthFit {
     /// Factors of the semi-axes a0, b0, a1, b1.
-    pub fn axes(&self) -> [f64; 4] {
+    pub(crate) fn axes(&self) -> [f64; 4] {
         let [a, b, distal] = self.factors;
         [a, b, a * distal, b * distal]
     }
 
     /// This change followed by another, held to what a person may differ by; and the part of the other that is left.
-    pub fn then(&self, step: &Self) -> (Self, Self) {
+    pub(crate) fn then(&self, step: &Self) -> (Self, Self) {
         let mut total = Self { shift: self.shift + step.shift, factors: self.factors };
         let mut done = *step;
         for index in 0..3 {

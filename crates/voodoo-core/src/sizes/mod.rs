@@ -1,6 +1,6 @@
 //! Sizes of the body: what the first frame corrects and fits, and what those that follow refine.
 
-pub mod girth;
+pub(crate) mod girth;
 mod outline;
 mod reported;
 mod unlike;
@@ -24,7 +24,7 @@ const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
 /// How a pose was set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
+pub(crate) enum Start {
     /// Exactly, and the sizes are known.
     SizesKnown,
     /// Exactly: the first frame fits the sizes by it.
@@ -35,7 +35,7 @@ pub enum Start {
 
 /// What is known of the sizes, and whether the next frame shall fit them.
 #[derive(Debug, Default)]
-pub struct Sizes {
+pub(crate) struct Sizes {
     open: bool,
     /// The pose was not set exactly: it is fitted before the girths are.
     rough: bool,
@@ -56,7 +56,7 @@ pub struct Sizes {
 
 impl Sizes {
     /// The pose was set: unless the sizes are known, the next frame fits them, and those that follow refine the lengths.
-    pub fn restart(&mut self, model: &Model, start: Start, config: &Config) {
+    pub(crate) fn restart(&mut self, model: &Model, start: Start, config: &Config) {
         let fit = start != Start::SizesKnown;
         (self.open, self.rough) = (fit, start == Start::Detected);
         self.set = fit.then(|| model.body.clone());
@@ -70,49 +70,49 @@ impl Sizes {
     }
 
     /// Takes in what a detector reports of the sizes of a body that it found: the lengths are drawn to the mean of all reports.
-    pub fn update(&mut self, detected: Detected) {
+    pub(crate) fn update(&mut self, detected: Detected) {
         if self.found() {
             self.reported.update(detected);
         }
     }
 
     /// Whether what a detector reported of a body that it found does not fix its sizes yet.
-    pub fn unsure(&self) -> bool {
+    pub(crate) fn unsure(&self) -> bool {
         self.reported.is_uncertain()
     }
 
     /// The sizes are to be fitted, but the pose has to be first.
-    pub fn wait_for_pose(&self) -> bool {
+    pub(crate) fn wait_for_pose(&self) -> bool {
         self.open && self.rough
     }
 
     /// The sizes were found with the pose: nobody told how large the body is.
-    pub fn found(&self) -> bool {
+    pub(crate) fn found(&self) -> bool {
         self.rough
     }
 
     /// Limbs of one length whose lengths are refined; none where they are known.
-    pub fn followed(&self) -> &[Pair] {
+    pub(crate) fn followed(&self) -> &[Pair] {
         &self.pairs
     }
 
     /// Standard deviation of the mean radius of a limb, metres; NaN where it was given.
-    pub fn girth_sigma(&self, body: &Body, limb: usize) -> f64 {
+    pub(crate) fn girth_sigma(&self, body: &Body, limb: usize) -> f64 {
         self.girths.get(limb).map_or(f64::NAN, |girth| girth.sigma(&body.limbs()[limb].shape))
     }
 
     /// The sizes are known: no frame changes them.
-    pub fn known(&self) -> bool {
+    pub(crate) fn known(&self) -> bool {
         self.set.is_none()
     }
 
     /// The body as it was set, before frames changed its sizes.
-    pub fn as_set(&self) -> Option<&Body> {
+    pub(crate) fn as_set(&self) -> Option<&Body> {
         self.set.as_ref()
     }
 
     /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
-    pub fn edited(&mut self, model: &Model, map: &JointMap) {
+    pub(crate) fn edited(&mut self, model: &Model, map: &JointMap) {
         self.reported.bind(map);
         self.girths.clear();
         self.outlines.clear();
@@ -129,7 +129,7 @@ impl Sizes {
     }
 
     /// Fits the sizes to the first frame after a reset, whose pose is known.
-    pub fn initialise(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
+    pub(crate) fn initialise(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
         if !self.open {
             return;
         }
@@ -179,7 +179,7 @@ impl Sizes {
 
     /// Draws the sizes to what a frame shows of the body at `poses`: lengths unless it is `lost`, and with `girths` those of the
     /// limbs that are `relied_on`. Changed lengths leave the joints closed.
-    pub fn refine(
+    pub(crate) fn refine(
         &mut self,
         setting: Setting,
         model: &mut Model,
@@ -251,7 +251,7 @@ impl Sizes {
 
 /// What may be learnt from a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Reliance<F> {
+pub(crate) struct Reliance<F> {
     /// The body was lost.
     pub lost: bool,
     /// Girths are followed.

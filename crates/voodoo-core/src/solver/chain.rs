@@ -11,7 +11,7 @@ use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory of the chain solver.
 #[derive(Debug, Default)]
-pub struct ChainSolver {
+pub(crate) struct ChainSolver {
     pub(super) chain: Chain,
     pub(super) screws: Vec<Vector6<f64>>,
     pub(super) composite: Vec<(Matrix6<f64>, Vector6<f64>)>,
@@ -21,7 +21,14 @@ pub struct ChainSolver {
 
 impl ChainSolver {
     /// One damped step from the normal equations at `poses`, `stride` times as far; the joints come out exactly closed.
-    pub fn step(&mut self, body: &Body, normal: &NormalEquations, damping: f64, stride: f64, poses: &mut [Pose]) {
+    pub(crate) fn step(
+        &mut self,
+        body: &Body,
+        normal: &NormalEquations,
+        damping: f64,
+        stride: f64,
+        poses: &mut [Pose],
+    ) {
         self.chain.layout(body);
         self.assemble(body, normal, poses, damping);
         if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {

@@ -10,7 +10,7 @@ use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory.
 #[derive(Debug, Default)]
-pub struct Lengths {
+pub(crate) struct Lengths {
     /// Mixed second derivatives, one row of all pose unknowns a pair.
     mixed: Vec<f64>,
     reduced: Vec<f64>,
@@ -20,7 +20,7 @@ pub struct Lengths {
 impl ChainSolver {
     /// Relative changes of length, one a pair, into `change`: the Gauss-Newton step of the lengths after the pose's unknowns
     /// have been eliminated (Schur complement), held back by `inertia` and drawn to `change`'s value at entry by `pull`.
-    pub fn lengths(
+    pub(crate) fn lengths(
         &mut self,
         body: &Body,
         normal: &NormalEquations,
@@ -56,7 +56,7 @@ fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
 impl Lengths {
     /// Information of the relative length of each of `pairs` by itself, pose's unknowns eliminated, from what
     /// [`ChainSolver::factor_information`] left; one a pair, into `information`.
-    pub fn information(
+    pub(crate) fn information(
         &mut self,
         solver: &ChainSolver,
         body: &Body,

@@ -10,7 +10,7 @@ const STAY: f64 = 0.05;
 
 /// Each limb moves to the optimum of its own pairs; information crosses one joint a step through the bands.
 #[derive(Debug, Default)]
-pub struct Limbwise {
+pub(crate) struct Limbwise {
     warm_start: WarmStart,
 }
 

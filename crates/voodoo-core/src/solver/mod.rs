@@ -9,14 +9,14 @@ mod tree;
 mod warm_start;
 mod whole_body;
 
-pub use chain::ChainSolver;
-pub use lengths::Lengths;
-pub use limbwise::Limbwise;
-pub use schedule::{Gate, Reassociation, Schedule, WarmStartInput};
-pub use spread::Spread;
-pub use tree::TreeSolver;
-pub use warm_start::WarmStart;
-pub use whole_body::{LENGTH_INFORMATION, SITE_SCALE, WholeBody};
+pub(crate) use chain::ChainSolver;
+pub(crate) use lengths::Lengths;
+pub(crate) use limbwise::Limbwise;
+pub(crate) use schedule::{Gate, Reassociation, Schedule, WarmStartInput};
+pub(crate) use spread::Spread;
+pub(crate) use tree::TreeSolver;
+pub(crate) use warm_start::WarmStart;
+pub(crate) use whole_body::{LENGTH_INFORMATION, SITE_SCALE, WholeBody};
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Pair};
@@ -33,7 +33,7 @@ const DAMPING: f64 = 1e-3;
 
 /// What a solver works on: one ICP step of one frame.
 #[derive(Debug)]
-pub struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     /// The body.
     pub body: &'a Body,
     /// What was matched at the current poses.
@@ -51,7 +51,7 @@ pub struct Problem<'a> {
 }
 
 /// Moves the limbs towards their correspondences: prepares a frame, then solves every step of it.
-pub trait Solver: std::fmt::Debug + Send + Sync {
+pub(crate) trait Solver: std::fmt::Debug + Send + Sync {
     /// What it wants of the loop.
     fn schedule(&self, config: &Config) -> Schedule;
 
@@ -79,7 +79,7 @@ pub trait Solver: std::fmt::Debug + Send + Sync {
 }
 
 /// The solver of a configuration.
-pub fn solver(kind: SolverKind) -> Box<dyn Solver> {
+pub(crate) fn solver(kind: SolverKind) -> Box<dyn Solver> {
     match kind {
         SolverKind::Limbwise => Box::new(Limbwise::default()),
         SolverKind::Chain => Box::new(WholeBody::default()),

@@ -12,7 +12,7 @@ pub(crate) fn narrowed(start: f64, end: f64, step: usize) -> f64 {
 
 /// Which points may be matched in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gate {
+pub(crate) struct Gate {
     /// Enlargement of the limb boxes, metres.
     pub box_margin: f64,
     /// Greatest distance of a point from its limb's surface, metres.
@@ -21,7 +21,7 @@ pub struct Gate {
 
 /// In which steps points get new limbs and contours new edges; in the others they keep those of the step before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reassociation {
+pub(crate) enum Reassociation {
     /// In every step, as published (K06 IV-B).
     EveryStep,
     /// In the first steps, then in every second one.
@@ -30,7 +30,7 @@ pub enum Reassociation {
 
 /// What is matched before the warm start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WarmStartInput {
+pub(crate) enum WarmStartInput {
     /// Named sites with positions and rays.
     Sites,
     /// Those, and where there are any, the points as well.
@@ -39,7 +39,7 @@ pub enum WarmStartInput {
 
 /// What a solver wants of the loop: constant for one configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Schedule {
+pub(crate) struct Schedule {
     /// Gate of the first step, and the one it narrows to.
     pub gates: [Gate; 2],
     /// When points are assigned anew.
@@ -56,7 +56,7 @@ pub struct Schedule {
 
 impl Schedule {
     /// Which points may be matched in a step of a frame.
-    pub fn gate(&self, step: usize) -> Gate {
+    pub(crate) fn gate(&self, step: usize) -> Gate {
         let [start, end] = self.gates;
         Gate {
             box_margin: narrowed(start.box_margin, end.box_margin, step),
@@ -65,7 +65,7 @@ impl Schedule {
     }
 
     /// Whether points are assigned anew in a step of a frame.
-    pub fn reassociates(&self, step: usize) -> bool {
+    pub(crate) fn reassociates(&self, step: usize) -> bool {
         match self.reassociation {
             Reassociation::EveryStep => true,
             Reassociation::EverySecondStep => step < EVERY_SECOND_FROM || (step - EVERY_SECOND_FROM).is_multiple_of(2),

@@ -9,7 +9,7 @@ use crate::terms::normal_equations::{NormalEquations, line};
 
 /// Columns of the half-solved system, one row an unknown.
 #[derive(Debug, Default)]
-pub struct Spread {
+pub(crate) struct Spread {
     rows: Vec<[f64; 6]>,
     /// Unknowns that move the limb that is asked for, the last one first.
     moving: Vec<usize>,
@@ -18,7 +18,13 @@ pub struct Spread {
 impl ChainSolver {
     /// The limbs' information at `poses` with `own` added to that of every unknown, factored: what [`Spread`] reads. False when
     /// it is not positive definite.
-    pub fn factor_information(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], own: &[f64]) -> bool {
+    pub(crate) fn factor_information(
+        &mut self,
+        body: &Body,
+        normal: &NormalEquations,
+        poses: &[Pose],
+        own: &[f64],
+    ) -> bool {
         self.chain.layout(body);
         self.assemble(body, normal, poses, 0.0);
         let n = self.chain.freedoms;
@@ -29,7 +35,13 @@ impl ChainSolver {
     }
 
     /// The same with what is `known` of all unknowns, a lower triangle, to which the limbs' information is added.
-    pub fn factor_added(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], known: &mut [f64]) -> bool {
+    pub(crate) fn factor_added(
+        &mut self,
+        body: &Body,
+        normal: &NormalEquations,
+        poses: &[Pose],
+        known: &mut [f64],
+    ) -> bool {
         self.chain.layout(body);
         self.assemble(body, normal, poses, 0.0);
         known.iter_mut().zip(&self.h).for_each(|(known, told)| *known += told);
@@ -40,7 +52,7 @@ impl ChainSolver {
 
 impl Spread {
     /// Covariance of the pose of a limb about the `origin` of its frame: a turn in world axes (radians), then a shift (metres).
-    pub fn of_limb(&mut self, solver: &ChainSolver, limb: usize, origin: Vec3) -> Matrix6<f64> {
+    pub(crate) fn of_limb(&mut self, solver: &ChainSolver, limb: usize, origin: Vec3) -> Matrix6<f64> {
         self.list(solver, limb);
         for unknown in &self.moving {
             let screw = &solver.screws[*unknown];
@@ -55,7 +67,7 @@ impl Spread {
     }
 
     /// Covariance of the unknowns of a limb's own joint (of the root: of its turn, then of its shift), in their order.
-    pub fn of_joint(&mut self, solver: &ChainSolver, limb: usize) -> Matrix6<f64> {
+    pub(crate) fn of_joint(&mut self, solver: &ChainSolver, limb: usize) -> Matrix6<f64> {
         self.list(solver, limb);
         let start = solver.chain.start[limb];
         for unknown in &self.moving {

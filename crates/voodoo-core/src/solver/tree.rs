@@ -14,7 +14,7 @@ const FLOOR: f64 = 1e-6;
 
 /// The system of one step, and its solution.
 #[derive(Debug, Default)]
-pub struct TreeSolver {
+pub(crate) struct TreeSolver {
     /// Parent of each limb, always before it; the root is its own.
     pub parent: Vec<usize>,
     /// A limb's own block of the matrix and half the gradient of its twist.
@@ -28,7 +28,7 @@ pub struct TreeSolver {
 impl TreeSolver {
     /// One damped step from the normal equations at `poses`, `stride` times as far; `band_sigma` is a band's standard deviation,
     /// metres.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         body: &Body,
         normal: &NormalEquations,
@@ -99,7 +99,7 @@ impl TreeSolver {
 
     /// Eliminates every limb into its parent, leaves first, then finds the twists from the root on. False, and no twist to
     /// be used, when the matrix is not positive definite. `own` and `mixed` are used up.
-    pub fn solve(&mut self) -> bool {
+    pub(crate) fn solve(&mut self) -> bool {
         let Self { parent, own, mixed, twist } = self;
         twist.clear();
         twist.resize(own.len(), Vector6::zeros());

@@ -22,7 +22,7 @@ const SCALE: f64 = 0.5;
 
 /// Damped Gauss-Newton steps on the sites, and the points where they are matched before.
 #[derive(Debug, Default)]
-pub struct WarmStart {
+pub(crate) struct WarmStart {
     normal: NormalEquations,
     chain: ChainSolver,
     joint_sigmas: Vec<f64>,
@@ -40,7 +40,7 @@ pub struct WarmStart {
 
 impl WarmStart {
     /// Lets all limbs move, against their points; false without sites.
-    pub fn drives_all(&mut self, problem: &Problem) -> bool {
+    pub(crate) fn drives_all(&mut self, problem: &Problem) -> bool {
         let count = problem.body.limbs().len();
         self.driven.clear();
         self.driven.resize(count, true);
@@ -54,7 +54,7 @@ impl WarmStart {
     }
 
     /// Whether sites farther than `from` metres from where they were seen lead their limbs alone in this frame.
-    pub fn drives_far(&mut self, problem: &Problem, from: f64) -> bool {
+    pub(crate) fn drives_far(&mut self, problem: &Problem, from: f64) -> bool {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
             self.following.clear();
@@ -68,7 +68,7 @@ impl WarmStart {
     }
 
     /// One step: the limbs move as those of a body with closed joints would; gaps that the bands left stay as they are.
-    pub fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
+    pub(crate) fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let Problem { body, correspondences, config, .. } = problem;
         if problem.step == 0 {
             self.start.clear();

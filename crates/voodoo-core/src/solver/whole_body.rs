@@ -34,16 +34,16 @@ const LEAST_MOTION: f64 = 0.1;
 /// range, times `motion_scale`.
 const POSTURE: f64 = 1.0;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
-pub const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
+pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
-pub const SITE_SCALE: f64 = 0.15;
+pub(crate) const SITE_SCALE: f64 = 0.15;
 /// Sites farther than this from their measurement drive the chain before the points are assigned, metres; rounds of it.
 const DRIVEN_FROM: f64 = 0.25;
 const WARM_START_ROUNDS: usize = 4;
 
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
-pub struct WholeBody {
+pub(crate) struct WholeBody {
     normal: NormalEquations,
     chain: ChainSolver,
     /// Moves the limbs instead of the chain, if there.
@@ -111,7 +111,7 @@ impl Solver for WholeBody {
 
 impl WholeBody {
     /// The same terms, solved with elastic bands.
-    pub fn tree() -> Self {
+    pub(crate) fn tree() -> Self {
         Self { tree: Some(TreeSolver::default()), ..Self::default() }
     }
 

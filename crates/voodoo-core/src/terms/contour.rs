@@ -8,7 +8,7 @@ use crate::terms::normal_equations::NormalEquations;
 
 /// Edges along their direction across the limb, under the Geman-McClure kernel.
 #[derive(Debug)]
-pub struct Contour<'a> {
+pub(crate) struct Contour<'a> {
     /// The pairs.
     pub pairs: &'a [ContourPair],
     /// Information of an edge, 1/m^2.

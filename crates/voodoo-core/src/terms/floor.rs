@@ -9,7 +9,7 @@ use crate::terms::normal_equations::{NormalEquations, line};
 
 /// One-sided: `r = max(0, -height)` for the distal end of every limb's axis.
 #[derive(Debug)]
-pub struct Floor {
+pub(crate) struct Floor {
     /// The floor, in the frame of the poses.
     pub plane: Ground,
     /// Standard deviation of the depth below it, metres.

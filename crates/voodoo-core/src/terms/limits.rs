@@ -7,7 +7,7 @@ use crate::terms::normal_equations::NormalEquations;
 
 /// All joints that have limits.
 #[derive(Debug)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// Standard deviation of a violation, radians.
     pub sigma: f64,
 }

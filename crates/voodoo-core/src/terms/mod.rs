@@ -3,7 +3,7 @@
 mod contour;
 mod floor;
 mod limits;
-pub mod normal_equations;
+pub(crate) mod normal_equations;
 mod penetration;
 mod posture;
 mod prior;
@@ -11,22 +11,22 @@ mod regions;
 mod sites;
 mod surface;
 
-pub use contour::Contour;
-pub use floor::Floor;
-pub use limits::Limits;
-pub use penetration::Penetration;
-pub use posture::Posture;
-pub use prior::Prior;
-pub use regions::Regions;
-pub use sites::Sites;
-pub use surface::Surface;
+pub(crate) use contour::Contour;
+pub(crate) use floor::Floor;
+pub(crate) use limits::Limits;
+pub(crate) use penetration::Penetration;
+pub(crate) use posture::Posture;
+pub(crate) use prior::Prior;
+pub(crate) use regions::Regions;
+pub(crate) use sites::Sites;
+pub(crate) use surface::Surface;
 
 use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 
 /// One influence on the pose.
-pub trait Term {
+pub(crate) trait Term {
     /// Adds cost, gradient and information at `poses` (working frame).
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);
 }

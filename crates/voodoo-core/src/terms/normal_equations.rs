@@ -10,7 +10,7 @@ use crate::math::{Mat3, Vec3};
 
 /// Normal equations of one limb's twist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LimbBlock {
+pub(crate) struct LimbBlock {
     /// Information of the twist.
     pub h: Matrix6<f64>,
     /// Half the gradient.
@@ -19,7 +19,7 @@ pub struct LimbBlock {
 
 /// Normal equations of one joint's relative turn (the joint of a limb to its parent).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct JointBlock {
+pub(crate) struct JointBlock {
     /// Information of the turn.
     pub h: Matrix3<f64>,
     /// Half the gradient.
@@ -28,7 +28,7 @@ pub struct JointBlock {
 
 /// The whole system and its cost.
 #[derive(Clone, Debug, Default)]
-pub struct NormalEquations {
+pub(crate) struct NormalEquations {
     /// One block a limb.
     pub limbs: Vec<LimbBlock>,
     /// One block a limb, for its joint; unused for the root.
@@ -39,7 +39,7 @@ pub struct NormalEquations {
 
 impl NormalEquations {
     /// Empties the system for `limbs` limbs.
-    pub fn clear(&mut self, limbs: usize) {
+    pub(crate) fn clear(&mut self, limbs: usize) {
         self.limbs.clear();
         self.limbs.resize(limbs, LimbBlock::default());
         self.joints.clear();
@@ -49,21 +49,21 @@ impl NormalEquations {
 }
 
 /// The moment `x x n` and the direction `n`: derivative of `n . x` with respect to the twist.
-pub fn line(x: Vec3, n: Vec3) -> Vector6<f64> {
+pub(crate) fn line(x: Vec3, n: Vec3) -> Vector6<f64> {
     let m = x.cross(n);
     Vector6::new(m.x, m.y, m.z, n.x, n.y, n.z)
 }
 
 impl LimbBlock {
     /// Adds one scalar residual.
-    pub fn add_row(&mut self, weight: f64, jacobian: &Vector6<f64>, residual: f64) {
+    pub(crate) fn add_row(&mut self, weight: f64, jacobian: &Vector6<f64>, residual: f64) {
         self.h.syger(weight, jacobian, jacobian, 1.0);
         self.h.fill_upper_triangle_with_lower_triangle();
         self.g.axpy(weight * residual, jacobian, 1.0);
     }
 
     /// Adds a vector residual `r` of a point at `x` with information `w`.
-    pub fn add_point(&mut self, information: &Mat3, x: Vec3, r: Vec3) {
+    pub(crate) fn add_point(&mut self, information: &Mat3, x: Vec3, r: Vec3) {
         // Rows of J = [-[x]x, I], one a world axis.
         let rows = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| line(x, axis));
         let force = *information * r;
@@ -78,13 +78,13 @@ impl LimbBlock {
 
 impl JointBlock {
     /// Adds a vector residual `r` of the relative turn with information `weight` and unit derivative.
-    pub fn add_turn(&mut self, weight: f64, r: Vec3) {
+    pub(crate) fn add_turn(&mut self, weight: f64, r: Vec3) {
         self.h += Matrix3::identity() * weight;
         self.g += Vector3::new(r.x, r.y, r.z) * weight;
     }
 
     /// Adds a scalar residual with derivative `axis`.
-    pub fn add_row(&mut self, weight: f64, axis: Vec3, residual: f64) {
+    pub(crate) fn add_row(&mut self, weight: f64, axis: Vec3, residual: f64) {
         let row = Vector3::new(axis.x, axis.y, axis.z);
         self.h += weight * row * row.transpose();
         self.g += weight * residual * row;

@@ -15,7 +15,7 @@ const APPROXIMATE: f64 = 0.01;
 /// One-sided: `r = max(0, -distance)` for every felt point against every limb that is neither joined to its
 /// own nor hangs on the same parent. Those overlap at their joints in any pose.
 #[derive(Debug)]
-pub struct Penetration<'a> {
+pub(crate) struct Penetration<'a> {
     /// Standard deviation of the overlap, metres.
     pub sigma: f64,
     /// [`TaperedEllipticCylinder::sphere`] of every limb: most are far from each other.

@@ -15,7 +15,7 @@ const SWINGS: f64 = 1.7;
 
 /// All joints that have limits.
 #[derive(Debug)]
-pub struct Posture {
+pub(crate) struct Posture {
     /// Standard deviation of each component of a joint's turn, as a share of half of what it may turn in all.
     pub share: f64,
 }

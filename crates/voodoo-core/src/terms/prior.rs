@@ -18,7 +18,7 @@ const ROOT_SHARE: f64 = 0.2;
 
 /// Deviation from a predicted pose.
 #[derive(Debug)]
-pub struct Prior<'a> {
+pub(crate) struct Prior<'a> {
     /// Predicted poses, working frame.
     pub predicted: &'a [Pose],
     /// Standard deviations of the root: radians, metres.
@@ -33,7 +33,7 @@ pub struct Prior<'a> {
 
 impl Prior<'_> {
     /// How calm the root (first) and each joint are, into `calm`: 1 where they are as expected, 0 where they move.
-    pub fn calm(&self, body: &Body, poses: &[Pose], calm: &mut Vec<f64>) {
+    pub(crate) fn calm(&self, body: &Body, poses: &[Pose], calm: &mut Vec<f64>) {
         let share = |deviation: f64| geman_mcclure(deviation, WELL).1;
         calm.clear();
         calm.extend(body.limbs().iter().enumerate().map(|(index, limb)| match &limb.parent {

@@ -8,7 +8,7 @@ use crate::terms::normal_equations::{NormalEquations, line};
 
 /// All edges.
 #[derive(Debug)]
-pub struct Regions<'a> {
+pub(crate) struct Regions<'a> {
     /// The edges.
     pub pairs: &'a [RegionPair],
 }

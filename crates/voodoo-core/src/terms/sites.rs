@@ -8,7 +8,7 @@ use crate::terms::normal_equations::NormalEquations;
 
 /// All site pairs; `scale` is the kernel's, metres.
 #[derive(Debug)]
-pub struct Sites<'a> {
+pub(crate) struct Sites<'a> {
     /// The pairs.
     pub correspondences: &'a Correspondences,
     /// Information of a pair of weight one, 1/m^2.

@@ -8,7 +8,7 @@ use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 
 /// `W = w (n n^T + tangential_weight (I - n n^T))` under the Geman-McClure kernel of the signed distance.
 #[derive(Debug)]
-pub struct Surface<'a> {
+pub(crate) struct Surface<'a> {
     /// The matches.
     pub correspondences: &'a Correspondences,
     /// Information of a point of weight one, 1/m^2.
@@ -20,7 +20,7 @@ pub struct Surface<'a> {
 }
 
 /// Geman-McClure: `rho(r) = r^2 / (1 + r^2 / c^2)`, weight `rho'(r) / (2 r) = 1 / (1 + r^2 / c^2)^2`.
-pub fn geman_mcclure(r: f64, scale: f64) -> (f64, f64) {
+pub(super) fn geman_mcclure(r: f64, scale: f64) -> (f64, f64) {
     let square = r * r;
     let denominator = 1.0 + square / (scale * scale);
     (square / denominator, 1.0 / (denominator * denominator))

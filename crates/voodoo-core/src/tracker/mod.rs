@@ -2,8 +2,8 @@
 
 mod assess;
 mod edits;
-pub mod estimate;
-mod expected;
+pub(crate) mod estimate;
+pub(crate) mod expected;
 mod queries;
 mod report;
 
@@ -24,8 +24,6 @@ use crate::uncertainty::Found;
 use assess::Assessor;
 use estimate::{Estimate, Status};
 use expected::Before;
-
-pub use expected::LimbMotion;
 
 /// Follows one body through frames.
 #[derive(Debug)]

@@ -24,7 +24,7 @@ const LEAST_TOLD: f64 = 1e-3;
 
 /// What is known of a pose, from frame to frame.
 #[derive(Debug, Default)]
-pub struct ByEdges {
+pub(crate) struct ByEdges {
     normal: NormalEquations,
     system: ChainSolver,
     spread: Spread,
@@ -40,18 +40,18 @@ pub struct ByEdges {
 
 impl ByEdges {
     /// Nothing is known of the pose that comes next but that it was set.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.known.clear();
         self.sigma.clear();
     }
 
     /// Standard deviation of where a limb ends, metres, after the last frame; infinite where that is not known.
-    pub fn end_sigma(&self, limb: usize) -> f64 {
+    pub(crate) fn end_sigma(&self, limb: usize) -> f64 {
         self.sigma.get(limb).copied().unwrap_or(f64::INFINITY)
     }
 
     /// Takes what was matched at `poses`, so many times 1/30 s after the last frame.
-    pub fn observe(
+    pub(crate) fn observe(
         &mut self,
         model: &Model,
         poses: &[Pose],

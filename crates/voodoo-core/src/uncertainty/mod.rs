@@ -9,7 +9,7 @@
 mod by_edges;
 mod covariances;
 
-pub use by_edges::ByEdges;
+pub(crate) use by_edges::ByEdges;
 pub use covariances::Covariances;
 
 use crate::association::correspondence::Correspondences;
@@ -37,7 +37,7 @@ const SITE_SIGMA: [f64; 2] = [0.01, 0.015];
 
 /// What is known of a pose, from frame to frame.
 #[derive(Debug, Default)]
-pub struct Uncertainty {
+pub(crate) struct Uncertainty {
     normal: NormalEquations,
     system: ChainSolver,
     spread: Spread,
@@ -52,7 +52,7 @@ pub struct Uncertainty {
 
 /// A frame's pose and what speaks for it.
 #[derive(Clone, Copy, Debug)]
-pub struct Found<'a> {
+pub(crate) struct Found<'a> {
     /// What is tracked.
     pub body: &'a Body,
     /// Where it is, working frame.
@@ -71,13 +71,13 @@ pub struct Found<'a> {
 
 impl Uncertainty {
     /// Nothing is known of the pose that comes next but that it was set.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.variance.clear();
         self.known.clear();
     }
 
     /// Covariances of a frame's pose; `proven` says of which limbs it shows that they are where they are thought to be.
-    pub fn tell(&mut self, found: Found, proven: impl Fn(usize) -> bool, told: &mut Covariances) {
+    pub(crate) fn tell(&mut self, found: Found, proven: impl Fn(usize) -> bool, told: &mut Covariances) {
         self.expect(found);
         self.sum_terms(found, proven);
         let Self { normal, system, spread, variance, information, .. } = self;

@@ -13,13 +13,13 @@ use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 
 /// A point this far from the model's surface is not explained by it, metres; and a camera sees past the surface where the background
 /// lies so much behind it, or twice as much behind it what may be the body.
-pub const EXPLAINED: f64 = 0.04;
+pub(crate) const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
 
 /// Patches of a limb that face a camera inside its image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Patches {
+pub(crate) struct Patches {
     /// Those that a camera sees past.
     pub free_space: f64,
     /// Those behind what the camera sees.
@@ -38,7 +38,7 @@ impl std::ops::AddAssign for Patches {
 
 /// What the cameras see of a limb.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Visibility {
+pub(crate) struct Visibility {
     /// By the area in the image.
     pub image: Patches,
     /// As if the limb were seen from its side: to point along the ray hides nothing.
@@ -54,13 +54,13 @@ impl std::ops::AddAssign for Visibility {
 
 impl Visibility {
     /// Cost in unexplained patches: to be seen past is as bad as to leave a patch unexplained, to hide is suspicious.
-    pub fn cost(&self) -> f64 {
+    pub(crate) fn cost(&self) -> f64 {
         self.image.free_space + OCCLUDED_COST * self.side.occluded
     }
 }
 
 /// How much of a limb's surface is seen by the cameras and how much contradicted.
-pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Visibility {
+pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Visibility {
     let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
     let mut found = Visibility::default();
     for view in views.iter() {
@@ -92,7 +92,7 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
 }
 
 /// Cost of the points that the pose leaves unexplained: `w min(d^2 / c^2, 1)` of every candidate.
-pub fn unexplained(correspondences: &Correspondences, total_weight: f64) -> f64 {
+pub(crate) fn unexplained(correspondences: &Correspondences, total_weight: f64) -> f64 {
     let mut cost = total_weight;
     for matches in &correspondences.limbs {
         for (weight, distance) in matches.weight.iter().zip(&matches.surface.signed_distance) {

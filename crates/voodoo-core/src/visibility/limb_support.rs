@@ -22,7 +22,7 @@ use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};
 /// holds the distal joint, and a place at the proximal joint says nothing of where the limb points. Then of the places in the
 /// outer two fifths alone: what hides in the trunk from the middle on may end anywhere in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LimbSupport {
+pub(crate) struct LimbSupport {
     /// Seen where they are, and explained by no limb of another arm, leg or the trunk.
     pub own: [f64; 2],
     /// A camera sees past them: the space where they would be is free.
@@ -33,13 +33,13 @@ pub struct LimbSupport {
 
 impl LimbSupport {
     /// What speaks for the limb less what speaks against it.
-    pub fn net(&self) -> [f64; 2] {
+    pub(crate) fn net(&self) -> [f64; 2] {
         [self.own[0] - self.free_space[0], self.own[1] - self.free_space[1]]
     }
 }
 
 /// Looks at the upper and lower limbs of all `chains`; `supports` gets one entry a limb, `raycasters` is working memory.
-pub fn measure_support(
+pub(crate) fn measure_support(
     views: DepthViews,
     body: &Body,
     poses: &[Pose],

@@ -3,10 +3,10 @@
 //! `render` predicts a depth image, `evidence` says how well a pose explains the frame, `limb_support` what only one arm or leg
 //! explains, and `roundness` whether what is seen is round as limbs are; all of them look at the places of `surface`.
 
-pub mod evidence;
-pub mod limb_support;
-pub mod render;
-pub mod roundness;
+pub(crate) mod evidence;
+pub(crate) mod limb_support;
+pub(crate) mod render;
+pub(crate) mod roundness;
 pub(crate) mod surface;
 
 /// At so many places along and across a limb its surface is compared with images.

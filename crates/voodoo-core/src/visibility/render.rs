@@ -139,7 +139,7 @@ impl Rendering {
 
 /// A limb as one camera sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct LimbRaycaster {
+pub(crate) struct LimbRaycaster {
     shape: TaperedEllipticCylinder,
     /// The camera's centre and axes in the limb frame.
     origin: Vec3,
@@ -155,7 +155,7 @@ pub struct LimbRaycaster {
 
 impl LimbRaycaster {
     /// The rays of one camera against a limb of this shape for a camera in this place.
-    pub fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
+    pub(crate) fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();
         let mut corners = Some([[0.0; 2]; 8]);
         let (mut low, mut high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
@@ -193,7 +193,7 @@ impl LimbRaycaster {
 
     /// Depth at which the ray through `(x / z, y / z)` meets the limb, metres; NaN where it does not.
     #[inline(always)]
-    pub fn depth_at(&self, x: f64, y: f64) -> f64 {
+    pub(crate) fn depth_at(&self, x: f64, y: f64) -> f64 {
         // Most rays pass far from most limbs.
         let near = (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]);
         if near { self.depth_within(x, y) } else { f64::NAN }

@@ -15,7 +15,7 @@ use crate::visibility::surface::surface_rows;
 ///
 /// The least-squares factor between both over all places where middle and rims are seen near the model. Half the sum of the
 /// two rims is taken, so that a limb that points towards the camera, or is seen aslant, falls away no more than another.
-pub fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> {
+pub(crate) fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> {
     let (mut product, mut square) = (0.0, 0.0);
     for view in views.iter() {
         let camera_from_working = view.working_from_camera.inverse();

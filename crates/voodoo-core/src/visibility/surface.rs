@@ -8,7 +8,7 @@ use crate::visibility::evidence::EXPLAINED;
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
+pub(crate) enum Sight {
     /// Outside the image, or no return.
     Unknown,
     /// Behind what is seen.
@@ -21,7 +21,7 @@ pub enum Sight {
 
 /// A place on a limb's surface.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfacePlace {
+pub(crate) struct SurfacePlace {
     /// Camera frame, metres.
     pub point: Vec3,
     /// What is seen in its pixel.
@@ -31,7 +31,7 @@ pub struct SurfacePlace {
 impl SurfacePlace {
     /// What the camera says about it.
     #[inline]
-    pub fn sight(&self) -> Sight {
+    pub(crate) fn sight(&self) -> Sight {
         let surface = self.point.z;
         let (z, past) = match self.pixel {
             Pixel::Unknown => return Sight::Unknown,
@@ -49,7 +49,7 @@ impl SurfacePlace {
 
     /// Depth of what may be the body, if it is seen less than `tolerance` before or behind the place, metres.
     #[inline]
-    pub fn seen_within(&self, tolerance: f64) -> Option<f64> {
+    pub(crate) fn seen_within(&self, tolerance: f64) -> Option<f64> {
         match self.pixel {
             Pixel::Foreground(z) if (z - self.point.z).abs() < tolerance => Some(z),
             _ => None,
@@ -59,7 +59,7 @@ impl SurfacePlace {
 
 /// What of a limb faces a camera, at one place along it.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfaceRow<'a> {
+pub(crate) struct SurfaceRow<'a> {
     /// Share of the limb's length, from its proximal end.
     pub t: f64,
     /// The section there.
@@ -70,20 +70,20 @@ pub struct SurfaceRow<'a> {
 impl SurfaceRow<'_> {
     /// Places across it, camera frame, metres; in shares of the radius from the middle, see [`FacingSection::point`].
     #[inline]
-    pub fn points<const N: usize>(&self, across: [f64; N]) -> [Vec3; N] {
+    pub(crate) fn points<const N: usize>(&self, across: [f64; N]) -> [Vec3; N] {
         across.map(|s| *self.camera_from_limb * self.facing.point(s))
     }
 
     /// The same with what a camera shows there.
     #[inline]
-    pub fn places<const N: usize>(&self, view: &DepthView, across: [f64; N]) -> [SurfacePlace; N] {
+    pub(crate) fn places<const N: usize>(&self, view: &DepthView, across: [f64; N]) -> [SurfacePlace; N] {
         self.points(across).map(|point| SurfacePlace { point, pixel: view.at(point) })
     }
 }
 
 /// The rows at [`ALONG_LIMB`] of a limb; those along whose axis the camera looks are left out.
 #[inline]
-pub fn surface_rows<'a>(
+pub(crate) fn surface_rows<'a>(
     shape: &'a TaperedEllipticCylinder,
     camera_from_limb: &'a Pose,
 ) -> impl Iterator<Item = SurfaceRow<'a>> + 'a {

@@ -5,19 +5,19 @@
 use std::sync::LazyLock;
 
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{DepthImage, DepthPixels};
-use voodoo_core::observation::picture::{ColorImage, ColorPixels};
-use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
 use voodoo_core::{Body, Camera};
+use voodoo_core::{ColorImage, ColorPixels};
+use voodoo_core::{DepthImage, DepthPixels};
+use voodoo_core::{NO_LIMB, Rendering, Viewpoint};
 
-pub const CAMERAS: usize = 4;
-pub const WIDTH: usize = 240;
-pub const HEIGHT: usize = 200;
+pub(crate) const CAMERAS: usize = 4;
+pub(crate) const WIDTH: usize = 240;
+pub(crate) const HEIGHT: usize = 200;
 static CAMERA: LazyLock<Camera> =
     LazyLock::new(|| Camera::pinhole(WIDTH, HEIGHT, [200.0, 200.0, 119.5, 99.5]).unwrap());
 
 /// Where a camera stands: 3 m from the body, 1.2 m high.
-pub fn world_from_camera(camera: usize) -> Pose {
+pub(crate) fn world_from_camera(camera: usize) -> Pose {
     let (sin, cos) = f64::sin_cos(0.3 + std::f64::consts::FRAC_PI_2 * camera as f64);
     let place = Vec3::new(3.0 * cos, 3.0 * sin, 1.2);
     let forward = (Vec3::new(0.0, 0.0, 0.95) - place).normalize();
@@ -27,7 +27,7 @@ pub fn world_from_camera(camera: usize) -> Pose {
 }
 
 /// The body in the middle, standing.
-pub fn standing(body: &Body) -> Vec<Pose> {
+pub(crate) fn standing(body: &Body) -> Vec<Pose> {
     body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.0, 0.485 * 1.75), Quat::IDENTITY))
 }
 
@@ -42,11 +42,11 @@ fn rendered(body: Option<(&Body, &[Pose])>, camera: usize) -> Rendering {
 }
 
 /// Depths that a camera would see, metres: the body before a wall.
-pub fn depth_of(body: &Body, poses: &[Pose], camera: usize) -> Vec<f32> {
+pub(crate) fn depth_of(body: &Body, poses: &[Pose], camera: usize) -> Vec<f32> {
     rendered(Some((body, poses)), camera).depth().iter().map(|z| if *z > 0.0 && *z < 5.0 { *z } else { 5.0 }).collect()
 }
 
-pub fn depth_picture(depth: &[f32], camera: usize) -> DepthImage<'_> {
+pub(crate) fn depth_picture(depth: &[f32], camera: usize) -> DepthImage<'_> {
     DepthImage {
         pixels: DepthPixels::F32(depth),
         camera: &CAMERA,
@@ -58,7 +58,7 @@ pub fn depth_picture(depth: &[f32], camera: usize) -> DepthImage<'_> {
 }
 
 /// What a camera sees of the posed body; of the room alone with `body` none.
-pub fn shoot(body: Option<(&Body, &[Pose])>, camera: usize) -> Vec<[u8; 3]> {
+pub(crate) fn shoot(body: Option<(&Body, &[Pose])>, camera: usize) -> Vec<[u8; 3]> {
     let rendering = rendered(body, camera);
     let mut state = 7 + camera as u64;
     let mut noise = || {
@@ -89,7 +89,7 @@ pub fn shoot(body: Option<(&Body, &[Pose])>, camera: usize) -> Vec<[u8; 3]> {
     (0..WIDTH * HEIGHT).map(pixel).collect()
 }
 
-pub fn picture(pixels: &[[u8; 3]], camera: usize, stamp: f64) -> ColorImage<'_> {
+pub(crate) fn picture(pixels: &[[u8; 3]], camera: usize, stamp: f64) -> ColorImage<'_> {
     ColorImage {
         pixels: ColorPixels::Color(pixels),
         camera: &CAMERA,

@@ -32,6 +32,6 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Allocations since the program began.
-pub fn allocations_so_far() -> usize {
+pub(crate) fn allocations_so_far() -> usize {
     COUNT.load(Ordering::Relaxed)
 }

@@ -8,19 +8,19 @@
 
 use std::f64::consts::{PI, TAU};
 
-use voodoo_core::camera::Camera;
-use voodoo_core::config::RawValue;
+use voodoo_core::Camera;
+use voodoo_core::RawValue;
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
-use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
 use voodoo_core::{Body, Config, Estimate};
+use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
+use voodoo_core::{NO_LIMB, Rendering, Viewpoint};
 
 /// SplitMix64: small, and the same for ever.
-pub struct Noise(pub u64);
+pub(crate) struct Noise(pub u64);
 
 impl Noise {
     /// Uniform in `[0, 1)`.
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -29,24 +29,24 @@ impl Noise {
     }
 
     /// Normal with standard deviation 1 (Irwin-Hall).
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 
     /// Each coordinate uniform in `[-range, range]`.
-    pub fn vector(&mut self, range: f64) -> Vec3 {
+    pub(crate) fn vector(&mut self, range: f64) -> Vec3 {
         Vec3::new(self.uniform() - 0.5, self.uniform() - 0.5, self.uniform() - 0.5) * (2.0 * range)
     }
 }
 
 /// The person stands here, turned to the camera: 2.4 m before it.
-pub fn standing(body: &Body) -> Vec<Pose> {
+pub(crate) fn standing(body: &Body) -> Vec<Pose> {
     let turned = Quat::from_axis_angle(Vec3::Z, PI);
     body.rest_pose(Pose::from_parts(Vec3::new(2.4, 0.0, 0.86), turned))
 }
 
 /// All joints closed, each turned at random by up to `bend` radians about every axis.
-pub fn bent(body: &Body, world_from_root: Pose, bend: f64, noise: &mut Noise) -> Vec<Pose> {
+pub(crate) fn bent(body: &Body, world_from_root: Pose, bend: f64, noise: &mut Noise) -> Vec<Pose> {
     let mut poses: Vec<Pose> = Vec::new();
     for limb in body.limbs() {
         poses.push(match &limb.parent {
@@ -61,7 +61,13 @@ pub fn bent(body: &Body, world_from_root: Pose, bend: f64, noise: &mut Noise) ->
 }
 
 /// `count` points on the sides of the limbs, by area, none inside another limb, each coordinate off by `sigma` metres.
-pub fn surface_points(body: &Body, poses: &[Pose], count: usize, sigma: f64, noise: &mut Noise) -> Vec<[f64; 3]> {
+pub(crate) fn surface_points(
+    body: &Body,
+    poses: &[Pose],
+    count: usize,
+    sigma: f64,
+    noise: &mut Noise,
+) -> Vec<[f64; 3]> {
     let limbs = body.limbs();
     let area: Vec<f64> = limbs.iter().map(|limb| limb.shape.length() * (limb.shape.a0() + limb.shape.b1())).collect();
     let mut points = Vec::with_capacity(count);
@@ -88,12 +94,12 @@ pub fn surface_points(body: &Body, poses: &[Pose], count: usize, sigma: f64, noi
 }
 
 /// A frame with one free cloud.
-pub fn with_cloud<'a>(stamp: f64, clouds: &'a [Cloud<'a>]) -> Frame<'a> {
+pub(crate) fn with_cloud<'a>(stamp: f64, clouds: &'a [Cloud<'a>]) -> Frame<'a> {
     Frame { clouds, ..Frame::empty(stamp) }
 }
 
 /// Free points of weight 1 in the world frame.
-pub fn cloud(points: &[[f64; 3]]) -> Cloud<'_> {
+pub(crate) fn cloud(points: &[[f64; 3]]) -> Cloud<'_> {
     Cloud {
         points: PointSlice::F64(points),
         world_from_sensor: Pose::IDENTITY,
@@ -104,19 +110,19 @@ pub fn cloud(points: &[[f64; 3]]) -> Cloud<'_> {
 }
 
 /// A camera that lives as long as the tests.
-pub fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> &'static Camera {
+pub(crate) fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> &'static Camera {
     Box::leak(Box::new(Camera::pinhole(width, height, intrinsics).unwrap()))
 }
 
 /// A depth camera 1 m above the floor that looks along the world's x axis.
-pub struct DepthCamera {
+pub(crate) struct DepthCamera {
     pub width: usize,
     pub height: usize,
     pub focal: f64,
 }
 
 impl DepthCamera {
-    pub fn world_from_sensor() -> Pose {
+    pub(crate) fn world_from_sensor() -> Pose {
         let rotation = Quat::from_mat3(&voodoo_core::math::Mat3::from_cols(-Vec3::Y, -Vec3::Z, Vec3::X));
         Pose::from_parts(Vec3::Z, rotation)
     }
@@ -128,7 +134,7 @@ impl DepthCamera {
 
     /// Millimetres along the optical axis to the body before a wall at 3.6 m, with noise of `sigma` metres; returns the
     /// number of pixels on the body, too.
-    pub fn shoot(&self, body: &Body, poses: &[Pose], sigma: f64, noise: &mut Noise) -> (Vec<u16>, usize) {
+    pub(crate) fn shoot(&self, body: &Body, poses: &[Pose], sigma: f64, noise: &mut Noise) -> (Vec<u16>, usize) {
         let view = Viewpoint { camera: self.camera(), world_from_sensor: Self::world_from_sensor() };
         let mut image = Rendering::default();
         image.render(body, poses, &view, None).unwrap();
@@ -141,7 +147,7 @@ impl DepthCamera {
         (pixels, seen)
     }
 
-    pub fn image<'a>(&self, pixels: &'a [u16]) -> DepthImage<'a> {
+    pub(crate) fn image<'a>(&self, pixels: &'a [u16]) -> DepthImage<'a> {
         DepthImage {
             pixels: DepthPixels::U16(pixels),
             camera: self.camera(),
@@ -154,7 +160,7 @@ impl DepthCamera {
 }
 
 /// All numbers of an estimate as bits: equal when the estimates are, NaN included.
-pub fn bits(estimate: &Estimate) -> Vec<u64> {
+pub(crate) fn bits(estimate: &Estimate) -> Vec<u64> {
     let poses = estimate.world_from_limb.iter().flat_map(|pose| {
         let (t, q) = (pose.translation, pose.rotation);
         [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
@@ -175,7 +181,7 @@ pub fn bits(estimate: &Estimate) -> Vec<u64> {
 }
 
 /// The default configuration with each solver there is.
-pub fn every_solver() -> Vec<Config> {
+pub(crate) fn every_solver() -> Vec<Config> {
     let fields = Config::default().fields();
     let words = fields.iter().find(|field| field.name == "solver").map_or(&[] as &[&str], |field| field.words);
     let with = |word: &&str| {
@@ -187,7 +193,7 @@ pub fn every_solver() -> Vec<Config> {
 }
 
 /// Frames of a person who sways: noisy depth images 160x124, or noisy free points.
-pub fn swaying(body: &Body, frames: usize) -> Vec<(Vec<u16>, Vec<[f64; 3]>)> {
+pub(crate) fn swaying(body: &Body, frames: usize) -> Vec<(Vec<u16>, Vec<[f64; 3]>)> {
     let mut noise = Noise(11);
     let camera = DepthCamera { width: 160, height: 124, focal: 145.0 };
     let standing = standing(body);

@@ -2,14 +2,14 @@
 #![allow(clippy::expect_used, dead_code)]
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use voodoo_core::TaperedEllipticCylinder;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::shape::TaperedEllipticCylinder;
 
 /// Splitmix64: random numbers that are the same everywhere.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -17,24 +17,24 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    pub fn direction(&mut self) -> Vec3 {
+    pub(crate) fn direction(&mut self) -> Vec3 {
         let (z, angle) = (self.within(-1.0, 1.0), self.within(0.0, TAU));
         let r = (1.0 - z * z).sqrt();
         Vec3::new(r * angle.cos(), r * angle.sin(), z)
     }
 
-    pub fn pose(&mut self) -> Pose {
+    pub(crate) fn pose(&mut self) -> Pose {
         let axis = self.direction() * self.within(0.0, PI);
         let translation = self.direction() * self.within(0.0, 4.0);
         Pose::new(translation, axis)
     }
 
     /// A query: near the surface, anywhere around, or on a plane of symmetry or the axis.
-    pub fn query(&mut self, shape: &TaperedEllipticCylinder) -> Vec3 {
+    pub(crate) fn query(&mut self, shape: &TaperedEllipticCylinder) -> Vec3 {
         let t = self.unit();
         let surface = side(shape, self.within(0.0, TAU), t);
         match (self.unit() * 8.0) as usize {
@@ -48,13 +48,13 @@ impl Random {
     }
 }
 
-pub fn shape(sizes: [f64; 5]) -> TaperedEllipticCylinder {
+pub(crate) fn shape(sizes: [f64; 5]) -> TaperedEllipticCylinder {
     let [length, a0, b0, a1, b1] = sizes;
     TaperedEllipticCylinder::new(length, a0, b0, a1, b1).expect("a valid shape")
 }
 
 /// The limbs of a grown person, roughly.
-pub fn limb_like() -> Vec<TaperedEllipticCylinder> {
+pub(crate) fn limb_like() -> Vec<TaperedEllipticCylinder> {
     [
         [0.55, 0.16, 0.11, 0.19, 0.12],
         [0.22, 0.075, 0.095, 0.075, 0.095],
@@ -68,7 +68,7 @@ pub fn limb_like() -> Vec<TaperedEllipticCylinder> {
 }
 
 /// Degenerate and hostile shapes.
-pub fn hostile() -> Vec<TaperedEllipticCylinder> {
+pub(crate) fn hostile() -> Vec<TaperedEllipticCylinder> {
     [
         [0.3, 0.1, 0.1, 0.1, 0.1],
         [0.3, 0.1, 0.1, 0.0, 0.0],
@@ -90,7 +90,7 @@ pub fn hostile() -> Vec<TaperedEllipticCylinder> {
 }
 
 /// Any shape: limb-like, prism, cone or with unrelated ends.
-pub fn random_shape(random: &mut Random) -> TaperedEllipticCylinder {
+pub(crate) fn random_shape(random: &mut Random) -> TaperedEllipticCylinder {
     let length = random.within(0.02, 0.8);
     let mut axis = || 10f64.powf(random.within(-2.5, -0.6));
     let [a0, b0, a1, b1] = [axis(), axis(), axis(), axis()];
@@ -104,14 +104,14 @@ pub fn random_shape(random: &mut Random) -> TaperedEllipticCylinder {
 }
 
 /// `P(θ, t)` of the side.
-pub fn side(shape: &TaperedEllipticCylinder, angle: f64, t: f64) -> Vec3 {
+pub(crate) fn side(shape: &TaperedEllipticCylinder, angle: f64, t: f64) -> Vec3 {
     let a = shape.a0() + (shape.a1() - shape.a0()) * t;
     let b = shape.b0() + (shape.b1() - shape.b0()) * t;
     Vec3::new(a * angle.cos(), b * angle.sin(), shape.length() * t)
 }
 
 /// A random point of the closed surface.
-pub fn surface_point(shape: &TaperedEllipticCylinder, random: &mut Random) -> Vec3 {
+pub(crate) fn surface_point(shape: &TaperedEllipticCylinder, random: &mut Random) -> Vec3 {
     let (angle, t) = (random.within(0.0, TAU), random.unit());
     match (random.unit() * 4.0) as usize {
         0 => side(shape, angle, 0.0) * Vec3::new(t, t, 1.0),
@@ -133,7 +133,7 @@ fn to_ruling(shape: &TaperedEllipticCylinder, q: Vec3, angle: f64) -> (f64, Vec3
 
 /// The closest point of the closed surface by dense search: every local minimum of a fine grid over the angle (uniform in θ
 /// and uniform in the direction of the normal of either end) refined by ternary search, and the caps. Unsigned distance.
-pub fn brute_force(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) -> (f64, Vec3) {
+pub(crate) fn brute_force(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) -> (f64, Vec3) {
     // By symmetry the nearest point lies in the quadrant of the query.
     let fold = Vec3::new(1f64.copysign(q.x), 1f64.copysign(q.y), 1.0);
     let q = q * fold;
@@ -183,7 +183,7 @@ pub fn brute_force(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) -> (f6
 }
 
 /// True strictly inside the solid, from the definition.
-pub fn inside(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
+pub(crate) fn inside(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
     let t = q.z / shape.length();
     let a = shape.a0() + (shape.a1() - shape.a0()) * t;
     let b = shape.b0() + (shape.b1() - shape.b0()) * t;

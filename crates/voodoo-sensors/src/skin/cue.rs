@@ -14,10 +14,10 @@ use crate::skin::naming::{Choice, Rules};
 use crate::skin::picture::Picture;
 use crate::skin::rules::{Expected, LimbDistances, Seen, of_pieces};
 use crate::skin::teacher::Teacher;
+use voodoo_core::PointSlice;
+use voodoo_core::TrackError;
 use voodoo_core::Tracker;
-use voodoo_core::error::TrackError;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::frame::PointSlice;
 
 /// Regions no longer than this, in radii of a palm, may be parts of one hand: a shadow between the fingers and the palm does not make
 /// two of it. Arms that lie near each other stay apart.

@@ -37,12 +37,12 @@ impl Disc {
     }
 
     /// Sets the pixels of a mask of `[height, width]` that lie in the circle.
-    pub fn fill(&self, mask: &mut [u8], size: [usize; 2], value: u8) {
+    pub(super) fn fill(&self, mask: &mut [u8], size: [usize; 2], value: u8) {
         self.spans(size, |row, columns| mask[row * size[1]..][columns].fill(value));
     }
 
     /// Rows and columns of a picture of `[height, width]` that hold all of the circle that lies in it.
-    pub fn window(&self, [height, width]: [usize; 2]) -> [Range<usize>; 2] {
+    pub(super) fn window(&self, [height, width]: [usize; 2]) -> [Range<usize>; 2] {
         let within = |middle: i64, size: usize| {
             let inside = |value: i64| value.clamp(0, size as i64) as usize;
             inside(middle - self.radius)..inside(middle + self.radius + 1)

@@ -31,7 +31,7 @@ impl Cutout {
 
     /// The pixels (column, row) of the region's outer border, from its first one on, as Suzuki and Abe follow it ("Topological
     /// structural analysis of digitized binary images by border following", 1985), and OpenCV.
-    pub fn border(&self) -> Vec<[i32; 2]> {
+    pub(super) fn border(&self) -> Vec<[i32; 2]> {
         let Some(first) = self.mask.iter().position(|pixel| *pixel != 0) else { return Vec::new() };
         let start = [(first % self.width) as i32, (first / self.width) as i32];
         let step = |[u, v]: [i32; 2], turn: usize| [u + NEIGHBOUR_STEPS[turn & 7][0], v + NEIGHBOUR_STEPS[turn & 7][1]];
@@ -52,7 +52,7 @@ impl Cutout {
     }
 
     /// The longer side of the narrowest box around the region, however turned, pixels.
-    pub fn length(&self) -> f64 {
+    pub(super) fn length(&self) -> f64 {
         let hull = self.hull();
         let mut best = (f64::INFINITY, 0.0);
         for (index, [u, v]) in hull.iter().enumerate() {
@@ -112,7 +112,7 @@ impl Cutout {
     }
 
     /// Middles (column, row) of the parts of the region around its tips, farthest first, for a palm of this radius, pixels.
-    pub fn tips(&self, palm: f64) -> Vec<[f64; 2]> {
+    pub(super) fn tips(&self, palm: f64) -> Vec<[f64; 2]> {
         let outline = self.border();
         let count = outline.len();
         let away: Vec<f64> = outline

@@ -119,7 +119,7 @@ impl Seen<'_> {
     /// A site that was not seen is taken up far from where it is expected only in a region that no other site has, which is no
     /// speck, and which the body does not explain where it is thought to be. A hand whose forearm is lost may also hang before trunk
     /// or legs: those have no skin to show.
-    pub fn allowed(&self, site: &Expected, inside: &[Vec3]) -> Vec<u8> {
+    pub(super) fn allowed(&self, site: &Expected, inside: &[Vec3]) -> Vec<u8> {
         let owned = |region| self.blobs.iter().any(|blob| blob.label.is_some() && blob.sight.region == region);
         let has_bare = self.limbs.names.iter().any(|name| is_bare(name));
         let mut allowed: Vec<u8> = Vec::with_capacity(self.sights.len());
@@ -166,7 +166,7 @@ impl Seen<'_> {
 
     /// Of every sight whether it is the surface of a limb other than a hand's own forearm, of a bare one if that is lost. `side` is
     /// what the names of the hand's limbs begin with.
-    pub fn elsewhere(&self, site: &Expected, side: &str) -> Vec<bool> {
+    pub(super) fn elsewhere(&self, site: &Expected, side: &str) -> Vec<bool> {
         let own = |name: &str| name.starts_with(side) && OWN_LIMBS.iter().any(|ending| name.ends_with(ending));
         if site.head || !self.limbs.names.iter().any(|name| own(name)) {
             return vec![false; self.sights.len()];

@@ -24,7 +24,7 @@ use crate::math::Pose;
 
 /// Bends of an arm or leg about the line from its root to its end that are tried, twice as many where nothing seen has to agree
 /// with them; and places of its end, at most, and directions of its upper limb: all cost time in proportion.
-pub const SWIVELS: usize = 6;
+pub(crate) const SWIVELS: usize = 6;
 
 /// Looks for one kind of other configuration of an arm or leg.
 pub(super) trait Propose {

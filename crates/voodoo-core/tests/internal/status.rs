@@ -1,7 +1,7 @@
 //! What images prove of limbs, and whether what is seen is round.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use crate::scene;
+use super::scene;
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 use voodoo_core::Body;
