@@ -36,9 +36,17 @@ LENSES = {
 }
 
 
-def through(name, width=320, height=240, focal=150.0):
+def through(name, width=320, height=240, focal=220.0):
     model, coefficients = LENSES[name]
     return voodoo.Camera(width, height, focal, 1.02 * focal, 0.49 * width, 0.52 * height, coefficients, model)
+
+
+def as_wide(name):
+    """A camera that sees 50 degrees to the left and right of its axis."""
+    half, edge = 159.5, np.tan(np.radians(50.0))
+    focal = half / float(through(name, 2, 2, 1.0).project([[edge, 0.0, 1.0]])[0, 0] - 0.98)
+    model, coefficients = LENSES[name]
+    return voodoo.Camera(320, 240, focal, focal, half, 119.5, coefficients, model)
 
 
 def by_opencv(camera, points):
@@ -100,7 +108,7 @@ def followed(camera):
     walk, tracker, errors, lost = Walk(body=body, stops=stops, camera=camera), voodoo.Tracker(body), [], []
     for frame in walk:
         if not errors:
-            tracker.reset(frame.joints)
+            tracker.reset(joints=frame.joints)
         estimate = tracker.step(walk.measurement(frame))
         errors += [np.linalg.norm(estimate.joints[name] - frame.joints[name]) for name in JOINTS]
         lost += [status == "lost" for status in estimate.limb_status.values()]
@@ -109,22 +117,25 @@ def followed(camera):
 
 @pytest.fixture(scope="module")
 def rectified():
-    return followed(through("none", focal=134.0))
+    return followed(as_wide("none"))
 
 
 @pytest.mark.parametrize("name", ["plumb_bob", "azure", "fisheye"])
 def test_a_person_is_followed_through_a_lens_as_through_a_pinhole(rectified, name):
-    error, lost = followed(through(name, focal=134.0))
+    error, lost = followed(as_wide(name))
     assert abs(error - rectified[0]) < 0.002
-    assert lost <= rectified[1] + 0.005
-    assert rectified[0] < 0.03 and rectified[1] < 0.05
+    # One limb in one frame of three: the neck, which the chin hides now and then.
+    assert abs(lost - rectified[1]) < 0.02
+    assert rectified[0] < 0.02
 
 
 def test_an_image_seen_through_a_lens_shows_every_ray_what_lay_there():
-    straight, bent = through("none"), through("fisheye", focal=140.0)
+    straight, bent = through("none"), through("fisheye")
     index = _sources(straight, bent)
-    rows, columns = np.divmod(index, straight.width)
     known = index >= 0
-    assert 0.9 < known.mean() <= 1.0
-    off = straight.rays()[rows[known], columns[known]] - bent.rays()[known]
+    rows, columns = np.divmod(index[known], straight.width)
+    off = straight.rays()[rows, columns] - bent.rays()[known]
     assert np.abs(off * (straight.fx, straight.fy)).max() < 0.51
+    # Unknown is what the straight camera does not see.
+    beyond = np.abs(straight.project(np.dstack([bent.rays(), np.ones_like(known)])[~known]) - (159.5, 119.5))
+    assert 0.5 < known.mean() < 1.0 and (beyond > (159.9, 119.9)).any(axis=1).all()

@@ -6,8 +6,16 @@ use voodoo_core::camera::{Camera, Lens};
 use voodoo_core::math::Vec3;
 
 /// An Azure Kinect's depth camera.
-const AZURE: [f64; 8] =
-    [0.5479397774, -0.0209713709, 2.0557534e-5, -7.2104158e-5, -0.0026522316, 0.8896790743, 0.0861302093, -0.0139103848];
+const AZURE: [f64; 8] = [
+    0.5479397774,
+    -0.0209713709,
+    2.0557534e-5,
+    -7.2104158e-5,
+    -0.0026522316,
+    0.8896790743,
+    0.0861302093,
+    -0.0139103848,
+];
 
 /// Lenses as they are sold.
 fn lenses() -> Vec<Lens> {

@@ -17,7 +17,7 @@ const FIVE: [&str; 5] = ["humanoid_root", "l_shoulder", "r_shoulder", "l_ankle",
 pub struct Fixed {
     pub joints: Vec<String>,
     pub lengths: Vec<String>,
-    pub found: Vec<Detection>,
+    pub found: Vec<(Vec3, Detection)>,
     pub fails: bool,
 }
 
@@ -31,7 +31,7 @@ impl Fixed {
     fn seeing(mut self, body: &Body, poses: &[Pose]) -> Self {
         let place = |name: &String| Some(body.site_position(poses, body.site_index(name).ok()?));
         let joint = |name| place(name).map(|position| DetectedJoint { position, sigma: 0.03, visible: 1.0 });
-        self.found.push(Detection::new(self.joints.iter().map(joint).collect(), 6.0));
+        self.found.push((poses[0].translation, Detection::new(self.joints.iter().map(joint).collect(), 6.0)));
         self
     }
 }
@@ -60,12 +60,12 @@ impl Detect for Fixed {
         }
         let mut depth = Vec::new();
         around.open_depth(image, &mut depth);
-        let shows = |seen: &&Detection| {
+        let shows = |root: Vec3| {
             let point = |index: usize| image.world_from_sensor * image.back_project(index, depth[index]);
-            let within = |index: usize| (point(index) - 0.5 * (seen.low + seen.high)).abs().max_element() < 0.9;
+            let within = |index: usize| (point(index) - root).abs().max_element() < 0.9;
             (0..depth.len()).filter(|index| depth[*index] > 0.0 && depth[*index] < 3.0 && within(*index)).count() > 100
         };
-        Ok(self.found.iter().filter(shows).cloned().collect())
+        Ok(self.found.iter().filter(|(root, _)| shows(*root)).map(|(_, seen)| seen.clone()).collect())
     }
 }
 
@@ -101,6 +101,32 @@ fn a_detector_of_five_joints_starts_a_body_from_nothing_and_names_that_the_body_
 }
 
 #[test]
+fn joints_are_those_of_the_body_after_its_limbs_were_edited() {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let poses = scene::standing(&body);
+    let (pixels, _) = CAMERA.shoot(&body, &poses, 0.005, &mut scene::Noise(3));
+    let detector = Fixed::of(&FIVE).seeing(&body, &poses);
+    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap().with_detector(Box::new(detector));
+    // Sites of the hands are gone; those after them have other numbers.
+    for hand in ["l_hand", "r_hand"] {
+        tracker.remove_limb(hand).unwrap();
+    }
+    assert!(tracker.can_search() && tracker.body().sites().len() < body.sites().len());
+    show(&mut tracker, &pixels, 0..10);
+    assert_eq!(tracker.estimate().status, Status::Tracking);
+    for name in FIVE {
+        let truth = body.site_position(&poses, body.site_index(name).unwrap());
+        let off = tracker.estimate().sites[tracker.body().site_index(name).unwrap()].distance(truth);
+        assert!(off < 0.08, "{name} is {off} m off");
+    }
+    tracker.remove_limb("l_thigh").unwrap();
+    tracker.remove_limb("r_thigh").unwrap();
+    assert!(tracker.can_search(), "root and shoulders fix the pose");
+    tracker.remove_limb("l_upperarm").unwrap();
+    assert_eq!(tracker.can_search(), tracker.body().site_index("l_shoulder").is_ok());
+}
+
+#[test]
 fn lengths_that_are_reported_set_the_sizes_and_others_stay_as_they_were_given() {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let poses = scene::standing(&body);
@@ -111,7 +137,7 @@ fn lengths_that_are_reported_set_the_sizes_and_others_stay_as_they_were_given() 
             Fixed::of(&["l_shoulder", "r_shoulder", "l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle"]);
         detector.lengths = lengths.iter().map(|(name, _)| (*name).to_owned()).collect();
         let mut detector = detector.seeing(&body, &poses);
-        detector.found[0].lengths = lengths.iter().map(|(_, length)| [*length, 0.02]).collect();
+        detector.found[0].1.lengths = lengths.iter().map(|(_, length)| [*length, 0.02]).collect();
         let mut tracker = Tracker::new(body.clone(), config.clone()).unwrap().with_detector(Box::new(detector));
         show(&mut tracker, &pixels, 0..1);
         let shape = |name: &str| tracker.body().limbs()[body.limb_index(name).unwrap()].shape.length();
@@ -163,7 +189,8 @@ fn what_cannot_be_meant_is_a_failure_that_names_it() {
     let poses = scene::standing(&body);
     let (pixels, _) = CAMERA.shoot(&body, &poses, 0.005, &mut scene::Noise(3));
     let good = Fixed::of(&FIVE).seeing(&body, &poses);
-    let wrongs: [(&str, fn(&mut Detection)); 7] = [
+    type Wrong = fn(&mut Detection);
+    let wrongs: [(&str, Wrong); 7] = [
         ("detection[0].joints: expected 5", |seen| seen.joints.truncate(2)),
         ("detection[0].joints[1]: expected finite", |seen| seen.joints[1].as_mut().unwrap().position.x = f64::NAN),
         ("detection[0].joints[0].sigma: expected finite metres > 0", |seen| {
@@ -176,7 +203,7 @@ fn what_cannot_be_meant_is_a_failure_that_names_it() {
     ];
     for (words, wrong) in wrongs {
         let mut detector = good.clone();
-        wrong(&mut detector.found[0]);
+        wrong(&mut detector.found[0].1);
         let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap().with_detector(Box::new(detector));
         show(&mut tracker, &pixels, 0..3);
         let error = tracker.detector_error().map(ToString::to_string).unwrap_or_default();

@@ -121,7 +121,7 @@ class CallableDetector:
     """A function as a detector.
 
     Args:
-        function: takes a `DetectorImage`, returns the persons in it, `DetectedPerson`s.
+        function: takes a `DetectorImage`, returns the persons in it, each a `DetectedPerson`.
         joints: names of the joints that it reports, such as those of `Body.site_names`.
         lengths: names of the lengths that it reports, of `LENGTHS`.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
@@ -73,12 +74,11 @@ class Silhouette:
         self.empty = not person.any()
         pose = rigid(world_from_camera, name="world_from_camera")
         seen = None if depth is None else _depths(depth, camera, person)
-        pinhole = Camera(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
         # It is rigid, so the inverse rotation is the transposed one.
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, self.thickness, seen, self.border, pinhole, inverse)
+        self._core = _core.View(self.distance, self.thickness, seen, self.border, _pinhole(camera), inverse)
 
     @property
     def core(self) -> _core.View:
@@ -165,9 +165,14 @@ def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8])
     if camera.distorted:
         # Interpolated depths would be between two surfaces.
         at = _distorted_pixels(camera)
-        found = cv2.remap(found.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_NEAREST)
+        found = np.asarray(cv2.remap(found, at[..., 0], at[..., 1], cv2.INTER_NEAREST), dtype=np.float64)
     # Beside the person it is the silhouette that says so.
     return np.ascontiguousarray(np.where(person != 0, found, 0.0), dtype=np.float32)
+
+
+def _pinhole(camera: Camera) -> Camera:
+    """The camera without its lens."""
+    return replace(camera, distortion=(), model="plumb_bob")
 
 
 def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:
@@ -182,9 +187,9 @@ def _distorted_pixels(camera: Camera) -> npt.NDArray[np.float32]:
     """Where (height, width, 2) the distorted picture shows what each pixel of that pinhole camera sees. Kept: every picture of
     a camera has the same, and it takes longer than all the rest of a silhouette."""
     u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
-    rays = [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)]
+    rays = _pinhole(camera).undistorted(np.column_stack([u.reshape(-1), v.reshape(-1)]))
     # What the lens does not show is off the picture.
-    pixels = np.nan_to_num(camera.project(np.stack(rays, axis=-1).reshape(-1, 3)), nan=-9.0)
+    pixels = np.nan_to_num(camera.project(np.column_stack([rays, np.ones(len(rays))])), nan=-9.0)
     at = pixels.astype(np.float32).reshape(camera.height, camera.width, 2)
     at.setflags(write=False)
     return at

@@ -98,7 +98,7 @@ impl Lens {
     }
 
     /// Where the lens puts `(x/z, y/z)`; none outside of its domain.
-    #[inline]
+    #[inline(never)]
     pub(super) fn distorted(&self, at: [f64; 2], domain: f64) -> Option<[f64; 2]> {
         let within = at[0] * at[0] + at[1] * at[1] <= domain;
         match self {

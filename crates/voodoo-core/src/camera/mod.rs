@@ -288,8 +288,8 @@ impl Camera {
     fn bounds(&self, low: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64; 2])> {
         // What no pixel sees does not matter.
         let table = self.table();
-        let [low, high] =
-            [low, high].map(|corner| [0, 1].map(|axis| corner[axis].clamp(table.low[axis], table.high[axis])));
+        let within = |corner: [f64; 2]| [0, 1].map(|axis| corner[axis].max(table.low[axis]).min(table.high[axis]));
+        let [low, high] = [within(low), within(high)];
         let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
         let (mut least, mut most) = ([f64::MAX; 2], [f64::MIN; 2]);
         // Between two places on a side its picture bulges by less than their second differences.
