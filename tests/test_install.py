@@ -46,7 +46,7 @@ def test_the_metadata_is_complete():
     told = metadata(DISTRIBUTION)
     assert told["Requires-Python"] == ">=3.10" and told["License-Expression"] == "MIT OR Apache-2.0"
     assert len(told.get_all("Classifier")) > 10 and told["Keywords"] and told["Maintainer"]
-    for minor in range(10, 14):
+    for minor in range(10, 15):
         assert f"Programming Language :: Python :: 3.{minor}" in told.get_all("Classifier")
     extras = set(told.get_all("Provides-Extra"))
     assert {"view", "docs", "test", "training"} <= extras

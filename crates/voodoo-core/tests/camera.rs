@@ -1,4 +1,5 @@
 //! The camera: rays against projections, derivatives against differences, windows against what they must hold, refusals.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::scene::Noise;
 use voodoo_core::CameraError;
