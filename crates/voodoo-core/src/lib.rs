@@ -41,7 +41,7 @@
 //!
 //! let mut tracker = Tracker::new(body, Config::default())?;
 //! tracker.reset(&start, true)?;
-//! let estimate = tracker.step(&Frame { clouds: &[cloud], ..Frame::empty(0.0) })?;
+//! let estimate = tracker.step(&Frame::empty(0.0).with_clouds(&[cloud]))?;
 //! assert_eq!(estimate.status, Status::Tracking);
 //! assert!(estimate.mean_squared_distance.sqrt() < 0.01);
 //! # Ok(())
@@ -76,8 +76,8 @@ pub mod uncertainty;
 pub mod visibility;
 
 pub use body::Body;
-pub use config::Config;
-pub use error::{BodyError, ConfigError, TrackError};
+pub use config::{Config, ConfigError};
+pub use error::{BodyError, TrackError};
 pub use observation::frame::Frame;
 pub use people::People;
 pub use shape::TaperedEllipticCylinder;

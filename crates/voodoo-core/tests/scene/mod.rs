@@ -88,7 +88,7 @@ pub fn surface_points(body: &Body, poses: &[Pose], count: usize, sigma: f64, noi
 
 /// A frame with one free cloud.
 pub fn with_cloud<'a>(stamp: f64, clouds: &'a [Cloud<'a>]) -> Frame<'a> {
-    Frame { clouds, ..Frame::empty(stamp) }
+    Frame::empty(stamp).with_clouds(clouds)
 }
 
 /// Free points of weight 1 in the world frame.
@@ -174,6 +174,12 @@ pub fn bits(estimate: &Estimate) -> Vec<u64> {
         .chain(estimate.joint_gaps.iter().copied())
         .map(f64::to_bits)
         .collect()
+}
+
+/// A value with changes.
+pub fn with<T>(mut value: T, change: impl FnOnce(&mut T)) -> T {
+    change(&mut value);
+    value
 }
 
 /// The default configuration with each solver there is.
