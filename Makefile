@@ -15,12 +15,13 @@ test: ## every test
 	scripts/test
 long: ## every test, the long ones too
 	scripts/test --long
-lint: ## rustfmt, clippy, ruff, mypy
+lint: ## rustfmt, clippy, ruff, mypy, the order of imports
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets -- -D warnings
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
+	.venv/bin/lint-imports
 format: ## set the code
 	cargo fmt --all
 	.venv/bin/ruff format .
@@ -28,7 +29,7 @@ docs: ## build the documentation
 	scripts/docs
 bench: ## time a step and a closest point
 	cargo bench --locked -p voodoo-benches
-constants: ## the numbers by which the core decides
+constants: ## the numbers by which voodoo decides
 	scripts/constants
 fingerprint: ## the same bits as OLD? make fingerprint OLD=main
 	scripts/fingerprint "$(OLD)" .

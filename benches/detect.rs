@@ -9,7 +9,8 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
-use voodoo_core::detect::{Detector, Surroundings, Wanted};
+use voodoo_core::detect::{Detect, DetectionQuery, Surroundings};
+use voodoo_detect::Detector;
 
 #[path = "../crates/voodoo-core/tests/scene/mod.rs"]
 mod scene;
@@ -38,23 +39,26 @@ fn look(criterion: &mut Criterion) {
             };
         }
         let image = camera.image(&pixels);
-        let mut detector = Detector::new().unwrap();
+        let mut detector = Detector::new();
         let root = poses[0].translation;
-        for (what, wanted) in
-            [("of anybody", Wanted::Anybody), ("at a place", Wanted::Near(root)), ("of all", Wanted::All)]
-        {
-            let found = detector.detect(&image, &Surroundings::default(), wanted);
-            let off = found.first().map_or(f64::INFINITY, |person| person.joints[2].position.distance(root));
+        for (what, query) in [
+            ("of anybody", DetectionQuery::Any),
+            ("at a place", DetectionQuery::Near(root)),
+            ("of all", DetectionQuery::All),
+        ] {
+            let found = detector.detect(&image, &Surroundings::default(), query).unwrap();
+            let place = found.first().and_then(|person| person.joints[2]);
+            let off = place.map_or(f64::INFINITY, |joint| joint.position.distance(root));
             println!("{width}x{height}, {what}: {} found, the first {off:.2} m from the root", found.len());
             group.bench_function(BenchmarkId::new(what, format!("{width}x{height}")), |b| {
-                b.iter(|| black_box(detector.detect(&image, &Surroundings::default(), wanted).len()));
+                b.iter(|| black_box(detector.detect(&image, &Surroundings::default(), query).unwrap().len()));
             });
         }
     }
 }
 
 fn weights(criterion: &mut Criterion) {
-    let bytes = include_bytes!("../crates/voodoo-core/src/detect/person.weights");
+    let bytes = include_bytes!("../crates/voodoo-detect/person.weights");
     criterion.bench_function("reading the weights", |b| b.iter(|| Detector::with_weights(black_box(bytes)).is_ok()));
 }
 

@@ -12,6 +12,7 @@ use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::observation::frame::Frame;
 use voodoo_core::people::Options;
 use voodoo_core::{Body, Config, People};
+use voodoo_detect::Detector;
 
 #[path = "../crates/voodoo-core/tests/scene/mod.rs"]
 mod scene;
@@ -63,6 +64,7 @@ fn persons(criterion: &mut Criterion) {
     for count in [1, 2, 4] {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let people = People::new(body, Config::default(), Options::default()).unwrap();
+        let people = people.with_detector(Box::new(Detector::new()));
         let mut room = Room { people, images: images(count), frames: 0 };
         let start = Instant::now();
         (0..2 * PERIOD).for_each(|_| room.frame());

@@ -14,6 +14,7 @@ use voodoo_core::config::SolverKind;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{Cloud, DepthImage, Frame};
 use voodoo_core::{Body, Config, Tracker};
+use voodoo_detect::Detector;
 
 #[path = "../crates/voodoo-core/tests/scene/mod.rs"]
 mod scene;
@@ -77,7 +78,8 @@ fn tracker(config: Config) -> Tracker {
 }
 
 fn tracker_of(body: &Body, config: Config) -> Tracker {
-    let mut tracker = Tracker::new(body.clone(), config).unwrap();
+    let tracker = Tracker::new(body.clone(), config).unwrap();
+    let mut tracker = tracker.with_detector(Box::new(Detector::new()));
     tracker.reset_pose(&scene::standing(body)).unwrap();
     tracker
 }

@@ -18,6 +18,8 @@ RENDERED = (
 )
 UTD_SEQUENCES, UTD_ACTIONS, UTD_SUBJECTS = 40, 27, 4
 BUNDLED = "python/voodoo/data/bend_scoop"
+SCRIPT_FOLDERS = ("examples", "lab/experiments")
+"""Where a checkout has the scripts of the cases; older ones have all of them in the first."""
 LASER = "laser/general_tracking_moving_1.zip"
 TRC = "pose2sim/S00_P00_T01_BalancingTrial_0-100_filt_butterworth.trc"
 
@@ -60,7 +62,7 @@ def track(name: str, recording: str, solver: str, *words: str, frames: int | Non
 
 
 def example(name: str, script: str, *words: str, needs: tuple[str, ...] = (), **options: object) -> Case:
-    """A script in examples/ of the checkout."""
+    """A script in one of the SCRIPT_FOLDERS of the checkout."""
     return Case(name, "example", (script, *words), needs=needs, **options)  # type: ignore[arg-type]
 
 

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fingerprint_cases import SCRIPT_FOLDERS
 
 FORMAT = 3
 """Of the files of results; a new number makes all of them anew."""
@@ -157,8 +158,16 @@ def without_times(text: str) -> str:
     return "\n".join(lines)
 
 
+def script_of(checkout: Path, name: str) -> Path:
+    """A script of the checkout: in one of its folders of scripts, by the age of the build."""
+    for folder in SCRIPT_FOLDERS:
+        if (checkout / folder / name).exists():
+            return checkout / folder / name
+    raise FileNotFoundError(f"{checkout}: expected {name} in {' or '.join(SCRIPT_FOLDERS)}")
+
+
 def run_case(case: Mapping[str, Any], log: Log, *, checkout: Path, folder: Path) -> str:
-    """Run a command, an example of the checkout or a case of `fingerprint_public`; what it printed."""
+    """Run a command, a script of the checkout or a case of `fingerprint_public`; what it printed."""
     printed = io.StringIO()
     kind, words = case["kind"], list(case["arguments"])
     old_path, old_argv, old_folder = list(sys.path), sys.argv, Path.cwd()
@@ -174,7 +183,7 @@ def run_case(case: Mapping[str, Any], log: Log, *, checkout: Path, folder: Path)
                     if kind == "command":
                         next(iter(entry_points(group="console_scripts", name="voodoo"))).load()()
                     else:
-                        script = checkout / "examples" / words[0]
+                        script = script_of(checkout, words[0])
                         sys.path.insert(0, str(script.parent))
                         runpy.run_path(str(script), run_name="__main__")
                 except SystemExit as end:

@@ -1,4 +1,4 @@
-"""What our own scripts and tests need to know of a Rust file: its code without comments, strings and tests, and its parts.
+"""What scripts/constants needs to know of a Rust file: its code without comments, strings and tests.
 
 Not a parser: it knows tokens and brackets, which is enough for code that rustfmt has set.
 """
@@ -6,8 +6,6 @@ Not a parser: it knows tokens and brackets, which is enough for code that rustfm
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
 
 _TEXT = re.compile(
     r"""
@@ -20,8 +18,6 @@ _TEXT = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 _TEST = re.compile(r"#\[(?:cfg\(test\)|test)\]")
-_FUNCTION = re.compile(r"\bfn\s+(\w+)")
-_STRUCT = re.compile(r"\bstruct\s+(\w+)[^;{(]*\{")
 _OPEN, _CLOSE = "([{", ")]}"
 
 
@@ -73,44 +69,6 @@ def without_tests(code: str) -> str:
         end = end_of_item(code, found.end())
         code = code[: found.start()] + blank(code[found.start() : end]) + code[end:]
     return code
-
-
-@dataclass(frozen=True)
-class Part:
-    """A function, with the line it starts in and how many it has; or a struct, with how many fields."""
-
-    name: str
-    line: int
-    size: int
-
-
-def functions(code: str) -> Iterator[Part]:
-    """Functions with a body, from `fn` to the closing bracket."""
-    for found in _FUNCTION.finditer(code):
-        end = end_of_item(code, found.end())
-        body = code[found.start() : end]
-        if body.endswith("}"):
-            yield Part(found.group(1), line_of(code, found.start()), body.count("\n") + 1)
-
-
-def structs(code: str) -> Iterator[Part]:
-    """Structs with named fields."""
-    for found in _STRUCT.finditer(code):
-        body = code[found.end() - 1 : end_of_block(code, found.end() - 1)]
-        yield Part(found.group(1), line_of(code, found.start()), len(fields(body)))
-
-
-def fields(body: str) -> list[str]:
-    """Names of the fields of a struct's block."""
-    names, depth, line = [], 0, ""
-    for sign in re.sub(r"#\[[^\]]*\]", " ", body)[1:-1] + ",":
-        depth += (sign in _OPEN + "<") - (sign in _CLOSE + ">")
-        if sign == "," and depth == 0:
-            names += re.findall(r"^\s*(?:pub(?:\([^)]*\))?\s+)?(\w+)\s*:", line)
-            line = ""
-        else:
-            line += sign
-    return names
 
 
 def line_of(code: str, place: int) -> int:

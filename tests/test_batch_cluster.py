@@ -2,7 +2,6 @@
 
 import csv
 import os
-import re
 import signal
 import socket
 import subprocess
@@ -76,19 +75,6 @@ def test_every_recording_is_a_row_and_a_table(python, recordings, tmp_path):
     assert f"{RECORDINGS} of {RECORDINGS + 1} recordings done" in again.stdout
     assert [table for table in tables if table.stat().st_mtime_ns != before[table]] == [tables[0]]
     assert len(rows_of(tmp_path / "out")) == RECORDINGS + 1
-
-
-def test_a_worker_that_dies_costs_its_task_once_more_and_nothing_else(python):
-    """The measure of benches/batch_workers.py, on few recordings: what it prints of the time is not judged here."""
-    done = subprocess.run(
-        [python, ROOT / "benches" / "batch_workers.py", str(RECORDINGS)],
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "killed worker" in done.stdout and re.search(r"[\d.]+ times as fast", done.stdout)
 
 
 def test_what_kills_every_worker_is_a_row_and_the_rest_is_done(python, recordings, tmp_path):

@@ -6,7 +6,6 @@ import pytest
 import color_scene
 import voodoo
 from color_scene import CAMERA, RATE, pictures, pose, sequence
-from ik_cases import load_example
 from voodoo.measurements import ColorImage
 from voodoo.pipeline.ik import Positions, follow
 from voodoo.pipeline.start import start_tracker
@@ -101,9 +100,3 @@ def test_inverse_kinematics_takes_silhouettes_by_region(tmp_path):
             [np.nanmean(found[name]) for name in ("l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_ankle", "r_ankle")]
         )
     assert errors["regions"] < 0.7 * errors["none"] and errors["regions"] < 0.03, errors
-
-
-@pytest.mark.long
-def test_the_dense_form_follows_as_well(tmp_path):
-    dense, sparse = load_example("dense_regions").main(color_scene.write_color_bag(tmp_path / "scene", 3), 3)
-    assert dense < 0.04 and sparse < 0.03

@@ -1,6 +1,5 @@
 """What editors know of `voodoo.Config` is what the core says."""
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +10,6 @@ import voodoo
 from voodoo._core import config_fields
 
 ROOT = Path(__file__).resolve().parent.parent
-STUB = ROOT / "python" / "voodoo" / "_config_fields.pyi"
 
 
 def test_the_stub_is_up_to_date():
@@ -20,20 +18,8 @@ def test_the_stub_is_up_to_date():
     assert run.returncode == 0, run.stderr
 
 
-def test_names_kinds_and_defaults_are_those_of_the_core():
-    (fields,) = [node for node in ast.parse(STUB.read_text(encoding="utf-8")).body if isinstance(node, ast.ClassDef)]
-    found = {
-        node.target.id: (ast.unparse(node.annotation), ast.literal_eval(node.value))
-        for node in fields.body
-        if isinstance(node, ast.AnnAssign)
-    }
-    expected = {
-        name: (f"Literal[{', '.join(map(repr, words))}]" if words else type(default).__name__, default)
-        for name, _, _, default, _, words in config_fields()
-    }
-    assert found == expected
-    assert list(found) == list(voodoo.Config().values()) == list(voodoo.Config.model_fields)
-    assert {name: value for name, (_, value) in found.items()} == voodoo.Config().values()
+def test_the_entries_are_those_of_the_core_in_its_order():
+    assert list(voodoo.Config().values()) == list(voodoo.Config.model_fields) == [name for name, *_ in config_fields()]
 
 
 def test_editing_keeps_comments_order_and_layout():

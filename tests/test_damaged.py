@@ -75,7 +75,7 @@ def test_every_good_frame_has_a_pose(entries, start, undamaged, request, change,
     settled = [not ((stamp > gone) & (stamp < gone + SETTLED_S)).any() for stamp in result.stamps]
     off = np.linalg.norm(result.joints - undamaged.joints[kept], axis=2)[settled]
     # Where the tracker decides (between two arms, what lies on which limb) one frame less may turn the balance, and so may a
-    # pixel that is a millimetre off: benches/missing_frames.py.
+    # pixel that is a millimetre off: lab/experiments/missing_frames.py.
     assert off.mean() < WITHIN_M, f"{1000 * off.mean():.1f} mm"
 
 

@@ -1,11 +1,14 @@
 import csv
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, install, pose
+from voodoo.cli import app
 from voodoo.errors import RecordingError
 from voodoo.evaluation import evaluate as module
 from voodoo.evaluation.depth_agreement import near_joints, witness
@@ -15,7 +18,7 @@ from voodoo.evaluation.score import Score
 from voodoo.evaluation.search import find_recordings
 from voodoo.export.track import Track
 from voodoo.model.projection import CameraView, body_mask
-from voodoo.recordings import RecordedFrame
+from voodoo.recordings import RecordedFrame, sample_path
 from voodoo.sensors.depth import depth_points
 
 
@@ -298,3 +301,10 @@ def test_who_is_there_and_not_found_counts_as_lost(opened):
     become()
     score, _ = evaluate(Path("fake"), init="auto")
     assert score.searching_share == 0.5
+
+
+def test_pictures_without_matplotlib_are_refused_before_the_work(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    done = CliRunner().invoke(app, ["eval", str(sample_path()), "--out", str(tmp_path / "out")])
+    assert done.exit_code != 0 and "pip install 'voodoo-tracker[eval]'" in done.stderr
+    assert not (tmp_path / "out").exists()

@@ -3,11 +3,9 @@
 import numpy as np
 
 import voodoo
-from ik_cases import load_example
 from voodoo.evaluation import metrics
 from voodoo.evaluation.evaluate import compare, evaluate
 from voodoo.export.track import Track
-from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import Init, start_tracker
 
@@ -49,24 +47,3 @@ def test_no_leg_of_those_who_sit_down_goes_through_the_floor(voodoo_data):
     without, having = (sum(legs_lost_at_the_end(file, hypotheses=on) for file in files) for on in (False, True))
     assert without >= STARTS * len(files) // 2
     assert having == 0, f"{having} of {without}"
-
-
-def errors_of(folder, joint: str, *, mode: str, start: int) -> np.ndarray:
-    """Errors (F,) [m] of a joint of a rendered recording from a disturbed start."""
-    recording = voodoo.open_recording(folder)
-    errors, _ = load_example("fusion_experiment").track(recording, list(paired(recording)), "chain", mode, start)
-    return errors[:, recording.reference.names.index(joint)]
-
-
-def test_an_arm_behind_the_trunk_is_not_drawn_to_what_comes_into_view_there(voodoo_data):
-    """It went across the back in the last frames of these starts; the wrist was 51 to 75 cm off."""
-    for start in (3, 4, 6, 7):
-        assert errors_of(voodoo_data / "rendered" / "dev_03_punch", "r_wrist", mode="depth", start=start)[-1] < 0.15
-
-
-def test_an_arm_does_not_jump_only_to_come_out_of_another_limb(voodoo_data):
-    """What cameras saw of it did not become more; the elbow was 5 to 8 cm off."""
-    for joint, start in (("l_elbow", 5), ("r_elbow", 6), ("r_elbow", 13)):
-        assert (
-            errors_of(voodoo_data / "rendered" / "dev_04_kick_ball_cmu", joint, mode="fused", start=start).max() < 0.045
-        )

@@ -1,6 +1,4 @@
-"""The image constraint: J10's virtual experiments, the criterion h and its silhouettes."""
-
-import sys
+"""The image constraint: the criterion h and its silhouettes."""
 
 import numpy as np
 import pytest
@@ -8,45 +6,6 @@ import pytest
 import voodoo
 from ik_cases import BAR, front_camera, shoulder
 from voodoo import ik
-
-
-def test_experiment_1_image_pulls_the_chain_into_the_projection(virtual):
-    chain = virtual.planar_chain()
-    experiment = virtual.experiments(chain)[0]
-    plain = virtual.run(chain, experiment, with_image=False, steps=15)
-    image = virtual.run(chain, experiment, with_image=True, steps=15)
-    assert plain.residuals[0] < 1e-6 and image.residuals[0] < 1e-6
-    assert chain.criterion(plain.angles, [experiment.image])[0] > 5.0
-    assert image.h < 0.05
-    # Plain IK stops as soon as the end point is reached: more steps change nothing.
-    more = virtual.run(chain, experiment, with_image=False, steps=60)
-    assert np.array_equal(plain.angles, more.angles)
-
-
-def test_experiment_2_same_end_point_other_configuration(virtual):
-    chain = virtual.planar_chain()
-    experiment = virtual.experiments(chain)[1]
-    plain = virtual.run(chain, experiment, with_image=False, steps=40)
-    image = virtual.run(chain, experiment, with_image=True, steps=40)
-    assert np.allclose(plain.angles, experiment.start, atol=1e-6)
-    assert image.residuals[0] < 1e-6 and image.h < 0.05
-    middle = [chain.forward(angles)[1]["joint_2"] for angles in (experiment.objective, experiment.start, image.angles)]
-    assert np.linalg.norm(middle[2] - middle[0]) < 0.06 < 0.3 < np.linalg.norm(middle[1] - middle[0])
-
-
-def test_experiment_3_object_is_avoided(virtual):
-    chain = virtual.planar_chain()
-    experiment = virtual.experiments(chain)[2]
-    plain = virtual.run(chain, experiment, with_image=False, steps=40)
-    image = virtual.run(chain, experiment, with_image=True, steps=40)
-    assert chain.criterion(plain.angles, [experiment.image])[0] > 1.0
-    assert image.h < 0.05 and image.residuals[0] < 1e-6
-
-
-def test_experiments_write_their_pictures(virtual, tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["ik_virtual.py", "--out", str(tmp_path)])
-    virtual.main()
-    assert {file.name for file in tmp_path.iterdir()} == {f"experiment_{index}.png" for index in (1, 2, 3)}
 
 
 @pytest.mark.parametrize("pixels", [np.zeros((120, 160)), np.ones((120, 160))])

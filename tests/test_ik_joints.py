@@ -59,27 +59,3 @@ def test_angles_in_result_files(tmp_path):
         again = Track.load(file)
         assert again.angle_names == track.angle_names and np.array_equal(again.angles, track.angles)
     assert "l_elbow_flexion_rad" in (tmp_path / "pose.csv").read_text().splitlines()[0]
-
-
-def test_a_planar_chain_stays_in_its_plane(virtual):
-    chain = virtual.planar_chain(3)
-    assert chain.angle_names == ("joint_0_flexion", "joint_1_flexion", "joint_2_flexion")
-    for angles in np.random.default_rng(0).uniform(-1, 1, (10, 3)):
-        _, sites = chain.forward(angles)
-        turns = np.cumsum(angles)
-        tip = virtual.SEGMENT * np.array([-np.sin(turns).sum(), np.cos(turns).sum(), 0.0])
-        assert sites["tip"] == pytest.approx(tip, abs=1e-9)
-    found = ik.solve(chain, {"tip": (0.2, 0.4, 0.7)}, start=[0.1, 0.2, 0.3], steps=100)
-    assert found.joints["tip"] == pytest.approx((0.2, 0.4, 0.0), abs=1e-5)
-    assert found.residuals[0] == pytest.approx(0.7, abs=1e-6)
-
-
-def test_sub_chains_of_a_body_from_toml(virtual):
-    body = virtual.planar_chain(4).body
-    part = ik.Chain(body, limbs=("segment_2", "segment_3"))
-    whole = ik.Chain(body, root="fixed")
-    angles = np.array([0.3, -0.2, 0.5, 0.4])
-    poses, sites = whole.forward(angles)
-    _, found = part.forward(angles[2:], world_from_base=poses["segment_1"])
-    assert found["tip"] == pytest.approx(sites["tip"], abs=1e-12)
-    assert part.site_names == ("joint_2", "joint_3", "tip")

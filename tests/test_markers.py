@@ -117,7 +117,7 @@ def test_a_result_does_not_overwrite_what_is_read(tmp_path, monkeypatch):
 
 
 def test_the_documented_marker_map_fits_the_default_human(tmp_path):
-    text = (Path(__file__).parents[1] / "docs" / "how-to" / "markers.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "docs" / "how-to" / "keypoints.md").read_text(encoding="utf-8")
     (block,) = [block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "markers.toml" in block]
     (tmp_path / "markers.toml").write_text(block, encoding="utf-8")
     chosen = MarkerMap.load(tmp_path / "markers.toml")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import voodoo
+import voodoo._core as _core
 import voodoo.pipeline.front_end as front_end_module
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.recordings import LaserScan, RecordedFrame
-from voodoo.sensors.motion import LimbMotion
 from voodoo.sensors.settings import FrontEndSettings
 
 STEP = 1.0 / 30.0
@@ -22,56 +22,82 @@ def turned(angle, shift):
     return pose
 
 
-def near(points):
-    """Distances from two limbs at the origin and a metre to its left."""
-    return np.array([np.linalg.norm(points - place, axis=1) for place in ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))])
+def moving(shift, *, interval=STEP):
+    """A tracker of a standing body that has moved by (3,) in a frame, and world_from_limb before it did."""
+    tracker = voodoo.Tracker(voodoo.Body.human(height=1.78))
+    start = {"l_shoulder": (2.0, 0.2, 1.45), "r_shoulder": (2.0, -0.2, 1.45), "l_hip": (2.0, 0.1, 0.94)}
+    start["r_hip"] = (2.0, -0.1, 0.94)
+    joints = tracker.reset(joints=start).joints
+    for stamp, moved in ((STEP - interval, np.zeros(3)), (STEP, np.asarray(shift))):
+        before = tracker.estimate.world_from_limb
+        frame = voodoo.Frame(stamp)
+        for site, place in joints.items():
+            frame.add_position(site, place + moved, weight=1e4)
+        tracker.step(frame)
+    return tracker, before
 
 
-def moving(shift, angle=0.0, **options):
-    motion = LimbMotion(velocity_share=1.0, **options)
-    still = turned(0.0, (0.0, 0.0, 0.0))
-    motion.update(0.0, np.array([still, turned(0.0, (0.0, 1.0, 0.0))]))
-    motion.update(STEP, np.array([still, turned(angle, np.add((0.0, 1.0, 0.0), shift))]))
-    return motion
+def went_on(before, now, point):
+    """What a limb did to a place on it."""
+    return (now @ np.linalg.inv(before) @ [*point, 1.0])[:3] - point
 
 
-POINTS = np.array([[0.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.5, 0.0], [5.0, 5.0, 5.0]])
+def on_limb(tracker, limb):
+    """A place 2 cm outside a limb's surface, halfway along it."""
+    shape, pose = next(part.shape for part in tracker.body.limbs if part.name == limb), tracker.estimate.world_from_limb
+    return (pose[limb] @ [0.5 * (shape.a0 + shape.a1) + 0.02, 0.0, 0.5 * shape.length, 1.0])[:3]
+
+
+def test_sites_are_expected_where_a_share_of_the_last_motion_takes_them():
+    tracker, _ = moving((0.05, 0.0, 0.0))
+    now, rest = tracker.estimate.joints, voodoo.Tracker(voodoo.Body.human())
+    for elapsed, share in ((0.0, 0.0), (0.5, 0.3), (-0.5, -0.3)):
+        expected = tracker.predict(STEP + elapsed * STEP)
+        assert list(expected) == list(now)
+        moved = np.array([expected[site] - now[site] for site in now])
+        assert np.allclose(moved, share * np.array([0.05, 0.0, 0.0]), atol=0.002)
+    jumped, _ = moving((0.5, 0.0, 0.0))
+    for site, place in jumped.predict(2 * STEP).items():
+        assert np.array_equal(place, jumped.estimate.joints[site])
+    with pytest.raises(voodoo.MeasurementError):
+        rest.predict(0.0)
 
 
 def test_points_go_on_with_their_limb_and_the_scene_stays():
-    found = moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, STEP / 2, near)
-    assert np.allclose(found - POINTS, [[0, 0, 0], [0.015, 0, 0], [0, 0, 0], [0, 0, 0]])
-    earlier = moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, -STEP / 2, near)
-    assert np.allclose(earlier[1], POINTS[1] - (0.015, 0.0, 0.0))
-
-
-def test_a_turning_limb_moves_what_is_far_from_its_joint_more():
-    found = moving((0.0, 0.0, 0.0), angle=0.05).motion_compensated(POINTS, STEP, near)
-    assert np.allclose(found[1], [0.1 * np.cos(0.05), 1.0 + 0.1 * np.sin(0.05), 0.0])
+    tracker, before = moving((0.03, 0.01, 0.0))
+    now = tracker.estimate.world_from_limb
+    limb = on_limb(tracker, "l_calf")
+    points = np.array([limb, [5.0, 5.0, 5.0], limb + (0.0, 0.0, 3.0)])
+    for elapsed in (STEP / 2, -STEP / 2):
+        found = _core.carried(points, tracker._core, elapsed=elapsed)
+        share = 0.6 * elapsed / STEP
+        assert np.allclose(found[0], limb + share * went_on(before["l_calf"], now["l_calf"], limb), atol=1e-12)
+        assert np.array_equal(found[1:], points[1:])
+    pose = turned(0.3, (0.2, 0.1, 0.35))
+    seen = (points - pose[:3, 3]) @ pose[:3, :3]
+    found = _core.carried(seen, tracker._core, elapsed=-STEP / 2, world_from_sensor=pose)
+    assert np.allclose(found @ pose[:3, :3].T + pose[:3, 3], _core.carried(points, tracker._core, elapsed=-STEP / 2))
 
 
 def test_what_is_not_known_to_move_stays():
-    assert LimbMotion().motion_compensated(POINTS, STEP, near) is POINTS
-    assert moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, 0.0, near) is POINTS
-    jumped = moving((0.5, 0.0, 0.0))
-    assert np.array_equal(jumped.motion_compensated(POINTS, STEP, near), POINTS)
-    late = moving((0.03, 0.0, 0.0)).motion_compensated(POINTS, 5.0, near)
-    assert late[1, 0] == pytest.approx(0.1 + 0.1 * 0.03 / STEP), "for no longer than 0.1 s"
-    another_body = moving((0.03, 0.0, 0.0))
-    another_body.update(2 * STEP, np.eye(4)[None])
-    assert another_body.motion_compensated(POINTS, STEP, near) is POINTS
+    tracker, before = moving((0.03, 0.0, 0.0))
+    limb = on_limb(tracker, "l_calf")
+    points = limb[None]
+    assert _core.carried(points, tracker._core, elapsed=0.0) is None
+    late = _core.carried(points, tracker._core, elapsed=5.0)
+    step = went_on(before["l_calf"], tracker.estimate.world_from_limb["l_calf"], limb)
+    assert np.allclose(late[0], limb + 0.6 * 0.1 / STEP * step), "for no longer than 0.1 s"
+    jumped, _ = moving((0.5, 0.0, 0.0))
+    place = on_limb(jumped, "l_calf")[None]
+    assert np.array_equal(_core.carried(place, jumped._core, elapsed=STEP), place)
+    tracker.reset_pose(tracker.estimate.world_from_limb)
+    assert _core.carried(points, tracker._core, elapsed=STEP) is None
 
 
 def test_an_older_scan_is_moved_along_with_the_leg(monkeypatch):
     """A body that walks at 1.5 m/s, and a scan of its legs half a frame before: what reaches the frame is where they are."""
-    tracker = voodoo.Tracker(voodoo.Body.human(height=1.78))
-    start = {"l_shoulder": (2.0, 0.2, 1.45), "r_shoulder": (2.0, -0.2, 1.45), "l_hip": (2.0, 0.1, 0.94)}
-    start["r_hip"] = (2.0, -0.1, 0.94)
-    tracker.reset(joints=start)
+    tracker, before = moving((0.05, 0.0, 0.0))
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("scan",)))
-    shift = np.array([0.05, 0.0, 0.0])
-    front_end._motion.update(0.0, turned(0.0, -shift) @ tracker.estimate.limb_poses)
-    front_end._motion.update(STEP, tracker.estimate.limb_poses)
     pose = turned(0.3, (0.2, 0.1, 0.35))
     legs = [tracker.estimate.world_from_limb[f"{side}_calf"][:3, 3] for side in "lr"]
     places = np.array([[leg[0] - 0.05, leg[1], 0.35] for leg in legs] + [[4.0, 0.5, 0.35]])
@@ -101,5 +127,9 @@ def test_an_older_scan_is_moved_along_with_the_leg(monkeypatch):
     (points, used) = seen[0]
     assert np.array_equal(used, pose), "still in the frame of the sensor: what faces it may be seen"
     moved = (points - places) @ pose[:3, :3].T
-    assert np.allclose(moved[:2], 0.6 * 0.5 * shift, atol=1e-9)
+    now = tracker.estimate.world_from_limb
+    world = places @ pose[:3, :3].T + pose[:3, 3]
+    for limb, place, found in zip(("l_calf", "r_calf"), world, moved, strict=False):
+        assert np.allclose(found, 0.6 * 0.5 * went_on(before[limb], now[limb], place), atol=1e-9)
+        assert found[0] == pytest.approx(0.6 * 0.5 * 0.05, abs=0.005)
     assert np.allclose(moved[2], 0.0)

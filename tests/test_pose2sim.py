@@ -1,7 +1,4 @@
-"""Pose2Sim folders, and the body carried by rays alone."""
-
-import sys
-from pathlib import Path
+"""Pose2Sim folders."""
 
 import numpy as np
 import pytest
@@ -10,9 +7,6 @@ from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
 from voodoo.recordings.camera_files import read_camera_toml
 from voodoo.sensors.rays import SiteRay, agreed
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))
-import fusion_pose2sim
 
 CALIBRATION = """
 [cam_01]
@@ -75,21 +69,3 @@ def test_recording(folder):
         open_recording(folder, cameras=("cam_09",))
     with pytest.raises(RecordingError, match="17 keypoints"):
         next(iter(open_recording(folder, layout="coco17")))
-
-
-@pytest.mark.parametrize("solver", ["limbwise", "chain"])
-def test_rays_alone_follow_the_balancing_trial(folder, solver):
-    run = fusion_pose2sim.track(folder, "all", fusion_pose2sim.CONFIG.model_copy(update={"solver": solver}))
-    assert run.errors.shape == (100, 12)
-    assert run.errors.mean() < 0.03
-
-
-def test_a_camera_less_and_random_pixels(folder):
-    config = fusion_pose2sim.CONFIG
-    names = [camera.name for camera in open_recording(folder).cameras]
-    for missing in names:
-        kept = tuple(name for name in names if name != missing)
-        assert fusion_pose2sim.track(folder, missing, config, cameras=kept).errors.mean() < 0.045, missing
-    wrong = fusion_pose2sim.track(folder, "20 %", config, outliers=0.2)
-    assert wrong.errors[-10:].mean() < 0.05
-    assert all(estimate.status == "tracking" for estimate in wrong.estimates)

@@ -38,9 +38,6 @@ def test_the_two_commands_are_there_and_call_what_they_say():
         run(["bash", "-n", name], ROOT)
     assert "voodoo demo" in (ROOT / first).read_text() and "pytest" in (ROOT / second).read_text()
     assert second in (ROOT / ".ci" / "run").read_text()
-    for name in (first, second):  # what it will do and how long that takes comes first
-        said = [line for line in (ROOT / name).read_text().splitlines() if line.strip().startswith("echo ")]
-        assert "minutes on two cores" in said[0] and "sets up .venv" in said[0], name
 
 
 def test_the_commands_on_a_recording_run(tmp_path):
@@ -51,10 +48,6 @@ def test_the_commands_on_a_recording_run(tmp_path):
         assert words[0] == ".venv/bin/voodoo"
         run([*VOODOO, *(recording if word == "RECORDING" else word for word in words[1:])], tmp_path)
     assert (tmp_path / "pose.csv").stat().st_size > 1000 and (tmp_path / "look.mp4").stat().st_size > 1000
-
-
-def test_the_readme_fits_two_screens():
-    assert len(README.splitlines()) <= 100
 
 
 def test_the_lamp_is_tracked():

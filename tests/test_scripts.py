@@ -49,53 +49,93 @@ mod tests {
 """
 
 
+PYTHON = '''"""Text with 9.5 in it."""
+BINS, _WIDE = (3, 4), 5
+_SHARES = {"a": 0.2, "b": (0.3, 0.4)}
+
+
+@dataclass
+class Settings:
+    """Gates [m]."""
+
+    STEPS = 7
+    gate: float = 0.3
+    count: int = 3
+    share: float = 0.5
+
+
+def judge(seen, *, margin: float = 0.25, most: int = 9):
+    return seen * 2.0 > 1.5 and len(seen) >= 4 and 0.7 < margin < 1e-9 + seen[3]
+'''
+
+
 @pytest.fixture
-def source(tmp_path):
-    (tmp_path / "hypotheses").mkdir()
-    (tmp_path / "hypotheses" / "mod.rs").write_text(RUST)
-    (tmp_path / "sizes.rs").write_text("/// Metres.\nconst IDLE: f64 = 0.3;\n")
+def tree(tmp_path):
     config = (
         '\nconfig! {\n    /// Steps.\n    steps: usize = 6, "", 1 ..= 9;\n    /// Gate.\n    gate: f64 = 0.3, "m";\n}\n'
     )
-    (tmp_path / "config.rs").write_text(config)
+    files = {
+        "crates/voodoo-core/src/hypotheses/mod.rs": RUST,
+        "crates/voodoo-core/src/sizes.rs": "/// Metres.\nconst IDLE: f64 = 0.3;\n",
+        "crates/voodoo-core/src/config.rs": config,
+        "crates/voodoo-core/src/math/lanes.rs": "const LANES: usize = 8;\n",
+        "crates/voodoo-core/src/lib.rs": "mod config;\n#[cfg(test)]\nmod testing;\n",
+        "crates/voodoo-core/src/testing.rs": "const WALL: f64 = 4.5;\n",
+        "crates/voodoo-core/tests/all.rs": "const MANY: usize = 99;\n",
+        "crates/voodoo-ik/src/lib.rs": "/// Metres.\nconst IDLE: f64 = 0.4;\n",
+        "python/voodoo/sensors/gate.py": PYTHON,
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
     return tmp_path
 
 
-def test_constants_counts_names_literals_and_keys(source):
-    (source / "hypotheses" / "gate.rs").write_text("fn f(c: &Config) -> f64 { c.gate }\n")
-    found, _ = constants.read(source)
-    seen = {(one.group, one.kind, one.name): one.count for one in found}
+def test_constants_counts_names_literals_and_keys_of_every_crate_and_of_python(tree):
+    seen = {(one.room, one.kind, one.name): one.count for one in constants.read(tree)}
     assert seen == {
-        ("hypotheses", "named", "IDLE"): 1,
-        ("hypotheses", "named", "LEANS"): 4,
-        ("hypotheses", "named", "BARE"): 1,
-        ("hypotheses", "literal", "1.5"): 1,
-        ("hypotheses", "literal", "4"): 1,
-        ("hypotheses", "literal", "0.7"): 1,
-        ("hypotheses", "key", "gate"): 1,
-        ("rest", "named", "IDLE"): 1,
-        ("rest", "key", "steps"): 1,
+        ("voodoo-core/hypotheses", "named", "IDLE"): 1,
+        ("voodoo-core/hypotheses", "named", "LEANS"): 4,
+        ("voodoo-core/hypotheses", "named", "BARE"): 1,
+        ("voodoo-core/hypotheses", "literal", "1.5"): 1,
+        ("voodoo-core/hypotheses", "literal", "4"): 1,
+        ("voodoo-core/hypotheses", "literal", "0.7"): 1,
+        ("voodoo-core/config.rs", "key", "gate"): 1,
+        ("voodoo-core/config.rs", "key", "steps"): 1,
+        ("voodoo-core/sizes.rs", "named", "IDLE"): 1,
+        ("voodoo-ik/lib.rs", "named", "IDLE"): 1,
+        ("python/sensors", "named", "BINS"): 2,
+        ("python/sensors", "named", "_WIDE"): 1,
+        ("python/sensors", "named", "_SHARES"): 3,
+        ("python/sensors", "named", "STEPS"): 1,
+        ("python/sensors", "key", "gate"): 1,
+        ("python/sensors", "key", "margin"): 1,
+        ("python/sensors", "literal", "1.5"): 1,
+        ("python/sensors", "literal", "4"): 1,
+        ("python/sensors", "literal", "0.7"): 1,
     }
-    lines = constants.table(found)
-    assert re.search(r"hypotheses  all +3 +6 +3 +1 +10$", "\n".join(lines), re.MULTILINE)
+    lines = "\n".join(constants.table(constants.read(tree)))
+    assert re.search(r"^voodoo-core/hypotheses all +3 +6 +3 +0 +9$", lines, re.MULTILINE)
+    assert re.search(r"^python all +4 +7 +3 +2 +12$", lines, re.MULTILINE)
+    assert re.search(r"^all +9 +15 +6 +4 +25$", lines, re.MULTILINE)
 
 
-def test_constants_says_what_has_no_comment_or_two_homes(source):
-    assert constants.problems(source) == [
-        "hypotheses/mod.rs:7: BARE has no doc comment with its unit and reason",
-        "IDLE is defined in hypotheses/mod.rs, sizes.rs",
+def test_constants_says_what_has_no_comment_or_two_homes_in_a_crate(tree):
+    assert constants.problems(tree) == [
+        "voodoo-core/hypotheses/mod.rs:7: BARE has no doc comment with its unit and reason",
+        "IDLE is defined in voodoo-core/hypotheses/mod.rs, voodoo-core/sizes.rs",
     ]
 
 
 def test_constants_prints_json():
     done = subprocess.run([SCRIPTS / "constants", "--json"], capture_output=True, text=True, check=True)
-    groups = {one["group"] for one in json.loads(done.stdout)}
-    assert groups == {"hypotheses", "relocalize", "assess", "visibility", "rest"}
+    sides = {one["file"].split("/")[0] for one in json.loads(done.stdout)}
+    crates = {path.parent.name for path in (SCRIPTS.parent / "crates").glob("*/src")}
+    assert {"python", "voodoo-core"} < sides <= {"python", *crates}
 
 
-@pytest.mark.skipif(not (constants.SOURCE / "math").is_dir(), reason="the core's files still lie flat")
-def test_every_constant_of_the_core_is_documented_and_has_one_home():
-    assert constants.problems(constants.SOURCE) == []
+def test_every_constant_of_the_crates_is_documented_and_has_one_home():
+    assert constants.problems(constants.ROOT) == []
 
 
 def results(*places):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from voodoo import Camera, MeasurementError
-from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import (
     PAPER_WEIGHTS,
     POINTS_SHARING,
@@ -94,16 +94,3 @@ def test_gate_opens_while_nothing_passes_and_closes_again():
     assert not gate.accepts_point("l_wrist", at, np.array([0.15, 0, 0]), 0.11)
     assert gate.limit("l_wrist", "points", 100.0) == 0.25
     assert gate.limit("r_wrist", "points", 0.1) == 0.1  # each site has its own
-
-
-def test_prediction_moves_on_and_forgets_jumps():
-    predictor = SitePredictor(velocity_share=0.5)
-    with pytest.raises(MeasurementError):
-        predictor.predict(0.0)
-    predictor.update(float("nan"), ("hand",), np.zeros((1, 3)))
-    np.testing.assert_allclose(predictor.predict(5.0)["hand"], 0.0)
-    predictor.update(0.0, ("hand",), np.zeros((1, 3)))
-    predictor.update(0.1, ("hand",), np.array([[0.1, 0, 0]]))
-    np.testing.assert_allclose(predictor.predict(0.2)["hand"], [0.15, 0, 0])
-    predictor.update(0.2, ("hand",), np.array([[2.0, 0, 0]]))
-    np.testing.assert_allclose(predictor.predict(0.3)["hand"], [2.0, 0, 0])

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import voodoo
+from scene import rest_pose, turn
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
 from voodoo import MeasurementError
 from voodoo.sensors.body_view import BodyView
 from voodoo.sensors.pixels import in_sensor, ray_distance
-from voodoo.sensors.skin.regions import candidates
 from voodoo.sensors.skin.settings import SkinSettings
-from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
+from voodoo.sensors.skin.tracker import SkinTracker
 
 
 def test_hands_and_face_are_found_and_named():
@@ -85,7 +85,12 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
     grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
     body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
     found = {}
-    for outside in (0.0, 0.2):
+    for aside in (at(far, Z)[1], -0.1):  # where the body stands: at the far place, and away from it
+        tracker = voodoo.Tracker(voodoo.Body.human(height=1.78))
+        upright = turn((0.0, 0.0, 1.0), -np.pi / 2)
+        root = np.eye(4)
+        root[:3, :3], root[:3, 3] = upright, (Z, aside, 1.0)
+        tracker.reset_pose({limb: root @ pose for limb, pose in rest_pose(tracker.body).items()})
         skin = SkinTracker()
         learnt(skin)
         joints = Pose(head, left, right).joints
@@ -98,11 +103,12 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
                 POSE,
                 joints,
                 body=body,
-                surface=lambda places, outside=outside: LimbDistances(("thorax",), np.full((1, len(places)), outside)),
+                tracker=tracker,
             )
-        found[outside] = {ray.site: ray for ray in rays}
-    assert set(found[0.0]) == {"head_center", "r_hand"}
-    place = found[0.2]["l_hand"].place  # behind the surface that the depth camera saw
+        explained = bool(tracker.distance(at(far, Z)[None])[0] < 0.0)
+        found[explained] = {ray.site: ray for ray in rays}
+    assert set(found[True]) == {"head_center", "r_hand"}
+    place = found[False]["l_hand"].place  # behind the surface that the depth camera saw
     assert np.linalg.norm(place - at(far, Z)) == pytest.approx(0.04, abs=0.02)
 
 
@@ -182,16 +188,6 @@ def test_lost_tracking_teaches_nothing():
     skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
     np.testing.assert_array_equal(before, skin.colours)
     assert not skin.settled
-
-
-def test_candidates_skip_noise_and_doors():
-    mask = np.zeros((240, 320), bool)
-    mask[10:12, 10:12] = True
-    mask[40:52, 40:52] = True
-    mask[0:240, 200:320] = True
-    found, regions = candidates(mask, palm_px=5.4)
-    assert [item.pixel for item in found] == [(45.5, 45.5)]
-    assert (regions == found[0].region).sum() == found[0].area == 144
 
 
 def test_settings_and_images_are_checked():

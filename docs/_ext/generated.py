@@ -22,6 +22,8 @@ WIDTH = 80
 ROOT = Path(__file__).resolve().parents[2]
 MARK = re.compile(r"^% generated: (\S+)$", re.MULTILINE)
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((?!https?:|#)([^)]*)\)")
+LAB = re.compile(r"\[([^\]]*)\]\((?:\.\./)+lab/([^)#]*)[^)]*\)")
+"""Links to what is no page: they stay as the file's name."""
 PROJECT = {f"{name.upper()}.md": f"/project/{name}.md" for name in ("architecture", "contributing", "changelog")}
 """Files beside docs/ that are pages as well."""
 
@@ -129,7 +131,8 @@ GENERATED = {"command_line": command_line, "configuration": configuration}
 def fill(app: Sphinx, docname: str, source: list[str]) -> None:
     """Put the generated text where a page asks for it, and let links to the repository's root lead to its pages."""
     text = MARK.sub(lambda mark: project_file(mark[1]) if mark[1] in PROJECT else GENERATED[mark[1]](), source[0])
-    source[0] = re.sub(r"\]\((?:\.\./)+([A-Z]+\.md)", lambda link: f"]({PROJECT[link[1]]}", text)
+    text = re.sub(r"\]\((?:\.\./)+([A-Z]+\.md)", lambda link: f"]({PROJECT[link[1]]}", text)
+    source[0] = LAB.sub(r"\1 (`lab/\2`)", text)
 
 
 def escape(_app: Sphinx, _what: str, _name: str, _object: object, _options: object, lines: list[str]) -> None:

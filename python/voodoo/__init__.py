@@ -3,13 +3,19 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from voodoo._moved import MOVED, install
-
 if TYPE_CHECKING:
     from voodoo import ik
     from voodoo._core import ClosestPoints, Detection, Detector, Estimate, Frame, TaperedEllipticCylinder, __version__
     from voodoo.config import Config
-    from voodoo.errors import BodyError, CameraError, ConfigError, MeasurementError, RecordingError, VoodooError
+    from voodoo.errors import (
+        BodyError,
+        CameraError,
+        ConfigError,
+        DetectorWarning,
+        MeasurementError,
+        RecordingError,
+        VoodooError,
+    )
     from voodoo.model.body import Body, Joint, Limb, Place
     from voodoo.model.camera import Camera
     from voodoo.people import People, PeopleEstimate, Person
@@ -27,6 +33,7 @@ __all__ = [
     "ConfigError",
     "Detection",
     "Detector",
+    "DetectorWarning",
     "Estimate",
     "Frame",
     "Joint",
@@ -63,6 +70,7 @@ _HOMES = {
         "BodyError",
         "CameraError",
         "ConfigError",
+        "DetectorWarning",
         "MeasurementError",
         "RecordingError",
         "VoodooError",
@@ -79,6 +87,7 @@ _ROOMS = (
     "_core",
     "cli",
     "config",
+    "detectors",
     "errors",
     "evaluation",
     "export",
@@ -95,15 +104,13 @@ _ROOMS = (
     "visualization",
 )
 
-install()
-
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
     if name in _HOME_OF:
         value = getattr(import_module(_HOME_OF[name]), name)
         globals()[name] = value
         return value
-    if name in _ROOMS or f"voodoo.{name}" in MOVED:
+    if name in _ROOMS:
         return import_module(f"voodoo.{name}")
     raise AttributeError(f"module 'voodoo' has no attribute {name!r}")
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 __all__ = [
     "Body",
     "BodyView",
+    "Camera",
     "Chain",
     "ClosestPoints",
     "Detection",
@@ -20,7 +21,6 @@ __all__ = [
     "People",
     "PersonCandidate",
     "SiteGate",
-    "SiteMotion",
     "SiteRay",
     "SkinCue",
     "SkinTeacher",
@@ -30,179 +30,72 @@ __all__ = [
     "View",
     "__version__",
     "_estimate",
+    "body_before",
     "body_view",
     "carried",
-    "color_bins",
     "config_fields",
-    "joined_mask",
-    "mask_regions",
+    "expected_sites",
+    "linear_sum_assignment",
     "nearest_surface",
     "person_candidates",
-    "points_within",
     "render_depth",
-    "shown",
-    "skin_candidates",
-    "skin_mask",
 ]
 
 __version__: str
 
 _Points = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
+@final
+class Camera:
+    """A camera as the core holds it; use voodoo.Camera."""
+
+    def __new__(
+        cls,
+        width: int,
+        height: int,
+        intrinsics: tuple[float, float, float, float],
+        model: str,
+        coefficients: Sequence[float],
+    ) -> Camera: ...
+    def project(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Pixels (N, 2) of points (N, 3) in the camera's frame [m]; NaN where there is none."""
+
+    def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """x/z, y/z (N, 2) of pixels (N, 2); NaN where the lens puts nothing."""
+
+    def rays(self) -> npt.NDArray[np.float32]:
+        """x/z, y/z (height, width, 2) of all pixels."""
+
 class _Camera(Protocol):
     @property
-    def width(self) -> int: ...
-    @property
-    def height(self) -> int: ...
-    @property
-    def fx(self) -> float: ...
-    @property
-    def fy(self) -> float: ...
-    @property
-    def cx(self) -> float: ...
-    @property
-    def cy(self) -> float: ...
-    @property
-    def distorted(self) -> bool: ...
-    def rays(self) -> npt.NDArray[np.float32]: ...
+    def core(self) -> Camera: ...
 
 def render_depth(
     body: Body,
     world_from_limb: Sequence[npt.NDArray[np.float64]],
     *,
-    width: int,
-    height: int,
-    intrinsics: tuple[float, float, float, float],
-    rays: npt.NDArray[np.float32] | None = None,
+    camera: _Camera,
     world_from_sensor: npt.NDArray[np.float64] | None = None,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int16]]:
     """Depth (height, width) [m], 0 where nothing is seen, and index of the limb, -1 for none; see voodoo.render_depth."""
 
-def points_within(
-    depth: npt.NDArray[np.float32],
-    rays: npt.NDArray[np.float32],
-    *,
-    step: int,
-    rows: tuple[int, int],
-    columns: tuple[int, int],
-    low: npt.NDArray[np.float64],
-    high: npt.NDArray[np.float64],
-    world_from_sensor: npt.NDArray[np.float64],
-    other_from_sensor: npt.NDArray[np.float64],
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.intp]]:
-    """Points (N, 3) of a depth image within a box, in another camera's frame [m], and the index of each one's pixel.
-
-    Args:
-        depth: (h, w) along the optical axis [m]; what is not finite and above zero is no return.
-        rays: (H, W, 2) of the camera; `depth` has every `step`-th row and column of it.
-        step: see rays.
-        rows, columns: of `depth`, from and up to.
-        low, high: corners (3,) of the box in the world [m].
-        world_from_sensor, other_from_sensor: (4, 4).
-
-    Raises:
-        MeasurementError: sizes that do not fit together.
-    """
-
-def color_bins(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint16]:
-    """The bin of each pixel's colour in a histogram of 64 x 64 x 8 of Cr, Cb and Y, row by row; 32768 more where it is too
-    dark to have a colour.
-
-    Args:
-        image: (H, W, 3) BGR.
-
-    Returns:
-        (H, W).
-
-    Raises:
-        MeasurementError: another shape.
-    """
-
-def shown(
-    pixels: npt.NDArray[np.float64],
-    points: npt.NDArray[np.float64],
-    marks: npt.NDArray[np.bool_] | None,
-    *,
-    beyond: npt.NDArray[np.bool_],
-    reach: int,
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_] | None, npt.NDArray[np.intp]]:
-    """Where a depth camera saw something in a picture (H, W).
-
-    Args:
-        pixels: (N, 2) where its points are, NaN = nowhere.
-        points: (N, 3) in the camera's frame [m].
-        marks: (N,) of some of them.
-        beyond: (H, W) where it does not look.
-        reach: what is within so many rows and columns of a point belongs to it.
-
-    Returns:
-        (H, W) where something was seen, or is beyond, but no line of pixels on the far side of edges between surfaces; (H, W) the
-        same of the marked points alone; which points lie in the picture.
-
-    Raises:
-        MeasurementError: other shapes.
-    """
-
-def skin_mask(
-    bins: npt.NDArray[np.uint16],
-    table: npt.NDArray[np.bool_],
-    *,
-    longest: float,
-    body: npt.NDArray[np.bool_] | None = None,
-    always: npt.NDArray[np.float32] | None = None,
-    before: npt.NDArray[np.bool_] | None = None,
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """(H, W): where a picture has skin's colour, single pixels removed; (H, W): where that may be the body's.
-
-    Args:
-        bins: (H, W), see `color_bins`.
-        table: (32768,) which of them are skin's.
-        longest: gaps of two pixels are closed between regions no longer than this [px].
-        body: (H, W) where the body may be.
-        always: (H, W) share of the time in which a pixel shows skin where none is; half or more is the scene.
-        before: (H, W) where something is before the scene.
-
-    Raises:
-        MeasurementError: sizes that do not fit together.
-    """
-
-def joined_mask(mask: npt.NDArray[np.bool_], longest: float) -> npt.NDArray[np.bool_]:
-    """A mask (H, W) with gaps of two pixels closed between regions no longer than `longest` [px]."""
-
-def mask_regions(
-    mask: npt.NDArray[np.bool_],
-) -> tuple[npt.NDArray[np.int32], list[tuple[tuple[int, int], tuple[int, int], int, tuple[float, float]]]]:
-    """What hangs together in a mask (H, W), at corners too: (H, W) the number of its region in each pixel, from 1; and rows,
-    columns (from and up to), area [px] and middle (u, v) of each region."""
-
 def nearest_surface(
-    pixels: npt.NDArray[np.float64],
-    depths: npt.NDArray[np.float64],
-    still: npt.NDArray[np.bool_] | None,
-    *,
-    pixel: tuple[float, float],
-    radius: float,
-    among: npt.NDArray[np.bool_] | None = None,
-) -> tuple[float, bool] | None:
-    """Depth [m] of the nearest surface around a place in a picture, and whether most of it is still; None with less than three
-    points there. Where three of the points `among` are there, only those count.
+    pixels: npt.NDArray[np.float64], depths: npt.NDArray[np.float64], *, pixel: tuple[float, float], radius: float
+) -> float | None:
+    """Depth of the nearest surface around a place in a picture [m], None with fewer than three points there.
 
     Args:
-        pixels, depths: (N, 2) and (N,) [m], what was measured.
-        still: (N,) which may be the still scene; None: not known.
-        pixel: the place.
-        radius: [px].
-        among: (N,).
+        pixels: (N, 2) where points are seen.
+        depths: (N,) [m].
+        pixel: the place (u, v).
+        radius: of what is looked at [px].
 
     Raises:
         MeasurementError: other shapes.
     """
 
-def skin_candidates(
-    mask: npt.NDArray[np.bool_], palm_px: float
-) -> tuple[list[tuple[tuple[float, float], int, int, bool]], npt.NDArray[np.int32]]:
-    """Where in a skin mask (H, W) a head or a hand may be: pixel, region, area [px], whether it may be a hand; (H, W) the number
-    of its region in each pixel. See voodoo.sensors.skin.regions."""
+def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Pairs (row, column) of finite costs (N, M) with the least sum, every row or every column once, by rows."""
 
 @final
 class BodyView:
@@ -237,12 +130,6 @@ class BodyView:
     def still(self) -> npt.NDArray[np.bool_] | None: ...
     @property
     def before(self) -> npt.NDArray[np.bool_] | None: ...
-    def look_at(
-        self, labels: npt.NDArray[np.int32], places: Sequence[tuple[tuple[float, float], int]], radius: float
-    ) -> list[tuple[float, bool] | None]:
-        """Depth [m] of the nearest surface within `radius` pixels of each place (u, v), and whether most of it is still; None
-        with less than three points there. Where three of them are in its region, by its number among `labels` (H, W) of the
-        picture, only those count."""
 
 @final
 class StillDepth:
@@ -254,29 +141,16 @@ class StillDepth:
 
     def __new__(cls) -> StillDepth: ...
     def __copy__(self) -> StillDepth: ...
-    @property
-    def farthest(self) -> npt.NDArray[np.float32]: ...
-    def see(
-        self, z: npt.NDArray[np.float32], world_from_sensor: npt.NDArray[np.float64]
-    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]] | None:
-        """Take up an image (H, W) [m], 0 = no return; a camera that has moved starts anew.
-
-        Returns:
-            (H, W): True where the image shows what may be the scene; (H, W): True where it shows something before what
-            was seen there once. None as long as too little was seen.
-        """
 
 def body_view(
     depth: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
-    rays: npt.NDArray[np.float32],
+    camera: _Camera,
     joints: npt.NDArray[np.float64],
     *,
     metres_per_unit: float,
-    intrinsics: tuple[float, float, float, float] | None,
     world_from_depth: npt.NDArray[np.float64],
     color_from_depth: npt.NDArray[np.float64],
-    color_intrinsics: tuple[float, float, float, float],
-    project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+    color_camera: _Camera,
     beyond: Callable[[float], npt.NDArray[np.bool_]],
     reach: int,
     step: int,
@@ -287,13 +161,11 @@ def body_view(
 
     Args:
         depth: (H, W).
-        rays: (H, W, 2) x/z, y/z of its pixels.
+        camera: its calibration.
         joints: (N, 3) of the body in the world [m].
         metres_per_unit: of `depth`.
-        intrinsics: (fx, fy, cx, cy) of the depth camera; None: its lens distorts.
         world_from_depth, color_from_depth: (4, 4).
-        color_intrinsics: (fx, fy, cx, cy) of the colour camera.
-        project: pixels (N, 2) of points (N, 3) in the colour camera's frame, if its lens distorts.
+        color_camera: calibration of the colour camera.
         beyond: where the depth camera does not look (H, W) at a distance from it [m], in the colour picture.
         reach: what is within so many rows and columns of a point belongs to it.
         step: every step-th row and column of the depth image is used.
@@ -320,8 +192,7 @@ class SkinTeacher:
         places: npt.NDArray[np.float64],
         *,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         half_life: float,
         every: int,
         settled: int,
@@ -351,7 +222,7 @@ class SkinCue:
     def assigned(self) -> list[tuple[int, int]]: ...
     @property
     def followed(self) -> list[tuple[int | None, int, float, list[float], list[float], list[float]]]: ...
-    def look(
+    def observe(
         self,
         teacher: SkinTeacher,
         image: npt.NDArray[np.uint8],
@@ -359,18 +230,13 @@ class SkinCue:
         *,
         stamp: float,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         body: BodyView | None,
         settled: bool,
         arm_lost: Sequence[bool],
         upper_arm_visible: Sequence[bool],
-    ) -> npt.NDArray[np.float64] | None: ...
-    def name(
-        self,
-        limbs: Sequence[str],
-        away: npt.NDArray[np.float32],
-        strangers: npt.NDArray[np.float32] | None = None,
+        tracker: Tracker | tuple[People, int] | None,
+        others: Sequence[Tracker | tuple[People, int]],
     ) -> list[tuple[int, npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64] | None, float]]: ...
 
 @final
@@ -387,8 +253,7 @@ class KeypointLayout:
         predicted: Mapping[str, npt.NDArray[np.float64]],
         *,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        project: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         least: float,
     ) -> int | None: ...
     def observe(
@@ -399,8 +264,7 @@ class KeypointLayout:
         stamp: float,
         source: str,
         world_from_sensor: npt.NDArray[np.float64],
-        intrinsics: tuple[float, float, float, float],
-        lens: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]] | None,
+        camera: _Camera,
         noise: float,
         place_sigma: float,
         least: float,
@@ -411,17 +275,6 @@ class KeypointLayout:
     ) -> tuple[list[SiteRay], list[tuple[str, npt.NDArray[np.float64], float]], list[str], list[str]]: ...
 
 @final
-class SiteMotion:
-    """Where sites will be; see voodoo.sensors.gating.SitePredictor."""
-
-    def __new__(cls, *, share: float, max_speed: float) -> SiteMotion: ...
-    def __copy__(self) -> SiteMotion: ...
-    def __len__(self) -> int: ...
-    def update(self, stamp: float, names: tuple[str, ...], positions: npt.NDArray[np.float64]) -> None: ...
-    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]: ...
-    def positions(self, stamp: float) -> npt.NDArray[np.float64]: ...
-
-@final
 class SiteGate:
     """Which measurements of sites are near enough to be believed; see voodoo.sensors.gating.SiteGate."""
 
@@ -429,8 +282,6 @@ class SiteGate:
     def __copy__(self) -> SiteGate: ...
     def limit(self, site: str, source: str, stamp: float) -> float: ...
     def accepts(self, site: str, distance: float, stamp: float, source: str) -> bool: ...
-    @property
-    def accepted(self) -> list[tuple[str, str, float]]: ...
 
 @final
 class SiteRay:
@@ -493,31 +344,31 @@ class SiteRay:
         """The ray with another trust."""
 
 def carried(
-    points: npt.NDArray[np.float64],
-    poses: npt.NDArray[np.float64],
-    before: npt.NDArray[np.float64],
+    points: _Points,
+    tracker: Tracker | tuple[People, int],
     *,
-    interval: float,
     elapsed: float,
-    near: float,
-    share: float,
-    max_speed: float,
-    distances: Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float32]],
     world_from_sensor: npt.NDArray[np.float64] | None = None,
-) -> npt.NDArray[np.float64]:
-    """Points (N, 3) that go on with the limb they lie on; see voodoo.sensors.motion.
+) -> npt.NDArray[np.float64] | None:
+    """Where points (N, 3) are that were measured some time before the next frame, those on a limb moved on with it.
 
     Args:
         points: (N, 3) [m].
-        poses, before: (L, 4, 4) of the limbs.
-        interval: time between them [s].
-        elapsed: for so long points go on [s].
-        near: points farther than this from every limb stay [m].
-        share: of the limbs' velocity that is believed.
-        max_speed: points of a limb that is faster stay [m/s].
-        distances: of places (N, 3) from each limb, (L, N) [m].
+        tracker: who follows the body.
+        elapsed: time from the measurement to the frame [s].
         world_from_sensor: pose of the sensor in whose frame the points are; None: they are in the world.
+
+    Returns:
+        (N, 3), or None where nothing moves: too little time has passed, or the body's motion is not known.
     """
+
+def body_before(
+    tracker: Tracker | tuple[People, int], sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Length of body (N,) [m] between places (N, 3) and a camera (3,); see voodoo.Tracker.body_before."""
+
+def expected_sites(tracker: Tracker | tuple[People, int], stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+    """Site name -> (3,) where it is expected at a time [m]; see voodoo.Tracker.predict."""
 
 def _estimate(
     head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...], spread: tuple[Any, ...] | None = None
@@ -778,7 +629,7 @@ class PersonCandidate:
 def person_candidates(
     depth: npt.NDArray[np.float32],
     *,
-    intrinsics: Sequence[float],
+    camera: _Camera,
     up: Sequence[float] | None = None,
     floor: tuple[Sequence[float], float] | None = None,
     most: int = 8,
@@ -787,7 +638,7 @@ def person_candidates(
 
     Args:
         depth: float32, 0 or NaN means no return.
-        intrinsics: (fx, fy, cx, cy) [px].
+        camera: its calibration.
         up: unit vector upwards in the camera's optical frame; None means upwards in the image.
         floor: its unit normal and offset in that frame, normal . p = offset; None means that it is looked for.
         most: so many are returned, those of a standing person's size first.
@@ -855,6 +706,9 @@ class Detection:
     @property
     def mask(self) -> npt.NDArray[np.bool_]:
         """The pixels (H, W) of that image that show it."""
+    @property
+    def floor(self) -> tuple[tuple[float, float, float], float] | None:
+        """The floor as the image shows it, or as the frame gave it: unit normal (3,) upwards and height along it [m]; or None."""
 
 @final
 class Estimate:
@@ -938,7 +792,11 @@ class Estimate:
 class Tracker:
     """The tracker of the core; use voodoo.Tracker."""
 
-    def __new__(cls, body: Body, values: Mapping[str, Any]) -> Tracker: ...
+    def __new__(cls, body: Body, values: Mapping[str, Any], detector: object) -> Tracker: ...
+    @property
+    def can_search(self) -> bool: ...
+    @property
+    def detector_failures(self) -> int: ...
     @property
     def estimate(self) -> Estimate: ...
     def _body(self) -> Body: ...
@@ -953,9 +811,6 @@ class Tracker:
     def _set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None: ...
     def distance(self, points: _Points) -> npt.NDArray[np.float32]: ...
     def limb_distances(self, points: _Points) -> npt.NDArray[np.float32]: ...
-    def body_before(
-        self, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64]: ...
     def scale(self, factor: float) -> None: ...
     def set_shape(self, limb: str, shape: TaperedEllipticCylinder) -> None: ...
     def _add_limb(
@@ -976,20 +831,19 @@ class People:
         cls,
         body: Body,
         values: Mapping[str, Any],
+        detector: object,
         *,
         limit: int | None,
         nearest: bool,
         forget_after: float,
         region: tuple[Sequence[float], Sequence[float]] | None,
     ) -> People: ...
+    @property
+    def detector_failures(self) -> int: ...
     def step(self, frame: Frame, own: Sequence[tuple[int, Frame]]) -> list[tuple[int, Estimate]]: ...
     def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
     def wants_colors(self) -> bool: ...
     def only(self, ids: Sequence[int] | None) -> None: ...
-    def limb_distances(self, id: int, points: _Points) -> npt.NDArray[np.float32] | None: ...
-    def body_before(
-        self, id: int, sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64] | None: ...
     def estimate(self, id: int) -> Estimate | None: ...
     def body(self, id: int) -> Body | None: ...
 
@@ -1003,7 +857,7 @@ class View:
         thickness: npt.NDArray[np.float32],
         depth: npt.NDArray[np.float32] | None,
         border: float,
-        intrinsics: tuple[float, float, float, float],
+        camera: _Camera,
         camera_from_world: npt.ArrayLike,
     ) -> View: ...
 

@@ -42,6 +42,10 @@ class RecordingError(VoodooError):
         self.reason, self.hint = reason, hint
 
 
+class DetectorWarning(UserWarning):
+    """A detector failed: the tracker's step went on without it. It names the exception."""
+
+
 @contextmanager
 def reading(source: object, expected: str, *, error: type[VoodooError] = RecordingError) -> Iterator[None]:
     """Turn whatever a parser throws inside the block into one error: the one place where that is done.

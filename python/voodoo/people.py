@@ -12,6 +12,7 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.config import Config
+from voodoo.detectors.base import AnyDetector
 from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.model.body import Body, checked_joints
 
@@ -67,6 +68,7 @@ class People:
     Args:
         body: what every new person gets a copy of; None: `Body.human(model="measured")`.
         config: parameters; `threads` persons are followed side by side, with the same bits.
+        detector: finds persons in depth images, as for `Tracker`; with None only those are followed who are added.
         limit: persons that are followed at the same time, at most; None: any number.
         nearest: of more than `limit` those nearest to a depth camera are followed; else those who came first.
         forget_after: who is away for longer is somebody new when they come back [s].
@@ -78,6 +80,7 @@ class People:
         body: Body | None = None,
         *,
         config: Config | None = None,
+        detector: AnyDetector = "shipped",
         limit: int | None = None,
         nearest: bool = False,
         forget_after: float = 60.0,
@@ -87,7 +90,7 @@ class People:
 
         Raises:
             BodyError: `body` is not a Body.
-            ConfigError: a parameter that cannot be used.
+            ConfigError: a parameter that cannot be used, or no detector.
         """
         if body is not None and not isinstance(body, Body):
             raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
@@ -102,6 +105,7 @@ class People:
         self._core = _core.People(
             self._prototype.core,
             self.config.values(),
+            detector,
             limit=limit,
             nearest=bool(nearest),
             forget_after=float(forget_after),
@@ -118,6 +122,11 @@ class People:
     def estimate(self) -> PeopleEstimate:
         """The last one; at first with NaN as its stamp and nobody."""
         return self._estimate
+
+    @property
+    def detector_failures(self) -> int:
+        """Steps in which a detector failed; each of them warned (`voodoo.DetectorWarning`)."""
+        return self._core.detector_failures
 
     def step(self, frame: Frame, *, own: Mapping[int, Frame] | None = None) -> PeopleEstimate:
         """Everybody at the frame's time. Releases the GIL; after a refused frame all is as before.
@@ -189,6 +198,11 @@ class Followed:
         self._number = number
 
     @property
+    def _core(self) -> tuple[_core.People, int]:
+        """What the compiled core knows them by."""
+        return self._people._core, self._number
+
+    @property
     def body(self) -> Body:
         """The body in their sizes."""
         return self._people.body(self._number)
@@ -205,24 +219,14 @@ class Followed:
             raise BodyError(f"person: expected one of those who are there, found {self._number}")
         return found
 
-    def limb_distances(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """See Tracker.limb_distances."""
-        found = self._people._core.limb_distances(self._number, points)
-        if found is None:
-            raise BodyError(f"person: expected one of those who are there, found {self._number}")
-        return found
-
-    def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        """See Tracker.distance."""
-        return np.asarray(self.limb_distances(points).min(axis=0))
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+        """See Tracker.predict."""
+        return _core.expected_sites(self._core, stamp)
 
     def body_before(self, sites: npt.ArrayLike, camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """See Tracker.body_before."""
-        places = np.asarray(sites, dtype=np.float64).reshape(-1, 3)
-        found = self._people._core.body_before(self._number, places, np.asarray(camera, dtype=np.float64))
-        if found is None:
-            raise BodyError(f"person: expected one of those who are there, found {self._number}")
-        return found
+        places = np.ascontiguousarray(sites, dtype=np.float64).reshape(-1, 3)
+        return _core.body_before(self._core, places, np.asarray(camera, dtype=np.float64))
 
 
 def _box(region: tuple[Sequence[float], Sequence[float]] | None) -> tuple[list[float], list[float]] | None:

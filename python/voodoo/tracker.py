@@ -11,6 +11,7 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
 from voodoo.config import Config
+from voodoo.detectors.base import AnyDetector
 from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.model.joint import number_of
@@ -44,20 +45,23 @@ class Tracker:
     Args:
         body: what to track, in its initial sizes.
         config: parameters; the defaults are the measured ones.
+        detector: finds the body in depth images: without a pose, when it is lost, and when it is elsewhere than it is tracked.
+            "shipped" is the one that comes with the package and knows people, None is none; see `voodoo.detectors` for others.
     """
 
-    def __init__(self, body: Body, *, config: Config | None = None) -> None:
+    def __init__(self, body: Body, *, config: Config | None = None, detector: AnyDetector = "shipped") -> None:
         """Make a tracker without a pose: `step` looks for somebody, `reset` puts the body where it is known to be.
 
         Raises:
             BodyError: `body` is not a Body.
-            ConfigError: `config` is not a Config.
+            ConfigError: `config` is not a Config, or `detector` no detector.
         """
         if not isinstance(body, Body):
             raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
         if config is not None and not isinstance(config, Config):
             raise ConfigError(f"config: expected a voodoo.Config, found {type(config).__name__}")
         self.config = Config() if config is None else config
+        self.detector = detector
         self._initial = body
         self._backgrounds: dict[str, tuple[npt.NDArray[np.uint8], ...]] = {}
         self.search()
@@ -71,6 +75,16 @@ class Tracker:
     def estimate(self) -> Estimate:
         """The last estimate; at first one with status "searching", NaN as its stamp and no poses."""
         return self._core.estimate
+
+    @property
+    def can_search(self) -> bool:
+        """Whether `step` looks for the body while there is no pose: there is a detector that knows it."""
+        return self._core.can_search
+
+    @property
+    def detector_failures(self) -> int:
+        """Steps since the last `search` in which the detector failed; each of them warned (`voodoo.DetectorWarning`)."""
+        return self._core.detector_failures
 
     def reset(self, *, joints: Mapping[str, Sequence[float]], fit_sizes: bool = True) -> Estimate:
         """Set the pose, and the sizes, from positions of named joints and sites; time may start anew afterwards.
@@ -91,7 +105,7 @@ class Tracker:
 
     def search(self) -> None:
         """Give up the pose and what was learnt with it: from the next step on somebody is looked for, as in a new tracker."""
-        self._core = _core.Tracker(self._initial.core, self.config.values())
+        self._core = _core.Tracker(self._initial.core, self.config.values(), self.detector)
         for source, images in self._backgrounds.items():
             self._core._set_background(source, images)
 
@@ -134,7 +148,7 @@ class Tracker:
 
         Raises:
             MeasurementError: time not after the last frame, a measurement that cannot be used, or no pose yet of a body that
-                is not looked for, because it lacks sites of a person.
+                is not looked for: `can_search` says so.
             BodyError: the frame names a limb or site that is not in the body.
         """
         return self._core.step(_frame(frame))
@@ -175,6 +189,16 @@ class Tracker:
     def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.NDArray[np.float64]] | None:
         return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
 
+    def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
+        """Site name -> (3,) where it is expected at `stamp` [s], before or after the last frame [m].
+
+        The last estimate moved on by the share of its motion that is expected to go on, `Config.prediction`.
+
+        Raises:
+            MeasurementError: no pose yet.
+        """
+        return _core.expected_sites(self._core, stamp)
+
     def distance(self, points: npt.NDArray[np.float32] | npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """Signed distances (N,) [m] of world points (N, 3) to the posed body, negative inside.
 
@@ -201,8 +225,8 @@ class Tracker:
         Raises:
             MeasurementError: no pose yet, or another shape.
         """
-        places = np.asarray(sites, dtype=np.float64).reshape(-1, 3)
-        return self._core.body_before(places, np.asarray(camera, dtype=np.float64))
+        places = np.ascontiguousarray(sites, dtype=np.float64).reshape(-1, 3)
+        return _core.body_before(self._core, places, np.asarray(camera, dtype=np.float64))
 
     def scale(self, factor: float) -> None:
         """Scale the whole body by a factor above zero without losing the track.

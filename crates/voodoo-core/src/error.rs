@@ -59,6 +59,25 @@ pub enum BodyError {
     },
 }
 
+/// A calibration that no camera can have.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[error("camera {what}: expected {expected}, found {found}")]
+pub struct CameraError {
+    /// Which of its numbers.
+    pub what: &'static str,
+    /// What would be right.
+    pub expected: &'static str,
+    /// What was there.
+    pub found: String,
+}
+
+impl CameraError {
+    pub(crate) fn new(what: &'static str, expected: &'static str, found: impl Into<String>) -> Self {
+        Self { what, expected, found: found.into() }
+    }
+}
+
 /// Why the tracker refused a call. The tracker is unchanged afterwards.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -55,6 +55,7 @@
 
 pub mod association;
 pub mod body;
+pub mod camera;
 pub mod config;
 pub mod detect;
 pub mod error;
@@ -76,8 +77,9 @@ pub mod uncertainty;
 pub mod visibility;
 
 pub use body::Body;
+pub use camera::Camera;
 pub use config::{Config, ConfigError};
-pub use error::{BodyError, TrackError};
+pub use error::{BodyError, CameraError, TrackError};
 pub use observation::frame::Frame;
 pub use people::People;
 pub use shape::TaperedEllipticCylinder;

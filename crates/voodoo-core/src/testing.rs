@@ -1,7 +1,10 @@
 //! What unit tests of the tracker's parts share: a synthetic depth camera, and a part's view of one frame.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+use std::sync::LazyLock;
+
 use crate::body::{Body, HumanModel, Model};
+use crate::camera::Camera;
 use crate::config::Config;
 use crate::fit::{Context, Setting};
 use crate::math::{Pose, Quat, Vec3};
@@ -9,14 +12,8 @@ use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 use crate::observation::observer::{Expectation, Observer, Own};
 use crate::visibility::render::{Rendering, Viewpoint};
 
-/// Size and lens of the camera, which stands in the world's origin and looks along z.
-const VIEW: Viewpoint<'static> = Viewpoint {
-    width: 160,
-    height: 124,
-    intrinsics: [145.0, 145.0, 79.5, 61.5],
-    rays: None,
-    world_from_sensor: Pose::IDENTITY,
-};
+/// The camera, which stands in the world's origin and looks along z.
+static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());
 
 /// Depth of the wall behind the body, millimetres.
 const WALL: u16 = 4500;
@@ -39,7 +36,8 @@ pub(crate) fn stand(body: &Body) -> Vec<Pose> {
 /// Depth in millimetres, as the camera sees a posed body before nothing.
 pub(crate) fn depth(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
-    rendering.render(body, poses, &VIEW, None).unwrap();
+    let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
+    rendering.render(body, poses, &view, None).unwrap();
     rendering.depth().iter().map(|depth| (depth * 1000.0) as u16).collect()
 }
 
@@ -50,10 +48,8 @@ pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
 
 /// Puts a board that faces the camera before what an image shows; half its width and height, metres.
 pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64; 2]) {
-    let [fx, fy, cx, cy] = VIEW.intrinsics;
     for (index, pixel) in pixels.iter_mut().enumerate() {
-        let (column, row) = ((index % VIEW.width) as f64, (index / VIEW.width) as f64);
-        let (x, y) = (centre.z * (column - cx) / fx, centre.z * (row - cy) / fy);
+        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| centre.z * ray);
         let depth = (1000.0 * centre.z) as u16;
         if (x - centre.x).abs() < width && (y - centre.y).abs() < height && (*pixel == 0 || depth < *pixel) {
             *pixel = depth;
@@ -65,12 +61,9 @@ pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64;
 pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, look: impl FnOnce(&Frame) -> R) -> R {
     let images = [DepthImage {
         pixels: DepthPixels::U16(pixels),
-        width: VIEW.width,
-        height: VIEW.height,
+        camera: &CAMERA,
         metres_per_unit: 0.001,
-        intrinsics: VIEW.intrinsics,
-        rays: None,
-        world_from_sensor: VIEW.world_from_sensor,
+        world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,
     }];
@@ -149,16 +142,18 @@ pub(crate) fn farthest(first: &[Pose], second: &[Pose]) -> f64 {
     first.iter().zip(second).map(|(a, b)| a.translation.distance(b.translation)).fold(0.0, f64::max)
 }
 
+/// A camera that lives as long as the tests.
+pub(crate) fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> &'static Camera {
+    Box::leak(Box::new(Camera::pinhole(width, height, intrinsics).unwrap()))
+}
+
 /// A depth image in metres whose centre is that of its pixels, from a camera at the world's origin.
 pub(crate) fn image(pixels: &[f32], width: usize, focal: f64) -> DepthImage<'_> {
     let height = pixels.len() / width;
     DepthImage {
         pixels: DepthPixels::F32(pixels),
-        width,
-        height,
+        camera: pinhole(width, height, [focal, focal, 0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)]),
         metres_per_unit: 1.0,
-        intrinsics: [focal, focal, 0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)],
-        rays: None,
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

@@ -5,10 +5,10 @@ mod color_scene;
 mod scene;
 mod shape_support;
 
-mod detector_check;
+mod camera;
+mod detection;
 mod determinism;
 mod hostile;
-mod people;
 mod properties;
 mod refusals;
 mod regions;
@@ -20,3 +20,10 @@ mod shape_ray;
 mod status;
 mod terms;
 mod tree;
+
+use voodoo_core::{Body, Config, TrackError, Tracker};
+
+/// A tracker without a detector; voodoo-detect runs some of these files with its own.
+fn tracker(body: Body, config: Config) -> Result<Tracker, TrackError> {
+    Tracker::new(body, config)
+}

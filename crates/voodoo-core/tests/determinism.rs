@@ -5,12 +5,12 @@ use crate::scene;
 use voodoo_core::body::HumanModel;
 use voodoo_core::config::Overlap;
 use voodoo_core::observation::frame::Frame;
-use voodoo_core::{Body, Config, Tracker};
+use voodoo_core::{Body, Config};
 
 fn run(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> Vec<Vec<u64>> {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let camera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };
-    let mut tracker = Tracker::new(body.clone(), config).unwrap();
+    let mut tracker = crate::tracker(body.clone(), config).unwrap();
     tracker.reset_pose(&scene::standing(&body)).unwrap();
     let step = |(index, (pixels, points)): (usize, &(Vec<u16>, Vec<[f64; 3]>))| {
         let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);

@@ -8,6 +8,7 @@ use crate::scene;
 use std::time::{Duration, Instant};
 
 use voodoo_core::body::{HumanModel, Joint, Limb, Site};
+use voodoo_core::camera::{Camera, Lens};
 use voodoo_core::config::RawValue;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{
@@ -162,15 +163,24 @@ fn configurations(from: &mut Hostile) {
     }
 }
 
+/// A lens, or what cannot be one.
+fn lens(from: &mut Hostile) -> Lens {
+    match from.below(6) {
+        0 => Lens::PlumbBob(std::array::from_fn(|_| from.number(0.3))),
+        1 => Lens::Rational(std::array::from_fn(|_| from.number(0.3))),
+        2 => Lens::Fisheye(std::array::from_fn(|_| from.number(0.3))),
+        3 => Lens::InversePlumbBob(std::array::from_fn(|_| from.number(0.3))),
+        _ => Lens::Pinhole,
+    }
+}
+
 /// Predicted images: every pixel is a depth or none.
 fn renderings(from: &mut Hostile, body: &Body, standing: &[Pose]) {
-    let view = Viewpoint {
-        width: [0, 1, 7, 16, usize::MAX][from.below(5)],
-        height: [0, 1, 5, 12, 1 << 40][from.below(5)],
-        intrinsics: [from.positive(20.0), from.positive(20.0), from.number(8.0), from.number(6.0)],
-        rays: None,
-        world_from_sensor: from.pose(),
-    };
+    let [width, height] = [[0, 1, 7, 16, usize::MAX][from.below(5)], [0, 1, 5, 12, 1 << 40][from.below(5)]];
+    let intrinsics = [from.positive(20.0), from.positive(20.0), from.number(8.0), from.number(6.0)];
+    let lens = lens(from);
+    let Ok(camera) = Camera::new(width, height, intrinsics, lens) else { return };
+    let view = Viewpoint { camera: &camera, world_from_sensor: from.pose() };
     let mut image = Rendering::default();
     if image.render(body, standing, &view, None).is_ok() {
         assert!(image.depth().iter().all(|depth| *depth >= 0.0), "{view:?}");
@@ -188,13 +198,14 @@ fn step(from: &mut Hostile, tracker: &mut Tracker, good: &[[f64; 3]], stamp: &mu
         source: from.below(3) as u16,
     };
     let pixels: Vec<f32> = (0..48).map(|_| from.number(2.0).abs() as f32).collect();
+    let width = if from.rarely() { from.below(9) } else { 8 };
+    let intrinsics = [from.positive(10.0), from.positive(10.0), from.number(4.0), from.number(3.0)];
+    let lens = lens(from);
+    let Ok(camera) = Camera::new(width, 6, intrinsics, lens) else { return };
     let image = DepthImage {
         pixels: DepthPixels::F32(&pixels),
-        width: if from.rarely() { from.below(9) } else { 8 },
-        height: 6,
+        camera: &camera,
         metres_per_unit: from.positive(1.0),
-        intrinsics: [from.positive(10.0), from.positive(10.0), from.number(4.0), from.number(3.0)],
-        rays: None,
         world_from_sensor: if from.below(4) == 0 { from.pose() } else { scene::DepthCamera::world_from_sensor() },
         weight: from.positive(1.0),
         source: 0,
@@ -265,7 +276,7 @@ fn hostile_input_is_refused_or_answered_in_finite_numbers() {
     let standing = scene::standing(&body);
     let good = scene::surface_points(&body, &standing, 400, 0.01, &mut scene::Noise(1));
     let started = || {
-        let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+        let mut tracker = crate::tracker(body.clone(), Config::default()).unwrap();
         tracker.reset_pose(&standing).unwrap();
         tracker
     };

@@ -134,7 +134,7 @@ proptest! {
     #[test]
     fn a_foreshortened_calf_is_as_long_as_its_pair(share in 0.5..0.74_f64, other in 0.77..1.0_f64) {
         let truth = Body::human(1.7, HumanModel::Full).unwrap();
-        let measured = sites(&truth, &truth.rest_pose(Pose::identity()));
+        let measured = sites(&truth, &truth.rest_pose(Pose::IDENTITY));
         let fitted = |name: &str, share: f64| {
             let (knee, ankle) = (truth.site_index("l_knee").unwrap(), truth.site_index(name).unwrap());
             let mut named: Vec<(usize, Vec3)> = measured.iter().copied().enumerate().collect();
@@ -152,7 +152,7 @@ proptest! {
     #[test]
     fn a_knee_set_too_low_on_a_straight_leg_is_moved_along_it(low in 0.27..0.5_f64, bend in 0.6..1.5_f64) {
         let truth = Body::human(1.7, HumanModel::Full).unwrap();
-        let measured = sites(&truth, &truth.rest_pose(Pose::identity()));
+        let measured = sites(&truth, &truth.rest_pose(Pose::IDENTITY));
         let site = |name: &str| truth.site_index(name).unwrap();
         let (hip, knee, ankle) = (site("l_hip"), site("l_knee"), site("l_ankle"));
         let fitted = |low: f64, bend: f64| {
@@ -308,7 +308,7 @@ proptest! {
             let estimate = tracker.step(&scene::with_cloud(0.0, &clouds)).unwrap();
             estimate.sites.iter().map(|site| other.inverse_transform_point(*site)).collect::<Vec<_>>()
         };
-        let difference = largest_distance(&run(Pose::identity()), &run(other_from_world));
+        let difference = largest_distance(&run(Pose::IDENTITY), &run(other_from_world));
         prop_assert!(difference < 1e-3, "{difference} m");
     }
 
@@ -343,7 +343,7 @@ proptest! {
         let joint = Joint {
             name: "grip".into(),
             parent_from_joint: Pose::from_parts(Vec3::Z * forearm.length(), Quat::IDENTITY),
-            limb_from_joint: Pose::identity(),
+            limb_from_joint: Pose::IDENTITY,
             semi_axes: [0.05, 0.05],
             weight: 1.0,
             limits: None,

@@ -1,8 +1,10 @@
 //! What is refused, and that a refusal leaves no trace.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+use crate::detection::Fixed;
 use crate::scene;
 use voodoo_core::body::{HumanModel, Joint, JointKind, Limb, Site};
+use voodoo_core::camera::Camera;
 use voodoo_core::config::{RawValue, Value};
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{
@@ -71,26 +73,21 @@ fn bad_clouds_are_refused() {
 #[test]
 fn bad_images_are_refused() {
     let pixels = [2400_u16; 12];
+    let camera = Camera::pinhole(4, 3, [100.0, 100.0, 1.5, 1.0]).unwrap();
+    let wider = Camera::pinhole(5, 3, [100.0, 100.0, 1.5, 1.0]).unwrap();
     let base = DepthImage {
         pixels: DepthPixels::U16(&pixels),
-        width: 4,
-        height: 3,
+        camera: &camera,
         metres_per_unit: 0.001,
-        intrinsics: [100.0, 100.0, 1.5, 1.0],
-        rays: None,
         world_from_sensor: scene::DepthCamera::world_from_sensor(),
         weight: 1.0,
         source: 0,
     };
-    let rays = [[0.0_f32; 2]; 11];
     for (image, what) in [
-        (DepthImage { width: 5, ..base }, "depth[0].image"),
-        (DepthImage { width: 0, height: 0, pixels: DepthPixels::U16(&[]), ..base }, "depth[0].image"),
+        (DepthImage { camera: &wider, ..base }, "depth[0].image"),
+        (DepthImage { pixels: DepthPixels::U16(&[]), ..base }, "depth[0].image"),
         (DepthImage { metres_per_unit: 0.0, ..base }, "depth[0].metres_per_unit"),
         (DepthImage { metres_per_unit: f64::NAN, ..base }, "depth[0].metres_per_unit"),
-        (DepthImage { intrinsics: [0.0, 1.0, 1.0, 1.0], ..base }, "depth[0].camera"),
-        (DepthImage { intrinsics: [1.0, 1.0, f64::NAN, 1.0], ..base }, "depth[0].camera"),
-        (DepthImage { rays: Some(&rays), ..base }, "depth[0].rays"),
         (DepthImage { weight: -2.0, ..base }, "depth[0].weight"),
         (
             DepthImage { world_from_sensor: Pose::from_parts(Vec3::NAN, Quat::IDENTITY), ..base },
@@ -130,14 +127,17 @@ fn bad_sites_and_floors_are_refused() {
 #[test]
 fn a_tracker_without_a_pose_searches_and_refuses_every_frame_of_a_body_that_no_detector_knows() {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
-    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    let new = || Tracker::new(body.clone(), Config::default()).unwrap();
+    let mut tracker = new().with_detector(Box::new(Fixed::of(&["l_hip", "r_hip", "l_shoulder", "nose"])));
     let estimate = tracker.step(&Frame::empty(0.0)).unwrap();
     assert_eq!((estimate.status, estimate.stamp, estimate.sites.len()), (Status::Searching, 0.0, 0));
     assert!(matches!(tracker.step(&Frame::empty(0.0)), Err(TrackError::TimeBackwards { .. })));
-    let sites = body.sites().iter().filter(|site| site.name != "l_hand").cloned().collect();
-    let unknown = Body::new("unknown", body.limbs().to_vec(), sites).unwrap();
-    let mut tracker = Tracker::new(unknown, Config::default()).unwrap();
-    assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+    let two = Fixed::of(&["l_hip", "r_hip", "nose"]);
+    for mut tracker in [new(), new().with_detector(Box::new(two))] {
+        assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+        assert!(tracker.estimate().stamp.is_nan());
+    }
+    let tracker = new();
     // No residual of zero before anything was measured.
     assert!(tracker.estimate().stamp.is_nan() && tracker.estimate().mean_squared_distance.is_nan());
 }
@@ -155,7 +155,7 @@ fn a_refused_reset_changes_nothing() {
     assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
     let millimetres: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();
     assert!(tracker.reset(&millimetres, true).unwrap_err().to_string().contains("found 1000.0000 times"));
-    assert!(tracker.reset_pose(&[Pose::identity()]).unwrap_err().to_string().contains("10 limbs"));
+    assert!(tracker.reset_pose(&[Pose::IDENTITY]).unwrap_err().to_string().contains("10 limbs"));
     assert!(tracker.scale(0.0).is_err() && tracker.scale(f64::NAN).is_err());
     assert!(tracker.remove_limb("torso").is_err() && tracker.remove_limb("tail").is_err());
     assert_eq!(tracker.body(), &body);
@@ -169,8 +169,8 @@ fn sites_of(tracker: &Tracker) -> Vec<(usize, Vec3)> {
 fn limb(name: &str, parent: Option<usize>) -> Limb {
     let joint = Joint {
         name: format!("{name}_joint"),
-        parent_from_joint: Pose::identity(),
-        limb_from_joint: Pose::identity(),
+        parent_from_joint: Pose::IDENTITY,
+        limb_from_joint: Pose::IDENTITY,
         semi_axes: [0.0; 2],
         weight: 1.0,
         limits: None,

@@ -2,8 +2,9 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::{color_scene, scene};
-use color_scene::{CAMERAS, WIDTH, depth_of, depth_picture, picture, shoot, standing, world_from_camera};
+use color_scene::{CAMERAS, HEIGHT, WIDTH, depth_of, depth_picture, picture, shoot, standing, world_from_camera};
 use voodoo_core::body::HumanModel;
+use voodoo_core::camera::{Camera, Lens};
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 use voodoo_core::tracker::estimate::LimbStatus;
@@ -240,8 +241,8 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
     assert!(refused(&mut tracker, &[at(0, 0.1)]).contains("color[0].image: expected a picture like those"));
     assert!(refused(&mut tracker, &[at(1, 0.1), at(1, 0.1)]).contains("color[1].source"));
     assert!(refused(&mut tracker, &[at(1, 0.4)]).contains("color[0].stamp"));
-    let lens = ColorImage { intrinsics: [0.0, 1.0, 1.0, 1.0], ..at(1, 0.1) };
-    assert!(refused(&mut tracker, &[lens]).contains("color[0].camera"));
+    let bent = Camera::new(WIDTH, HEIGHT, [200.0, 200.0, 119.5, 99.5], Lens::Fisheye([0.0; 4])).unwrap();
+    assert!(refused(&mut tracker, &[ColorImage { camera: &bent, ..at(1, 0.1) }]).contains("color[0].camera"));
     let unlike = [(ColorPixels::Color(&small[..]), [2, 3]), (ColorPixels::Color(&small[..4]), [2, 2])];
     assert!(tracker.set_background(0, &unlike).unwrap_err().to_string().contains("images[1]"));
     assert_eq!(format!("{tracker:?}"), before);

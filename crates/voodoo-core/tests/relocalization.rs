@@ -5,7 +5,7 @@ use crate::scene;
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::Frame;
-use voodoo_core::{Body, Config, Estimate, Status, Tracker};
+use voodoo_core::{Body, Config, Estimate, Status};
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 145.0 };
 
@@ -22,7 +22,7 @@ fn moved(body: &Body, shift: Vec3, turn: f64) -> Vec<Pose> {
 fn cover_and_move(config: Config) -> (Body, Vec<Estimate>) {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let mut noise = scene::Noise(3);
-    let mut tracker = Tracker::new(body.clone(), config).unwrap();
+    let mut tracker = crate::tracker(body.clone(), config).unwrap();
     tracker.reset_pose(&scene::standing(&body)).unwrap();
     let mut found = Vec::new();
     for index in 0..30 {
@@ -86,7 +86,7 @@ fn sizes_of_a_second_reset_start_from_the_body_as_given() {
     let (pixels, _) = CAMERA.shoot(&thick, &poses, 0.005, &mut noise);
     let images = [CAMERA.image(&pixels)];
     let frame = Frame::empty(0.0).with_images(&images);
-    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    let mut tracker = crate::tracker(body.clone(), Config::default()).unwrap();
     tracker.reset(&positions, true).unwrap();
     let given = tracker.body().clone();
     tracker.step(&frame).unwrap();
@@ -121,7 +121,7 @@ fn left_over_right(real: f64, set: f64, config: Config) -> [f64; 2] {
     positions.retain(|(site, _)| !person.sites()[*site].name.ends_with("toe"));
     let (pixels, _) = CAMERA.shoot(&person, &poses, 0.005, &mut scene::Noise(7));
     let images = [CAMERA.image(&pixels)];
-    let mut tracker = Tracker::new(body, config).unwrap();
+    let mut tracker = crate::tracker(body, config).unwrap();
     tracker.reset(&positions, true).unwrap();
     tracker.step(&Frame::empty(0.0).with_images(&images)).unwrap();
     let body = tracker.body();

@@ -4,30 +4,22 @@
 use crate::scene;
 use crate::shape_support;
 use shape_support::{Random, hostile, inside, limb_like, random_shape};
-use voodoo_core::Body;
 use voodoo_core::body::{HumanModel, Joint, Limb};
+use voodoo_core::camera::Lens;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::shape::TaperedEllipticCylinder;
 use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
+use voodoo_core::{Body, Camera};
 
 fn camera(width: usize, height: usize, focal: f64) -> Viewpoint<'static> {
-    Viewpoint {
-        width,
-        height,
-        intrinsics: [focal, 1.1 * focal, 0.48 * width as f64, 0.53 * height as f64],
-        rays: None,
-        world_from_sensor: Pose::IDENTITY,
-    }
+    let intrinsics = [focal, 1.1 * focal, 0.48 * width as f64, 0.53 * height as f64];
+    Viewpoint { camera: scene::pinhole(width, height, intrinsics), world_from_sensor: Pose::IDENTITY }
 }
 
 /// The ray of a pixel, `z = 1`, sensor frame.
 fn ray(view: &Viewpoint, pixel: usize) -> Vec3 {
-    if let Some(rays) = view.rays {
-        return Vec3::new(f64::from(rays[pixel][0]), f64::from(rays[pixel][1]), 1.0);
-    }
-    let [fx, fy, cx, cy] = view.intrinsics;
-    let (column, row) = (pixel % view.width, pixel / view.width);
-    Vec3::new((column as f64 - cx) / fx, (row as f64 - cy) / fy, 1.0)
+    let [x, y] = view.camera.pixel_ray(pixel % view.camera.width(), pixel / view.camera.width());
+    Vec3::new(x, y, 1.0)
 }
 
 /// Limbs without kinship: each shape stands where its pose says.
@@ -56,7 +48,7 @@ fn agrees_with_exact_rays(body: &Body, poses: &[Pose], view: &Viewpoint) -> usiz
     let mut image = Rendering::default();
     image.render(body, poses, view, None).expect("valid input");
     let mut seen = 0;
-    for pixel in 0..view.width * view.height {
+    for pixel in 0..view.camera.pixels() {
         let direction = ray(view, pixel);
         let hit = |limb: usize, fatter: f64| {
             let shape = body.limbs()[limb].shape;
@@ -171,31 +163,39 @@ fn agrees_with_dense_marching() {
 }
 
 #[test]
-fn a_table_of_rays_gives_the_image_of_the_pinhole_and_nan_sees_nothing() {
+fn lenses_that_distort_show_what_their_rays_meet_and_nothing_where_they_have_none() {
     let body = Body::human(1.75, HumanModel::Full).expect("a human");
     let poses = scene::bent(&body, Pose::new(Vec3::new(0.1, 0.0, 2.2), Vec3::X * 1.4), 0.4, &mut scene::Noise(33));
     let view = camera(90, 70, 70.0);
-    let mut table: Vec<[f32; 2]> = (0..90 * 70)
-        .map(|pixel| {
-            let direction = ray(&view, pixel);
-            [direction.x as f32, direction.y as f32]
-        })
-        .collect();
-    let blind = 35 * 90 + 43;
+    let through = |lens: Lens| {
+        let intrinsics = [70.0, 77.0, 43.2, 37.1];
+        Camera::new(90, 70, intrinsics, lens).expect("a camera")
+    };
     let (mut image, mut other) = (Rendering::default(), Rendering::default());
     image.render(&body, &poses, &view, None).expect("valid input");
-    assert!(image.limb()[blind] != NO_LIMB);
-    table[blind] = [f32::NAN; 2];
-    other.render(&body, &poses, &Viewpoint { rays: Some(&table), ..view }, None).expect("valid input");
-    assert_eq!((other.depth()[blind], other.limb()[blind]), (0.0, NO_LIMB));
+    // As good as a pinhole, whose rays are rounded: they meet the edges elsewhere.
+    let straight = through(Lens::PlumbBob([1e-12, 0.0, 0.0, 0.0, 0.0]));
+    other.render(&body, &poses, &Viewpoint { camera: &straight, ..view }, None).expect("valid input");
     let pairs = image.depth().iter().zip(other.depth());
     let off = pairs.filter(|(one, other)| (**one - **other).abs() > 1e-4).count();
-    // The rounded rays meet the edges elsewhere.
     assert!(off < 20, "{off}");
-    let bent: Vec<[f32; 2]> =
-        table.iter().map(|[x, y]| [x * (1.0 - 0.2 * (x * x + y * y)), y * (1.0 - 0.2 * (x * x + y * y))]).collect();
-    let bent: Vec<[f32; 2]> = bent.iter().map(|ray| if ray[0].is_nan() { [9.0, 9.0] } else { *ray }).collect();
-    assert!(agrees_with_exact_rays(&body, &poses, &Viewpoint { rays: Some(&bent), ..view }) > 250);
+    for lens in [
+        Lens::PlumbBob([-0.3, 0.1, 0.002, -0.001, 0.0]),
+        Lens::Fisheye([0.02, -0.01, 0.0, 0.0]),
+        Lens::InversePlumbBob([0.2, 0.05, 0.0, 0.001, 0.0]),
+    ] {
+        let camera = through(lens);
+        assert!(agrees_with_exact_rays(&body, &poses, &Viewpoint { camera: &camera, ..view }) > 250, "{lens:?}");
+    }
+    // No direction falls on the corners of this one; a body around the camera is seen everywhere else.
+    let blind = through(Lens::PlumbBob([-0.9, 0.0, 0.0, 0.0, 0.0]));
+    let around = loose(&[TaperedEllipticCylinder::new(40.0, 30.0, 30.0, 30.0, 30.0).expect("a shape")]);
+    let behind = [Pose::from_parts(Vec3::Z * 0.5, voodoo_core::math::Quat::IDENTITY)];
+    other.render(&around, &behind, &Viewpoint { camera: &blind, ..view }, None).expect("valid input");
+    let dark = blind.rays().iter().zip(other.limb()).filter(|(ray, _)| ray[0].is_nan());
+    assert!(dark.clone().count() > 100 && dark.clone().all(|(_, limb)| *limb == NO_LIMB));
+    let lit = blind.rays().iter().zip(other.limb()).filter(|(ray, _)| !ray[0].is_nan());
+    assert!(lit.clone().count() > 1000 && lit.clone().all(|(_, limb)| *limb != NO_LIMB));
 }
 
 #[test]
@@ -223,18 +223,11 @@ fn refuses_what_it_cannot_use_and_keeps_the_last_image() {
     let kept = image.depth().to_vec();
     let mut lame = poses.clone();
     lame[3].translation.x = f64::NAN;
-    let rays = [[0.0_f32; 2]; 5];
     let mut skewed = view;
     skewed.world_from_sensor.rotation.x = 3.0;
     for (poses, view, word) in [
         (&poses[1..], view, "one rigid pose a limb"),
         (&lame[..], view, "one rigid pose a limb"),
-        (&poses[..], Viewpoint { width: 0, ..view }, "1 to 33554432 pixels"),
-        (&poses[..], Viewpoint { width: 100_000, height: 100_000, ..view }, "1 to 33554432 pixels"),
-        (&poses[..], Viewpoint { width: usize::MAX, ..view }, "1 to 33554432 pixels"),
-        (&poses[..], Viewpoint { intrinsics: [0.0, 1.0, 1.0, 1.0], ..view }, "positive focal lengths"),
-        (&poses[..], Viewpoint { intrinsics: [1.0, 1.0, f64::NAN, 1.0], ..view }, "finite centre"),
-        (&poses[..], Viewpoint { rays: Some(&rays), ..view }, "one ray a pixel"),
         (&poses[..], skewed, "a rigid transform"),
     ] {
         let error = image.render(&body, poses, &view, None).expect_err("bad input");

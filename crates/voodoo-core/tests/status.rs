@@ -37,7 +37,7 @@ fn arms(body: &Body) -> Vec<TwoBone> {
 
 /// Depth of the body from one place, millimetres, nothing behind it.
 fn shoot(body: &Body, poses: &[Pose], world_from_sensor: Pose) -> Vec<u16> {
-    let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
+    let view = Viewpoint { camera: scene::pinhole(WIDTH, HEIGHT, INTRINSICS), world_from_sensor };
     let mut image = Rendering::default();
     image.render(body, poses, &view, None).unwrap();
     image.depth().iter().map(|depth| (depth * 1000.0).round() as u16).collect()
@@ -58,11 +58,8 @@ fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(DepthViews) -> T) 
         .iter()
         .map(|(pixels, world_from_sensor)| DepthImage {
             pixels: DepthPixels::U16(pixels),
-            width: WIDTH,
-            height: HEIGHT,
+            camera: scene::pinhole(WIDTH, HEIGHT, INTRINSICS),
             metres_per_unit: 0.001,
-            intrinsics: INTRINSICS,
-            rays: None,
             world_from_sensor: *world_from_sensor,
             weight: 1.0,
             source: 0,

@@ -43,7 +43,7 @@ impl Criterion<'_> {
             let ends = segment.ends.map(|(part, point)| at.poses[part].transform_point(point));
             for view in self.views {
                 let z = view.camera_from_world.transform_point(0.5 * (ends[0] + ends[1])).z;
-                sum += view.intrinsics[0] * (ends[1] - ends[0]).length() / z.max(NEAREST);
+                sum += view.camera.focal()[0] * (ends[1] - ends[0]).length() / z.max(NEAREST);
             }
         }
         let views = self.views.len();
@@ -126,7 +126,7 @@ impl Criterion<'_> {
                     if z < NEAREST {
                         continue;
                     }
-                    let scale = view.intrinsics[0] / z;
+                    let scale = view.camera.focal()[0] / z;
                     sum += scale * depth;
                     let nearer = view.camera_from_world.rotation.inverse() * Vec3::Z;
                     let force = scale * (slope - depth / z * nearer);

@@ -115,8 +115,8 @@ impl Model {
         let mut part = Part {
             limb,
             parent,
-            parent_from_joint: Pose::identity(),
-            joint_from_limb: Pose::identity(),
+            parent_from_joint: Pose::IDENTITY,
+            joint_from_limb: Pose::IDENTITY,
             turn: Turn::Rigid,
             start,
         };

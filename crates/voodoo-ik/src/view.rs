@@ -1,5 +1,6 @@
 //! One picture of the image criterion: how far a point lies outside of its silhouette, or before what it sees.
 
+use voodoo_core::camera::Camera;
 use voodoo_core::math::{Pose, Vec3};
 
 /// Points nearer to the camera plane than this, or behind it, are not seen; metres.
@@ -24,12 +25,8 @@ pub struct View<'a> {
     /// How far its border may be from where it should be, pixels: that much less deep is deep enough. The middle between two
     /// borders is known to half of that.
     pub border: f64,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Focal lengths fx, fy and centre cx, cy, pixels; integer coordinates are pixel centres.
-    pub intrinsics: [f64; 4],
+    /// The camera, without distortion: take that out of masks and depths before.
+    pub camera: &'a Camera,
     /// Pose of the world in the optical frame.
     pub camera_from_world: Pose,
 }
@@ -41,11 +38,12 @@ impl View<'_> {
         if x.z < NEAREST {
             return (0.0, Vec3::ZERO);
         }
-        let [fx, fy, cx, cy] = self.intrinsics;
+        let [fx, fy] = self.camera.focal();
         let inverse = 1.0 / x.z;
         let (px, py) = (x.x * inverse, x.y * inverse);
-        let Some(at) = self.locate(fx * px + cx, fy * py + cy) else { return (0.0, Vec3::ZERO) };
-        let Some([distance, half]) = at.sample(self.pixels, self.width) else { return (0.0, Vec3::ZERO) };
+        let place = self.camera.pixel([px, py]).and_then(|place| self.locate(place));
+        let Some(at) = place else { return (0.0, Vec3::ZERO) };
+        let Some([distance, half]) = at.sample(self.pixels, self.camera.width()) else { return (0.0, Vec3::ZERO) };
         let [distance, mut du, mut dv] = distance.at(&at);
         let projected = fx * radius * inverse;
         let mut depth = (projected - self.border).max(0.0);
@@ -81,7 +79,7 @@ impl View<'_> {
     /// (metres as they would appear across the line of sight), and the derivative by the point.
     fn before(&self, at: &Place, x: Vec3, radius: f64, itself: bool) -> (f64, Vec3) {
         let nothing = (0.0, Vec3::ZERO);
-        let Some(corners) = at.corners(self.depth, self.width) else { return nothing };
+        let Some(corners) = at.corners(self.depth, self.camera.width()) else { return nothing };
         let corners = corners.map(f64::from);
         let (least, most) = corners.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(*d), b.max(*d)));
         if at.beyond != [0.0; 2] || !(least > NEAREST && most < (1.0 + EDGE) * least) {
@@ -93,7 +91,7 @@ impl View<'_> {
         if sign < 0.0 && !itself {
             return nothing;
         }
-        let [fx, fy, ..] = self.intrinsics;
+        let [fx, fy] = self.camera.focal();
         let inverse = 1.0 / x.z;
         let value = fx * gap * inverse - self.border;
         if value <= 0.0 {
@@ -105,14 +103,15 @@ impl View<'_> {
     }
 
     /// The four pixels around a place; outside of the picture those of its border.
-    fn locate(&self, u: f64, v: f64) -> Option<Place> {
-        let (right, bottom) = ((self.width - 1) as f64, (self.height - 1) as f64);
+    fn locate(&self, [u, v]: [f64; 2]) -> Option<Place> {
+        let (width, height) = (self.camera.width(), self.camera.height());
+        let (right, bottom) = ((width - 1) as f64, (height - 1) as f64);
         let (x, y) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
-        let column = (x as usize).min(self.width - 2);
-        let row = (y as usize).min(self.height - 2);
+        let column = (x as usize).min(width - 2);
+        let row = (y as usize).min(height - 2);
         let place =
-            Place { start: row * self.width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
-        (place.start + self.width + 2 <= self.pixels.len()).then_some(place)
+            Place { start: row * width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
+        (place.start + width + 2 <= self.pixels.len()).then_some(place)
     }
 }
 

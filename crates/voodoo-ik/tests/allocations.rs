@@ -5,9 +5,9 @@
 mod counting;
 
 use counting::allocations_so_far;
-use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::{Body, Camera};
 use voodoo_ik::{Aim, Criterion, Goal, Model, Options, Rest, Root, Solver, View, bones, trunk};
 
 const WARM_UP: usize = 26;
@@ -23,15 +23,8 @@ fn allocations() -> usize {
         .collect();
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-    let view = View {
-        pixels: &pixels,
-        depth: &[],
-        border: 1.0,
-        width: 160,
-        height: 120,
-        intrinsics: [140.0, 140.0, 79.5, 59.5],
-        camera_from_world,
-    };
+    let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
+    let view = View { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
     let segments = bones(&body, &model, 1.0);
     let trunk = trunk(&body, &model);
     let criterion = Criterion { views: &[view], segments: &segments, thin: 1.7, trunk: &trunk };
@@ -47,7 +40,7 @@ fn allocations() -> usize {
         });
         let mut angles = vec![0.1; model.freedoms()];
         let before = allocations_so_far();
-        solver.solve(&model, &Pose::identity(), &goals, Some(&criterion), &Options::default(), &mut angles);
+        solver.solve(&model, &Pose::IDENTITY, &goals, Some(&criterion), &Options::default(), &mut angles);
         if index >= WARM_UP {
             count += allocations_so_far() - before;
         }

@@ -3,11 +3,11 @@
 
 use nalgebra::Matrix6;
 use proptest::prelude::*;
-use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::terms::normal_equations::{LimbBlock, line};
+use voodoo_core::{Body, Camera};
 use voodoo_ik::{
     Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Solver, Trunk, View, bones, level_rows, log,
     project, trunk,
@@ -31,7 +31,7 @@ fn goal(body: &Body, model: &Model, site: &str, aim: Aim, level: usize) -> Goal 
 
 fn position(model: &Model, goal: &Goal, angles: &[f64]) -> Vec3 {
     let mut at = Kinematics::default();
-    model.place(&Pose::identity(), angles, &mut at);
+    model.place(&Pose::IDENTITY, angles, &mut at);
     at.poses[goal.part].transform_point(goal.point)
 }
 
@@ -79,7 +79,7 @@ proptest! {
         let goal = Goal { part: model.part_of(site.limb).unwrap(), point: site.position, aim, weight: 2.0, level: 0 };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut rows, mut residual) = (Kinematics::default(), Vec::new(), Vec::new());
-            model.place(&Pose::identity(), angles, &mut at);
+            model.place(&Pose::IDENTITY, angles, &mut at);
             level_rows(&model, &[goal], &at, &mut rows, &mut residual);
             (rows, residual)
         };
@@ -112,7 +112,8 @@ proptest! {
         // Optical frame: z towards -x of the world, 3 m away.
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { pixels: &pixels, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 150.0, 79.5, 59.5], camera_from_world };
+        let camera = Camera::pinhole(160, 120, [140.0, 150.0, 79.5, 59.5]).unwrap();
+        let view = View { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
         let deep = View { depth: &depth, ..view };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Bone| segment.radius = [radius, 0.5 * radius]);
@@ -124,7 +125,7 @@ proptest! {
         let criterion = Criterion { views: &[view, deep], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
-            model.place(&Pose::identity(), angles, &mut at);
+            model.place(&Pose::IDENTITY, angles, &mut at);
             (criterion.evaluate(&model, &at, &mut gradient), gradient)
         };
         let (h, gradient) = evaluate(&angles);
@@ -155,12 +156,13 @@ proptest! {
         let image = vec![[-100.0_f32, 0.0]; 160 * 120];
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-        let view = View { pixels: &image, depth: &[], border: 1.0, width: 160, height: 120, intrinsics: [140.0, 140.0, 79.5, 59.5], camera_from_world };
+        let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
+        let view = View { pixels: &image, depth: &[], border: 1.0, camera: &camera, camera_from_world };
         // One short bone beside the shoulder, moved into the trunk by its base.
         let segment = Bone { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
         let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };
         let mut at = Kinematics::default();
-        model.place(&Pose::identity(), &vec![0.0; model.freedoms()], &mut at);
+        model.place(&Pose::IDENTITY, &vec![0.0; model.freedoms()], &mut at);
         at.poses[0] = Pose::from_parts(Vec3::new(x, y, 0.3), at.poses[0].rotation);
         let h = criterion.evaluate(&model, &at, &mut vec![0.0; model.freedoms()]);
         let shape = &body.limbs()[0].shape;
@@ -211,7 +213,7 @@ proptest! {
         let third = goal(&body, &model, "l_wrist", Aim::Position(Vec3::ZERO), 2);
         let residual = |goals: &[Goal]| {
             let mut angles = start[..model.freedoms()].to_vec();
-            Solver::default().solve(&model, &Pose::identity(), goals, None, &options, &mut angles);
+            Solver::default().solve(&model, &Pose::IDENTITY, goals, None, &options, &mut angles);
             for (angle, [least, greatest]) in angles.iter().zip(model.limits()) {
                 prop_assert!(*least <= *angle && *angle <= *greatest);
             }
@@ -228,9 +230,9 @@ proptest! {
         let model = Model::new(&body, &[], Root::Free).unwrap();
         let wanted: Vec<f64> = angles[..model.freedoms()].iter().zip(model.limits()).map(|(a, [l, h])| a.clamp(*l, *h)).collect();
         let mut at = Kinematics::default();
-        model.place(&Pose::identity(), &wanted, &mut at);
+        model.place(&Pose::IDENTITY, &wanted, &mut at);
         let mut found = Vec::new();
-        project(&body, &model, &Pose::identity(), &at.poses, &mut found);
+        project(&body, &model, &Pose::IDENTITY, &at.poses, &mut found);
         for (found, wanted) in found.iter().zip(&wanted) {
             prop_assert!((found - wanted).abs() < 1e-9);
         }

@@ -2,9 +2,9 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use proptest::prelude::*;
-use voodoo_core::Body;
 use voodoo_core::body::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::{Body, Camera};
 use voodoo_ik::{
     Aim, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, View, bones, level_cost, level_rows, trunk,
 };
@@ -40,7 +40,7 @@ impl Arm {
 
     fn place(&self, angles: &[f64]) -> Kinematics {
         let mut at = Kinematics::default();
-        self.model.place(&Pose::identity(), angles, &mut at);
+        self.model.place(&Pose::IDENTITY, angles, &mut at);
         at
     }
 
@@ -59,7 +59,7 @@ impl Arm {
     fn solve(&self, goals: &[Goal], criterion: Option<&Criterion>, start: &[f64], rest: Vec<Rest>) -> Vec<f64> {
         let mut angles = start.to_vec();
         let report =
-            Solver::with_rest(rest).solve(&self.model, &Pose::identity(), goals, criterion, &long(), &mut angles);
+            Solver::with_rest(rest).solve(&self.model, &Pose::IDENTITY, goals, criterion, &long(), &mut angles);
         let h = criterion.map_or(0.0, |criterion| self.h(criterion, &angles));
         assert!((report.h - h).abs() < 1e-9, "{} {h}", report.h);
         for (angle, [low, high]) in angles.iter().zip(self.model.limits()) {
@@ -97,8 +97,8 @@ fn view(pixels: &[[f32; 2]]) -> View<'_> {
     // Optical frame: z towards -x of the world, 3 m away.
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-    let intrinsics = [140.0, 140.0, 79.5, 59.5];
-    View { pixels, depth: &[], border: 1.0, width: 160, height: 120, intrinsics, camera_from_world }
+    let camera = Box::leak(Box::new(Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap()));
+    View { pixels, depth: &[], border: 1.0, camera, camera_from_world }
 }
 
 proptest! {

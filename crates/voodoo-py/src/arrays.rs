@@ -89,11 +89,11 @@ pub fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>>
 }
 
 /// Rows of three numbers.
-pub fn rows<'a>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; 3]]> {
-    if array.dims()[1] == 3 {
+pub fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; N]]> {
+    if array.dims()[1] == N {
         return Ok(array.as_slice()?.as_chunks().0);
     }
-    let text = format!("{name}: expected shape (N, 3), found {:?}", array.shape());
+    let text = format!("{name}: expected shape (N, {N}), found {:?}", array.shape());
     Err(exception(array.py(), "MeasurementError", text))
 }
 
@@ -120,7 +120,7 @@ pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
 
 /// A pose from a rigid 4x4 matrix; the identity without one.
 pub fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
-    let Some(value) = value else { return Ok(Pose::identity()) };
+    let Some(value) = value else { return Ok(Pose::IDENTITY) };
     let wrong = || wrong_argument(value.py(), name, "a rigid 4x4 transform", value);
     let rows: [[f64; 4]; 4] = match entries::<16>(value, &[4, 4]) {
         Some(numbers) => [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| numbers[4 * row + column])),

@@ -26,6 +26,7 @@ type LimbParts = (String, Option<String>, PyShape, Option<JointParts>, [bool; 2]
 /// name, limb, position
 type SiteParts = (String, String, [f64; 3]);
 
+#[doc = stub!("Body")]
 #[pyclass(name = "Body", module = "voodoo._core", frozen, eq, from_py_object)]
 #[derive(Clone, PartialEq)]
 pub struct PyBody(pub Body);

@@ -2,15 +2,13 @@
 
 use std::sync::Arc;
 
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::observation::frame::DepthPixels;
 use voodoo_sensors::body_view::{Beside, BodyView, Matrix, StillDepth};
-use voodoo_sensors::registration::Labels;
 
 use crate::arrays::contiguous;
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception, wrong_argument};
 
 type Marks<'py> = Bound<'py, PyArray2<bool>>;
@@ -28,6 +26,7 @@ pub fn rows_of(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Matrix
     }
 }
 
+#[doc = stub!("BodyView")]
 #[pyclass(name = "BodyView", module = "voodoo._core", frozen)]
 pub struct PyBodyView(pub Arc<BodyView>);
 
@@ -83,21 +82,9 @@ impl PyBodyView {
         let before = self.0.before.as_ref();
         before.map(|marks| PyArray1::from_slice(py, marks).reshape(self.0.size)).transpose()
     }
-
-    /// Depth of the nearest surface around each of some places and whether most of it is still; none with too few points.
-    fn look_at(
-        &self,
-        labels: PyReadonlyArray2<'_, i32>,
-        places: Vec<([f64; 2], i32)>,
-        radius: f64,
-    ) -> PyResult<Vec<Option<(f64, bool)>>> {
-        let size = [labels.dims()[0], labels.dims()[1]];
-        let image = Labels { first: [0, 0], size, values: labels.as_slice()?.to_vec() };
-        let found = self.0.measured().nearest_surfaces(&image, &places, radius);
-        found.map_err(|error| error.into_py(labels.py()))
-    }
 }
 
+#[doc = stub!("StillDepth")]
 #[pyclass(name = "StillDepth", module = "voodoo._core")]
 #[derive(Default)]
 pub struct PyStillDepth(StillDepth);
@@ -112,42 +99,21 @@ impl PyStillDepth {
     fn __copy__(&self) -> Self {
         Self(self.0.twin())
     }
-
-    #[getter]
-    fn farthest<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
-        PyArray1::from_slice(py, self.0.farthest())
-    }
-
-    /// Where an image (metres) shows what may be the scene, and where something before what was seen there once.
-    fn see<'py>(
-        &mut self,
-        z: PyReadonlyArray2<'py, f32>,
-        world_from_sensor: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Option<(Marks<'py>, Marks<'py>)>> {
-        let (py, size) = (z.py(), [z.dims()[0], z.dims()[1]]);
-        let image = z.as_array().iter().copied().collect();
-        let pose = rows_of("world_from_sensor", &world_from_sensor)?;
-        let found = self.0.see(image, size, &pose, size.map(|size| 0..size)).map_err(|error| error.into_py(py))?;
-        let mask = |marks: Vec<bool>| PyArray1::from_vec(py, marks).reshape(size);
-        found.map(|(still, before)| Ok((mask(still)?, mask(before)?))).transpose()
-    }
 }
 
-/// Where a depth camera saw something near the body, in a picture of the camera beside it.
+#[doc = stub!("body_view")]
 #[pyfunction]
-#[pyo3(signature = (depth, rays, joints, *, metres_per_unit, intrinsics, world_from_depth, color_from_depth, color_intrinsics, project, beyond, reach, step, margin, scene))]
+#[pyo3(signature = (depth, camera, joints, *, metres_per_unit, world_from_depth, color_from_depth, color_camera, beyond, reach, step, margin, scene))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn body_view<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
-    rays: PyReadonlyArray3<'py, f32>,
+    camera: &Bound<'py, PyAny>,
     joints: PyReadonlyArray2<'py, f64>,
     metres_per_unit: f64,
-    intrinsics: Option<[f64; 4]>,
     world_from_depth: PyReadonlyArray2<'py, f64>,
     color_from_depth: PyReadonlyArray2<'py, f64>,
-    color_intrinsics: [f64; 4],
-    project: Option<&Bound<'py, PyAny>>,
+    color_camera: &Bound<'py, PyAny>,
     beyond: &Bound<'py, PyAny>,
     reach: usize,
     step: usize,
@@ -164,12 +130,11 @@ pub fn body_view<'py>(
         _ => return Err(wrong()),
     };
     columns(py, "joints", &joints, 3)?;
+    let (camera, color_camera) = (camera_of(camera)?, camera_of(color_camera)?);
     let beside = Beside {
         image,
         metres_per_unit,
-        size: [rays.dims()[0], rays.dims()[1]],
-        intrinsics,
-        rays: rays.as_slice()?.as_chunks().0,
+        camera: &camera,
         world_from_depth: rows_of("world_from_depth", &world_from_depth)?,
         color_from_depth: rows_of("color_from_depth", &color_from_depth)?,
         step,
@@ -179,15 +144,7 @@ pub fn body_view<'py>(
     let scene = scene.as_mut().map(|scene| &mut scene.0);
     let found = py.detach(|| beside.nearby(scene));
     let nearby = found.map_err(|error| error.into_py(py))?;
-    let pixels = match project {
-        Some(project) => {
-            let points = PyArray1::from_slice(py, nearby.points.as_flattened()).reshape([nearby.points.len(), 3])?;
-            let pixels: PyReadonlyArray2<'py, f64> = project.call1((points,))?.extract()?;
-            columns(py, "pixels", &pixels, 2)?;
-            pixels.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect()
-        }
-        None => nearby.projected(color_intrinsics),
-    };
+    let pixels = nearby.projected(&color_camera);
     let beyond: PyReadonlyArray2<'py, bool> = beyond.call1((beside.away(),))?.extract()?;
     let (size, mask) = ([beyond.dims()[0], beyond.dims()[1]], beyond.as_slice()?);
     let view = py.detach(|| nearby.view(pixels, mask, reach, size)).map_err(|error| error.into_py(py))?;

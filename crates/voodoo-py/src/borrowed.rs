@@ -1,11 +1,13 @@
 //! What a `Frame` holds, and what a step borrows of it: arrays of the caller, names looked up in the body.
 
+use std::sync::Arc;
+
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::Body;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
 use voodoo_core::observation::picture::{ColorImage, ColorPixels};
+use voodoo_core::{Body, Camera};
 
 use crate::arrays::{PointArray, PointView, contiguous};
 use crate::errors::IntoPy;
@@ -31,10 +33,8 @@ enum BorrowedPixels<'py> {
 
 pub struct ImageData {
     pub pixels: DepthArray,
-    pub size: [usize; 2],
+    pub camera: Arc<Camera>,
     pub metres_per_unit: f64,
-    pub intrinsics: [f64; 4],
-    pub rays: Option<Py<PyArray3<f32>>>,
     pub world_from_sensor: Pose,
     pub weight: f64,
     pub source: u16,
@@ -54,9 +54,7 @@ pub enum ColorPixelView<'py> {
 
 pub struct ColorData {
     pub pixels: ColorArray,
-    pub size: [usize; 2],
-    pub intrinsics: [f64; 4],
-    pub distorted: bool,
+    pub camera: Arc<Camera>,
     pub world_from_sensor: Pose,
     pub stamp: f64,
     pub source: u16,
@@ -105,10 +103,9 @@ impl ColorData {
 
 impl ColorView<'_, '_> {
     /// The picture of the camera with this number.
-    pub fn image(&self, camera: u16) -> PyResult<ColorImage<'_>> {
-        let ColorData { size: [height, width], intrinsics, world_from_sensor, stamp, source, .. } = *self.data;
-        let pixels = self.pixels.pixels()?;
-        Ok(ColorImage { pixels, width, height, intrinsics, world_from_sensor, stamp, camera, source })
+    pub fn image(&self, number: u16) -> PyResult<ColorImage<'_>> {
+        let ColorData { ref camera, world_from_sensor, stamp, source, .. } = *self.data;
+        Ok(ColorImage { pixels: self.pixels.pixels()?, camera, world_from_sensor, stamp, number, source })
     }
 }
 
@@ -130,8 +127,15 @@ pub struct Borrowed<'py> {
     pub ground: Option<Ground>,
 }
 
-/// Pixels, rays, and the image with everything that is no array.
-type ImageView<'py> = (BorrowedPixels<'py>, Option<PyReadonlyArray3<'py, f32>>, DepthImage<'static>);
+/// A depth image, and its array and camera.
+struct ImageView<'py> {
+    pixels: BorrowedPixels<'py>,
+    camera: Arc<Camera>,
+    metres_per_unit: f64,
+    world_from_sensor: Pose,
+    weight: f64,
+    source: u16,
+}
 
 impl Borrowed<'_> {
     pub fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
@@ -152,16 +156,13 @@ impl Borrowed<'_> {
     pub fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
         self.images
             .iter()
-            .map(|(pixels, rays, image)| {
-                let pixels = match pixels {
+            .map(|image| {
+                let pixels = match &image.pixels {
                     BorrowedPixels::U16(view) => DepthPixels::U16(view.as_slice()?),
                     BorrowedPixels::F32(view) => DepthPixels::F32(view.as_slice()?),
                 };
-                let rays = match rays {
-                    Some(view) => Some(view.as_slice()?.as_chunks().0),
-                    None => None,
-                };
-                Ok(DepthImage { pixels, rays, ..*image })
+                let ImageView { ref camera, metres_per_unit, world_from_sensor, weight, source, .. } = *image;
+                Ok(DepthImage { pixels, camera, metres_per_unit, world_from_sensor, weight, source })
             })
             .collect()
     }
@@ -199,20 +200,14 @@ impl Held<'_> {
                     DepthArray::U16(array) => BorrowedPixels::U16(array.bind(py).readonly()),
                     DepthArray::F32(array) => BorrowedPixels::F32(array.bind(py).readonly()),
                 };
-                let rays = image.rays.as_ref().map(|rays| rays.bind(py).readonly());
-                let [height, width] = image.size;
-                let plain = DepthImage {
-                    pixels: DepthPixels::U16(&[]),
-                    width,
-                    height,
+                ImageView {
+                    pixels,
+                    camera: Arc::clone(&image.camera),
                     metres_per_unit: image.metres_per_unit,
-                    intrinsics: image.intrinsics,
-                    rays: None,
                     world_from_sensor: image.world_from_sensor,
                     weight: image.weight,
                     source: image.source,
-                };
-                (pixels, rays, plain)
+                }
             })
             .collect();
         let (mut positions, mut rays) = (Vec::new(), Vec::new());

@@ -6,26 +6,22 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::body::HumanModel;
-use voodoo_core::detect::crop::SIZE;
-use voodoo_core::detect::segmentation::Segmentation;
-use voodoo_core::detect::{Detection, Detector, JOINTS, LENGTHS, Surroundings, Wanted};
+use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::observation::frame::{DepthImage, DepthPixels, Ground};
 use voodoo_core::{Body, Frame};
+use voodoo_detect::crop::SIZE;
+use voodoo_detect::segmentation::Segmentation;
+use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
 use crate::arrays::{contiguous, vector};
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::frame::PyFrame;
 
-/// Finds people in depth images, with a small network that comes with the library.
-///
-/// Args:
-///     weights: path of another network's weights, as training/ exports them; None means those that come with the library.
-///
-/// Raises:
-///     MeasurementError: a file that holds no such weights.
+#[doc = stub!("Detector")]
 #[pyclass(name = "Detector", module = "voodoo")]
-pub struct PyDetector(Detector);
+pub struct PyDetector(pub Detector);
 
 #[pymethods]
 impl PyDetector {
@@ -34,7 +30,7 @@ impl PyDetector {
     fn new(py: Python<'_>, weights: Option<PathBuf>) -> PyResult<Self> {
         let refused = |message: String| exception(py, "MeasurementError", message);
         let detector = match weights {
-            None => Detector::new().map_err(|error| error.to_string()),
+            None => Ok(Detector::new()),
             Some(path) => std::fs::read(&path)
                 .map_err(|error| format!("{}: expected a readable file, found {error}", path.display()))
                 .and_then(|bytes| {
@@ -44,16 +40,7 @@ impl PyDetector {
         detector.map(Self).map_err(refused)
     }
 
-    /// The people in the depth images of a frame, the surest first.
-    ///
-    /// Floor and boxes to leave out are those of the frame; what else it holds is not looked at. Releases the GIL.
-    ///
-    /// Args:
-    ///     frame: with at least one depth image.
-    ///     up: (3,) unit vector upwards in the world, where the frame tells no floor; None means upwards in the image.
-    ///
-    /// Raises:
-    ///     MeasurementError: a measurement that cannot be used.
+    #[doc = stub!("Detector.detect")]
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
         let any = Body::human(1.75, HumanModel::Full).map_err(|error| error.into_py(py))?;
@@ -71,20 +58,19 @@ impl PyDetector {
             None => None,
         };
         let detector = &mut self.0;
-        let mut found = py.detach(|| {
-            let mut found = Vec::new();
+        let found = py.detach(|| {
+            let mut found: Vec<PyDetection> = Vec::new();
             for image in &images {
                 let around =
                     Surroundings { ground: input.ground, up, excluded: input.excluded, ..Surroundings::default() };
-                for detection in detector.detect(image, &around, Wanted::All).to_vec() {
-                    let mut pixels = Vec::new();
-                    detector.mask(&detection, &mut pixels);
+                for detection in detector.detect(image, &around, DetectionQuery::All)? {
                     let source = frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
-                    found.push(PyDetection { detection, pixels, size: [image.height, image.width], source });
+                    found.push(PyDetection { detection, size: [image.camera.height(), image.camera.width()], source });
                 }
             }
-            found
+            Ok::<_, DetectError>(found)
         });
+        let mut found = found.map_err(|error| exception(py, "MeasurementError", error.to_string()))?;
         found.sort_by(|a, b| b.detection.person.total_cmp(&a.detection.person));
         Ok(found)
     }
@@ -94,11 +80,10 @@ impl PyDetector {
     }
 }
 
-/// A person in a depth image. World frame, metres.
+#[doc = stub!("Detection")]
 #[pyclass(name = "Detection", module = "voodoo", frozen)]
 pub struct PyDetection {
     detection: Detection,
-    pixels: Vec<usize>,
     size: [usize; 2],
     source: String,
 }
@@ -112,10 +97,10 @@ impl PyDetection {
     fn of_joints<'py, T: IntoPyObject<'py>>(
         &self,
         py: Python<'py>,
-        value: impl Fn(&voodoo_core::detect::DetectedJoint) -> T,
+        value: impl Fn(&DetectedJoint) -> T,
     ) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (name, joint) in JOINTS.iter().zip(&self.detection.joints) {
+        for (name, joint) in JOINTS.iter().zip(self.detection.joints.iter().flatten()) {
             dict.set_item(name, value(joint))?;
         }
         Ok(dict)
@@ -132,71 +117,77 @@ impl PyDetection {
 
 #[pymethods]
 impl PyDetection {
-    /// Joint name -> position (3,) [m]; `l_` and `r_` are the person's own.
+    #[doc = stub!("Detection.joints")]
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_joints(py, |joint| PyArray1::from_slice(py, &joint.position.to_array()))
     }
 
-    /// Joint name -> standard deviation along each axis [m].
+    #[doc = stub!("Detection.joint_sigma")]
     #[getter]
     fn joint_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_joints(py, |joint| joint.sigma)
     }
 
-    /// Joint name -> probability that it is in the image and not hidden.
+    #[doc = stub!("Detection.visible")]
     #[getter]
     fn visible<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_joints(py, |joint| joint.visible)
     }
 
-    /// Upper arm, forearm, thigh, shank, shoulder and hip width, trunk, neck and stature [m].
+    #[doc = stub!("Detection.lengths")]
     #[getter]
     fn lengths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_lengths(py, |[length, _]| length)
     }
 
-    /// The same names -> standard deviation [m].
+    #[doc = stub!("Detection.length_sigma")]
     #[getter]
     fn length_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.of_lengths(py, |[length, relative]| length * relative)
     }
 
-    /// Height of the person when standing upright [m].
+    #[doc = stub!("Detection.stature")]
     #[getter]
     fn stature(&self) -> f64 {
         self.detection.lengths.last().map_or(f64::NAN, |length| length[0])
     }
 
-    /// Probability that the front of the trunk shows.
+    #[doc = stub!("Detection.facing")]
     #[getter]
     fn facing(&self) -> f64 {
-        probability(self.detection.facing)
+        probability(self.detection.facing.unwrap_or(0.0))
     }
 
-    /// Probability that it is a person.
+    #[doc = stub!("Detection.confidence")]
     #[getter]
     fn confidence(&self) -> f64 {
         probability(self.detection.person)
     }
 
-    /// The depth image it was found in.
+    #[doc = stub!("Detection.source")]
     #[getter]
     fn source(&self) -> &str {
         &self.source
     }
 
-    /// The pixels (H, W) of that image that show it.
+    #[doc = stub!("Detection.mask")]
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         let mut mask = vec![false; self.size[0] * self.size[1]];
-        self.pixels.iter().for_each(|pixel| mask[*pixel] = true);
+        self.detection.pixels.iter().for_each(|pixel| mask[*pixel] = true);
         PyArray1::from_vec(py, mask).reshape(self.size)
+    }
+
+    /// The floor as the image shows it, or as the frame gave it: unit normal (3,) upwards and height along it [m]; or None.
+    #[getter]
+    fn floor(&self) -> Option<([f64; 3], f64)> {
+        self.detection.floor.map(|floor| (floor.normal.to_array(), floor.offset))
     }
 
     fn __repr__(&self) -> String {
         let Detection { joints, .. } = &self.detection;
-        let at = joints.get(2).map_or([f64::NAN; 3], |root| root.position.to_array());
+        let at = joints.get(2).copied().flatten().map_or([f64::NAN; 3], |root| root.position.to_array());
         format!(
             "Detection(source={:?}, confidence={:.2}, facing={:.2}, stature={:.2}, humanoid_root=({:.2}, {:.2}, {:.2}))",
             self.source,
@@ -210,41 +201,47 @@ impl PyDetection {
     }
 }
 
-/// What may be a person in a depth image, with the network's picture of it.
+#[doc = stub!("PersonCandidate")]
 #[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen)]
 pub struct PyCandidate {
     crop: Py<PyArray3<f32>>,
     mask: Py<PyArray2<bool>>,
+    #[doc = stub!("PersonCandidate.middle")]
     #[pyo3(get)]
     middle: [f64; 3],
+    #[doc = stub!("PersonCandidate.roll")]
     #[pyo3(get)]
     roll: f64,
+    #[doc = stub!("PersonCandidate.area")]
     #[pyo3(get)]
     area: f64,
+    #[doc = stub!("PersonCandidate.floor")]
     #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
 }
 
 #[pymethods]
 impl PyCandidate {
+    #[doc = stub!("PersonCandidate.crop")]
     #[getter]
     fn crop(&self, py: Python<'_>) -> Py<PyArray3<f32>> {
         self.crop.clone_ref(py)
     }
 
+    #[doc = stub!("PersonCandidate.mask")]
     #[getter]
     fn mask(&self, py: Python<'_>) -> Py<PyArray2<bool>> {
         self.mask.clone_ref(py)
     }
 }
 
-/// Candidates in a depth image `(H, W)` float32, metres; `up` and `floor` (normal, offset) in the camera's optical frame.
+#[doc = stub!("person_candidates")]
 #[pyfunction]
-#[pyo3(signature = (depth, *, intrinsics, up=None, floor=None, most=8))]
+#[pyo3(signature = (depth, *, camera, up=None, floor=None, most=8))]
 pub fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
-    intrinsics: [f64; 4],
+    camera: &Bound<'py, PyAny>,
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
@@ -252,14 +249,15 @@ pub fn person_candidates<'py>(
     let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
-    let [height, width] = [view.as_array().nrows(), view.as_array().ncols()];
+    let camera = camera_of(camera)?;
+    let [height, width] = [camera.height(), camera.width()];
+    if view.as_array().dim() != (height, width) {
+        return Err(wrong_argument(py, "depth", &format!("shape ({height}, {width}), as its camera has"), depth));
+    }
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
-        width,
-        height,
+        camera: &camera,
         metres_per_unit: 1.0,
-        intrinsics,
-        rays: None,
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

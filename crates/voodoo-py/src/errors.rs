@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use voodoo_core::shape::ShapeError;
-use voodoo_core::{BodyError, ConfigError, TrackError};
+use voodoo_core::{BodyError, CameraError, ConfigError, TrackError};
 
 /// An exception of `voodoo.errors` by its class name.
 pub fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
@@ -21,6 +21,12 @@ pub trait IntoPy {
 impl IntoPy for BodyError {
     fn into_py(self, py: Python<'_>) -> PyErr {
         exception(py, "BodyError", self.to_string())
+    }
+}
+
+impl IntoPy for CameraError {
+    fn into_py(self, py: Python<'_>) -> PyErr {
+        exception(py, "CameraError", self.to_string())
     }
 }
 

@@ -11,7 +11,7 @@ use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
 use voodoo_core::uncertainty::Covariances;
 
-use crate::arrays::{frozen, matrix};
+use crate::arrays::frozen;
 use crate::errors::exception;
 
 /// The names that the numbers of an estimate belong to; shared by all estimates of one body.
@@ -38,7 +38,7 @@ impl Names {
     }
 }
 
-/// What a step found; immutable. World frame, metres, seconds.
+#[doc = stub!("Estimate")]
 #[pyclass(name = "Estimate", module = "voodoo", frozen)]
 pub struct PyEstimate {
     pub estimate: Estimate,
@@ -110,7 +110,7 @@ fn covariances((sites, limbs, turns, lengths, girths): Spread) -> Covariances {
     }
 }
 
-/// An estimate of what pickle and copy keep of it; earlier ones kept no `spread`.
+#[doc = stub!("_estimate")]
 #[pyfunction]
 #[pyo3(signature = (head, names, found, spread=None))]
 pub fn _estimate(
@@ -148,98 +148,99 @@ pub fn _estimate(
 
 #[pymethods]
 impl PyEstimate {
-    /// Time of the frame [s]; NaN after a reset and before the first one.
+    #[doc = stub!("Estimate.stamp")]
     #[getter]
     fn stamp(&self) -> f64 {
         self.estimate.stamp
     }
 
-    /// tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured,
-    /// or what is seen there is flat), or searching (there is no pose: nobody was found).
+    #[doc = stub!("Estimate.status")]
     #[getter]
     fn status(&self) -> &'static str {
         self.estimate.status.name()
     }
 
-    /// What the frame says about every limb: "measured", "inferred" (hidden, out of view, or nothing seen that another
-    /// limb would not explain as well: carried by joints and prediction) or "lost" (it should show where it is, and does
-    /// not).
+    #[doc = stub!("Estimate.limb_status")]
     #[getter]
     fn limb_status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
         mapping(py, self.names.limbs.iter().zip(self.estimate.limb_status.iter().map(|status| status.name())))
     }
 
-    /// ICP steps used.
+    #[doc = stub!("Estimate.steps")]
     #[getter]
     fn steps(&self) -> usize {
         self.estimate.steps
     }
 
-    /// Weighted mean of the squared distances of all measurements to the final pose [m^2]; NaN without any.
+    #[doc = stub!("Estimate.mean_squared_distance")]
     #[getter]
     fn mean_squared_distance(&self) -> f64 {
         self.estimate.mean_squared_distance
     }
 
-    /// Root of the mean squared distance [m].
+    #[doc = stub!("Estimate.residual")]
     #[getter]
     fn residual(&self) -> f64 {
         self.estimate.mean_squared_distance.sqrt()
     }
 
-    /// Names of the rows of joint_positions.
+    #[doc = stub!("Estimate.joint_names")]
     #[getter]
     fn joint_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let made = || PyTuple::new(py, &self.names.sites).map(Bound::unbind);
         self.names.site_tuple.get_or_try_init(py, made).map(|names| names.bind(py).clone())
     }
 
-    /// Names of the rows of limb_poses.
+    #[doc = stub!("Estimate.limb_names")]
     #[getter]
     fn limb_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.names.limbs)
     }
 
-    /// Positions (J, 3) [m] of all joints and sites; J = 0 before the first reset.
+    #[doc = stub!("Estimate.joint_positions")]
     #[getter]
     fn joint_positions<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let sites = &self.estimate.sites;
         frozen(py, sites.iter().flat_map(Vec3::to_array).collect(), &[sites.len(), 3])
     }
 
-    /// world_from_limb (L, 4, 4) of all limbs.
+    #[doc = stub!("Estimate.limb_poses")]
     #[getter]
     fn limb_poses<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let poses = &self.estimate.world_from_limb;
-        frozen(py, poses.iter().flat_map(|pose| matrix(pose).into_iter().flatten()).collect(), &[poses.len(), 4, 4])
+        frozen(
+            py,
+            poses.iter().flat_map(|pose| voodoo_core::math::matrix(pose).into_iter().flatten()).collect(),
+            &[poses.len(), 4, 4],
+        )
     }
 
-    /// Position (3,) [m] of every named joint and site.
+    #[doc = stub!("Estimate.joints")]
     #[getter]
     fn joints<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         rows(&slf.get().names.sites, &slf.get().joint_positions(slf.py())?)
     }
 
-    /// Pose (4, 4) of every limb.
+    #[doc = stub!("Estimate.world_from_limb")]
     #[getter]
     fn world_from_limb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         rows(&slf.get().names.limbs, &slf.get().limb_poses(slf.py())?)
     }
 
-    /// Covariance (3, 3) [m^2] of the position of every joint and site, world frame; NaN before the first frame.
+    #[doc = stub!("Estimate.covariance")]
     #[getter]
     fn covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         rows(&slf.get().names.sites, &slf.get().joint_covariances(slf.py())?)
     }
 
-    /// The same as an array (J, 3, 3) in the order of joint_names.
+    #[doc = stub!("Estimate.joint_covariances")]
     #[getter]
     fn joint_covariances<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let sites = &self.estimate.covariances.sites;
         frozen(py, sites.iter().flat_map(Mat3::to_cols_array).collect(), &[sites.len(), 3, 3])
     }
 
-    /// Standard deviation (3,) [m] of every joint's and site's x, y and z in the world.
+    #[doc = stub!("Estimate.joint_sigma")]
     #[getter]
     fn joint_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let (this, sites) = (slf.get(), &slf.get().estimate.covariances.sites);
@@ -247,8 +248,7 @@ impl PyEstimate {
         rows(&this.names.sites, &frozen(slf.py(), sigma.collect(), &[sites.len(), 3])?)
     }
 
-    /// Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the
-    /// origin of the limb's frame, as in geometry_msgs/PoseWithCovariance.
+    #[doc = stub!("Estimate.limb_covariance")]
     #[getter]
     fn limb_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let (this, limbs) = (slf.get(), &slf.get().estimate.covariances.limbs);
@@ -256,7 +256,7 @@ impl PyEstimate {
         rows(&this.names.limbs, &frozen(slf.py(), all, &[limbs.len(), 6, 6])?)
     }
 
-    /// Covariance (3, 3) [rad^2] of the turn of every joint about the world's axes.
+    #[doc = stub!("Estimate.angle_covariance")]
     #[getter]
     fn angle_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
@@ -267,35 +267,35 @@ impl PyEstimate {
         rows(names, &frozen(slf.py(), all, &[turns.len(), 3, 3])?)
     }
 
-    /// Standard deviation of every limb's length [m]; NaN where lengths are not refined.
+    #[doc = stub!("Estimate.length_sigma")]
     #[getter]
     fn length_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
         mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.lengths.iter().copied()))
     }
 
-    /// Standard deviation of every limb's mean radius [m]; NaN where girths are not refined.
+    #[doc = stub!("Estimate.girth_sigma")]
     #[getter]
     fn girth_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
         mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.girths.iter().copied()))
     }
 
-    /// Matched points of every limb.
+    #[doc = stub!("Estimate.limb_points")]
     #[getter]
     fn limb_points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
         mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_points.iter().copied()))
     }
 
-    /// Root of the mean squared distance of every limb's points [m]; NaN without any.
+    #[doc = stub!("Estimate.limb_residual")]
     #[getter]
     fn limb_residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
         mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_residual.iter().copied()))
     }
 
-    /// Distance between the two halves of every joint [m].
+    #[doc = stub!("Estimate.joint_gaps")]
     #[getter]
     fn joint_gaps<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();
@@ -303,7 +303,7 @@ impl PyEstimate {
         mapping(slf.py(), gaps.filter_map(|(name, gap)| Some((name.as_ref()?, *gap))))
     }
 
-    /// What each source gave: candidates, those that matched, root of their mean squared distance [m].
+    #[doc = stub!("Estimate.sources")]
     #[getter]
     fn sources<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let this = slf.get();

@@ -1,6 +1,6 @@
 //! `Frame`: holds references to the caller's arrays until the step reads them.
 
-use numpy::{PyArray2, PyArray3, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::Aabb;
@@ -9,19 +9,14 @@ use voodoo_core::observation::frame::Ground;
 use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
 use crate::borrowed::{Borrowed, CloudData, ColorArray, ColorData, ColorView, DepthArray, Held, ImageData, SiteData};
+use crate::camera::camera_of;
 use crate::errors::{exception, wrong_argument};
 use crate::sites::PySiteRay;
 
-/// All measurements of one instant, from any number of sensors.
-///
-/// Arrays are referenced, not copied (unless they are not contiguous): leave them unchanged until the step. Names of limbs
-/// and sites, weights, finiteness and the stamp are checked by the step, which refuses the whole frame.
-///
-/// Args:
-///     stamp: time [s] by any clock; every step's is after the last one's.
+#[doc = stub!("Frame")]
 #[pyclass(name = "Frame", module = "voodoo")]
 pub struct PyFrame {
-    /// Time [s].
+    #[doc = stub!("Frame.stamp")]
     #[pyo3(get)]
     pub stamp: f64,
     pub(crate) clouds: Vec<CloudData>,
@@ -68,20 +63,7 @@ impl PyFrame {
         Self { stamp, clouds, images, colors, sites, ground: None, excluded, sources }
     }
 
-    /// Add 3-D points (N, 3) [m] in the sensor's frame (K06 IV-A, first three kinds).
-    ///
-    /// Far from the world's origin (map coordinates) float32 has no digits left for a body: give points in the sensor's frame.
-    ///
-    /// Args:
-    ///     points: float32 or float64, finite; no masked array.
-    ///     world_from_sensor: rigid (4, 4); identity by default.
-    ///     weight: weight of each point, above zero; a larger one costs no time.
-    ///     limb: the points are known to be on this limb.
-    ///     on_body: the points are known to be on the body; not needed with `limb`.
-    ///     source: name for the report in `Estimate.sources`.
-    ///
-    /// Raises:
-    ///     MeasurementError: wrong shape or dtype, or no rigid transform.
+    #[doc = stub!("Frame.add_points")]
     #[pyo3(signature = (points, *, world_from_sensor=None, weight=1.0, limb=None, on_body=false, source="points"))]
     fn add_points(
         &mut self,
@@ -104,18 +86,7 @@ impl PyFrame {
         Ok(())
     }
 
-    /// Add an organised depth image: depth along the optical axis (z, not range).
-    ///
-    /// Args:
-    ///     image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned; no masked array.
-    ///     camera: its calibration, a voodoo.Camera of the same size.
-    ///     metres_per_unit: of the image. The default is that of uint16 in millimetres; an image in metres needs 1.0.
-    ///     world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
-    ///     weight: weight of each pixel, above zero; a larger one costs no time.
-    ///     source: name for the report in `Estimate.sources`.
-    ///
-    /// Raises:
-    ///     MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
+    #[doc = stub!("Frame.add_depth")]
     #[pyo3(signature = (image, *, camera, metres_per_unit=0.001, world_from_sensor=None, weight=1.0, source="depth"))]
     fn add_depth(
         &mut self,
@@ -126,11 +97,8 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
-        let ([height, width], intrinsics) = calibration(camera)?;
-        let rays = match camera.getattr("distorted")?.extract::<bool>()? {
-            true => Some(camera.call_method0("rays")?.cast::<PyArray3<f32>>()?.clone()),
-            false => None,
-        };
+        let camera = camera_of(camera)?;
+        let [height, width] = [camera.height(), camera.width()];
         let py = image.py();
         let wrong = || {
             let found = match image.cast::<PyUntypedArray>() {
@@ -161,10 +129,8 @@ impl PyFrame {
         }
         let data = ImageData {
             pixels,
-            size: [size[0], size[1]],
+            camera,
             metres_per_unit,
-            intrinsics,
-            rays: rays.map(Bound::unbind),
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             weight,
             source: self.source(source),
@@ -173,18 +139,7 @@ impl PyFrame {
         Ok(())
     }
 
-    /// Add a colour or grey picture: Tracker fits the body's contour to its regions, People tells persons apart by clothes.
-    ///
-    /// Args:
-    ///     image: (height, width, 3) uint8, channels in any order that is the same in all frames, or (height, width) uint8.
-    ///     camera: its calibration, a voodoo.Camera of the same size; Tracker refuses one with distortion: undistort first.
-    ///     world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
-    ///     stamp: when the picture was taken [s], within 0.25 s of the frame's; the frame's by default.
-    ///     source: name of the camera, the same in every frame: what is learnt of colours goes by it, and the report in
-    ///         `Estimate.sources`.
-    ///
-    /// Raises:
-    ///     MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
+    #[doc = stub!("Frame.add_color")]
     #[pyo3(signature = (image, *, camera, world_from_sensor=None, stamp=None, source="color"))]
     fn add_color(
         &mut self,
@@ -194,18 +149,16 @@ impl PyFrame {
         stamp: Option<&Bound<'_, PyAny>>,
         source: &str,
     ) -> PyResult<()> {
-        let (size, intrinsics) = calibration(camera)?;
-        let [height, width] = size;
+        let camera = camera_of(camera)?;
+        let [height, width] = [camera.height(), camera.width()];
         let expected = format!("an array of shape ({height}, {width}, 3) or ({height}, {width}) and dtype uint8");
         unmasked("image", image, "fill it: image.filled(0)")?;
         let (pixels, _) = ColorArray::new(image)
-            .filter(|(_, found)| *found == size)
+            .filter(|(_, found)| *found == [height, width])
             .ok_or_else(|| wrong_argument(image.py(), "image", &expected, image))?;
         let data = ColorData {
             pixels,
-            size,
-            intrinsics,
-            distorted: camera.getattr("distorted")?.extract()?,
+            camera,
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             stamp: stamp.map_or(Ok(self.stamp), arguments::stamp)?,
             source: self.source(source),
@@ -214,18 +167,7 @@ impl PyFrame {
         Ok(())
     }
 
-    /// Add the position (3,) [m] of a named site in the world (3-D point-to-point relation).
-    ///
-    /// Args:
-    ///     site: one of `Body.site_names`.
-    ///     position: (3,) [m].
-    ///     weight: above zero; 20 is that of a datum good to 2.2 cm, see voodoo.sensors.model.
-    ///     bias: it may always be so far off [m]: within that distance of the site it says nothing, beyond, its force is that
-    ///         of the rest of the distance.
-    ///     source: name for the report in `Estimate.sources`.
-    ///
-    /// Raises:
-    ///     MeasurementError: not three numbers.
+    #[doc = stub!("Frame.add_position")]
     #[pyo3(signature = (site, position, *, weight=1.0, bias=0.0, source="positions"))]
     fn add_position(
         &mut self,
@@ -247,16 +189,7 @@ impl PyFrame {
         Ok(())
     }
 
-    /// Add a ray in the world on which a named site was seen (2-D point-to-line relation).
-    ///
-    /// Args:
-    ///     site: one of `Body.site_names`.
-    ///     origin: (3,) [m] where it starts, the focal point of the camera.
-    ///     direction: (3,) where it goes, of any length.
-    ///     weight, bias, source: as in `add_position`.
-    ///
-    /// Raises:
-    ///     MeasurementError: not three numbers.
+    #[doc = stub!("Frame.add_ray")]
     #[pyo3(signature = (site, *, origin, direction, weight=1.0, bias=0.0, source="rays"))]
     fn add_ray(
         &mut self,
@@ -312,14 +245,7 @@ impl PyFrame {
         Ok(count)
     }
 
-    /// Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background.
-    ///
-    /// Args:
-    ///     normal: (3,) unit vector upwards, in the world.
-    ///     offset: height of the floor along it [m].
-    ///
-    /// Raises:
-    ///     MeasurementError: not three numbers.
+    #[doc = stub!("Frame.set_ground")]
     #[pyo3(signature = (*, normal, offset=0.0))]
     fn set_ground(
         &mut self,
@@ -330,16 +256,7 @@ impl PyFrame {
         Ok(())
     }
 
-    /// Leave out a box of the world: nothing in it belongs to anybody (the robot's own arm, a coat stand).
-    ///
-    /// Free points and depth pixels in it are neither matched nor searched; named sites and points of a limb are not touched.
-    ///
-    /// Args:
-    ///     low: (3,) the corner with the least coordinates [m], in the world.
-    ///     high: (3,) the other corner [m].
-    ///
-    /// Raises:
-    ///     MeasurementError: not three numbers; the step refuses corners that are not finite or in the wrong order.
+    #[doc = stub!("Frame.exclude")]
     fn exclude(&mut self, low: &Bound<'_, PyAny>, high: &Bound<'_, PyAny>) -> PyResult<()> {
         self.excluded.push(Aabb { mins: vector("low", low)?, maxs: vector("high", high)? });
         Ok(())
@@ -356,16 +273,4 @@ impl PyFrame {
             self.sources
         )
     }
-}
-
-/// Size (rows, columns) and intrinsics of a calibration.
-fn calibration(camera: &Bound<'_, PyAny>) -> PyResult<([usize; 2], [f64; 4])> {
-    let number = |name: &str| camera.getattr(name)?.extract::<f64>();
-    let pixels = |name: &str| camera.getattr(name)?.extract::<usize>();
-    let (Ok(width), Ok(height)) = (pixels("width"), pixels("height")) else {
-        let found = camera.get_type().name()?;
-        let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
-        return Err(exception(camera.py(), "MeasurementError", text));
-    };
-    Ok(([height, width], [number("fx")?, number("fy")?, number("cx")?, number("cy")?]))
 }

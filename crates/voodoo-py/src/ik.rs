@@ -7,7 +7,7 @@ use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 use voodoo_ik::{self, Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, Trunk};
 
-use crate::arrays::{frozen, limb_poses, matrix, pose};
+use crate::arrays::{frozen, limb_poses, pose};
 use crate::body::PyBody;
 use crate::errors::{IntoPy, exception};
 use crate::ik_view::PyView;
@@ -22,6 +22,7 @@ type SegmentParts = (String, String, f64);
 /// steps, tolerance, still, gain, caution, largest turn
 type OptionParts = (usize, f64, f64, f64, f64, f64);
 
+#[doc = stub!("Chain")]
 #[pyclass(name = "Chain", module = "voodoo._core", frozen)]
 pub struct PyChain {
     body: Body,
@@ -162,7 +163,7 @@ impl PyChain {
     fn forward<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>) -> PyResult<(Array<'py>, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
-        let poses: Vec<f64> = at.poses.iter().flat_map(matrix).flatten().collect();
+        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
         let sites: Vec<f64> =
             self.site_parts().flat_map(|(_, part, x)| at.poses[part].transform_point(x).to_array()).collect();
         let counts = (at.poses.len(), sites.len() / 3);
@@ -251,7 +252,7 @@ impl PyChain {
         let at = solver.kinematics();
         let residuals = goals.iter().map(|goal| goal.residual(at).length());
         let residuals = PyTuple::new(py, residuals.collect::<Vec<_>>())?;
-        let poses: Vec<f64> = at.poses.iter().flat_map(matrix).flatten().collect();
+        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
         let sites: Vec<f64> =
             self.site_parts().flat_map(|(_, part, x)| at.poses[part].transform_point(x).to_array()).collect();
         let (limbs, points, n) = (at.poses.len(), sites.len() / 3, angles.len());

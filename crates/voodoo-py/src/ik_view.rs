@@ -1,20 +1,23 @@
 //! `View` of inverse kinematics: one silhouette with its camera.
 
+use std::sync::Arc;
+
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use voodoo_core::Camera;
 use voodoo_core::math::Pose;
 
 use crate::arrays::pose;
+use crate::camera::camera_of;
 use crate::errors::exception;
 
+#[doc = stub!("View")]
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
 pub struct PyView {
     pixels: Vec<[f32; 2]>,
     depth: Vec<f32>,
     border: f64,
-    width: usize,
-    height: usize,
-    intrinsics: [f64; 4],
+    camera: Arc<Camera>,
     camera_from_world: Pose,
 }
 
@@ -26,7 +29,7 @@ impl PyView {
         thickness: PyReadonlyArray2<'_, f32>,
         depth: Option<PyReadonlyArray2<'_, f32>>,
         border: f64,
-        intrinsics: [f64; 4],
+        camera: &Bound<'_, PyAny>,
         camera_from_world: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let [height, width] = [distance.shape()[0], distance.shape()[1]];
@@ -34,13 +37,16 @@ impl PyView {
             let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
             return Err(exception(camera_from_world.py(), "MeasurementError", message));
         }
+        let camera = camera_of(camera)?;
+        if [camera.height(), camera.width()] != [height, width] || camera.distorts() {
+            let message = format!("camera: expected a pinhole camera of {width} x {height} pixels, found {camera:?}");
+            return Err(exception(camera_from_world.py(), "MeasurementError", message));
+        }
         Ok(Self {
             pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
             depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,
             border,
-            width,
-            height,
-            intrinsics,
+            camera,
             camera_from_world: pose("camera_from_world", Some(camera_from_world))?,
         })
     }
@@ -52,9 +58,7 @@ impl PyView {
             pixels: &self.pixels,
             depth: &self.depth,
             border: self.border,
-            width: self.width,
-            height: self.height,
-            intrinsics: self.intrinsics,
+            camera: &self.camera,
             camera_from_world: self.camera_from_world,
         }
     }

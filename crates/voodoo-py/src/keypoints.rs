@@ -1,24 +1,25 @@
 //! 2-D keypoints, and points that go on with the limbs.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
-use voodoo_core::math::Vec3;
-use voodoo_sensors::body_view::Matrix;
-use voodoo_sensors::carried::{Carrying, in_sensor, in_world};
+use voodoo_core::math::{CostTable, Vec3};
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Part, Sensor, Sighting, Told, nearest_person};
 
-use crate::arrays::rows;
+use crate::arrays::{PointArray, rows};
 use crate::body_view::rows_of;
-use crate::errors::exception;
+use crate::camera::camera_of;
+use crate::errors::IntoPy;
+use crate::people::TrackedBody;
 use crate::sites::{PySiteGate, PySiteRay, places_of};
-use crate::skin::{before, pairs};
+use crate::skin::before;
 
 type Seen = ((f64, f64), f64);
 /// Site, number and share of each keypoint, spread, and how far it lies behind the surface.
 type Shares = (String, Vec<(usize, f64)>, f64, f64);
 type Observed<'py> = (Vec<PySiteRay>, Vec<(String, Bound<'py, PyArray1<f64>>, f64)>, Vec<String>, Vec<String>);
 
+#[doc = stub!("KeypointLayout")]
 #[pyclass(name = "KeypointLayout", module = "voodoo._core", frozen)]
 pub struct PyKeypointLayout(Vec<Part>);
 
@@ -38,25 +39,25 @@ impl PyKeypointLayout {
     }
 
     /// Number of the person nearest to where the parts are expected.
-    #[pyo3(signature = (people, predicted, *, world_from_sensor, intrinsics, project, least))]
+    #[pyo3(signature = (people, predicted, *, world_from_sensor, camera, least))]
     fn nearest<'py>(
         &self,
         people: Vec<PyReadonlyArray2<'py, f64>>,
         predicted: &Bound<'py, PyAny>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        project: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         least: f64,
     ) -> PyResult<Option<usize>> {
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, intrinsics };
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
-        let (_, expected) = before(&eye, places, project)?;
+        let (_, expected) = before(&eye, places);
         let people = people.iter().map(|keypoints| rows("keypoints", keypoints)).collect::<PyResult<Vec<_>>>()?;
         Ok(nearest_person(people.into_iter(), &self.0, &expected, least))
     }
 
     /// Rays; sites with places and their standard deviations; names of those not seen, and of those that were dropped.
-    #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, intrinsics, lens, noise, place_sigma, least, only, gate, surface, before))]
+    #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, camera, noise, place_sigma, least, only, gate, surface, before))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
         &self,
@@ -66,8 +67,7 @@ impl PyKeypointLayout {
         stamp: f64,
         source: &str,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        lens: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         noise: f64,
         place_sigma: f64,
         least: f64,
@@ -76,17 +76,15 @@ impl PyKeypointLayout {
         surface: Option<&Bound<'py, PyAny>>,
         before: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Observed<'py>> {
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, intrinsics };
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
         let seen: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
         let pixels: Vec<[f64; 2]> = seen.iter().map(|seen| seen.map_or([f64::NAN; 2], |seen| seen.pixel)).collect();
-        let flat = match lens {
-            Some(lens) => pairs(lens, &pixels)?,
-            None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),
-        };
+        let flat = pixels.iter().map(|pixel| eye.undistorted(*pixel));
         let (places, mut gate) = (self.places(predicted)?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for ((part, seen), (flat, place)) in self.0.iter().zip(seen).zip(flat.into_iter().zip(places)) {
+        for ((part, seen), (flat, place)) in self.0.iter().zip(seen).zip(flat.zip(places)) {
             let Some(seen) = seen else {
                 unseen.push(part.site.clone());
                 continue;
@@ -123,44 +121,28 @@ impl PyKeypointLayout {
     }
 }
 
-/// Points of a sensor, or in the world, that go on with the limb that they lie on, as `distances` tells.
+#[doc = stub!("linear_sum_assignment")]
 #[pyfunction]
-#[pyo3(signature = (points, poses, before, *, interval, elapsed, near, share, max_speed, distances, world_from_sensor=None))]
-#[allow(clippy::too_many_arguments, reason = "keywords in Python")]
-pub fn carried<'py>(
-    py: Python<'py>,
-    points: PyReadonlyArray2<'py, f64>,
-    poses: PyReadonlyArray3<'py, f64>,
-    before: PyReadonlyArray3<'py, f64>,
-    interval: f64,
-    elapsed: f64,
-    near: f64,
-    share: f64,
-    max_speed: f64,
-    distances: &Bound<'py, PyAny>,
-    world_from_sensor: Option<PyReadonlyArray2<'py, f64>>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let mut moved = rows("points", &points)?.to_vec();
-    let pose = world_from_sensor.as_ref().map(|pose| rows_of("world_from_sensor", pose)).transpose()?;
-    pose.iter().for_each(|pose| in_world(&mut moved, pose));
-    let (poses, before) = (matrices(&poses)?, matrices(&before)?);
-    let carrying = Carrying { poses: &poses, before: &before, interval, elapsed, near, share, max_speed };
-    let around = carrying.around(&moved);
-    if !around.is_empty() {
-        let chosen: Vec<f64> = around.iter().flat_map(|index| moved[*index]).collect();
-        let chosen = PyArray1::from_vec(py, chosen).reshape([around.len(), 3])?;
-        let away: PyReadonlyArray2<'py, f32> = distances.call1((chosen,))?.extract()?;
-        carrying.carry(&mut moved, &around, away.as_slice()?);
-    }
-    pose.iter().for_each(|pose| in_sensor(&mut moved, pose));
-    PyArray1::from_slice(py, moved.as_flattened()).reshape([moved.len(), 3])
+pub fn linear_sum_assignment(costs: PyReadonlyArray2<'_, f64>) -> Vec<(usize, usize)> {
+    let costs = costs.as_array();
+    let table = CostTable::from_fn(costs.nrows(), costs.ncols(), |row, column| costs[[row, column]]);
+    voodoo_core::math::linear_sum_assignment(&table)
 }
 
-fn matrices(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix>> {
-    if array.shape()[1..] != [4, 4] {
-        let text = format!("poses: expected shape (N, 4, 4), found {:?}", array.shape());
-        return Err(exception(array.py(), "MeasurementError", text));
-    }
-    let rows: &[[f64; 4]] = array.as_slice()?.as_chunks().0;
-    Ok(rows.as_chunks::<4>().0.to_vec())
+#[doc = stub!("carried")]
+#[pyfunction]
+#[pyo3(signature = (points, tracker, *, elapsed, world_from_sensor=None))]
+pub fn carried<'py>(
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    tracker: TrackedBody<'py>,
+    elapsed: f64,
+    world_from_sensor: Option<PyReadonlyArray2<'py, f64>>,
+) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    let pose = world_from_sensor.as_ref().map(|pose| rows_of("world_from_sensor", pose)).transpose()?;
+    let array = PointArray::new("points", points)?;
+    let view = array.view(py);
+    let moved = voodoo_sensors::carried::carried(view.slice()?, tracker.tracker()?, elapsed, pose.as_ref());
+    let moved = moved.map_err(|error| error.into_py(py))?;
+    moved.map(|moved| PyArray1::from_slice(py, moved.as_flattened()).reshape([moved.len(), 3])).transpose()
 }

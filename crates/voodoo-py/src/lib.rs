@@ -1,17 +1,23 @@
 //! Python bindings of voodoo-core: conversions and error translation, no method of their own.
-#![allow(
-    missing_docs,
-    reason = "the documentation of the Python side stands in _core.pyi, that of what voodoo exports here, too: a test compares"
-)]
+#![allow(missing_docs, reason = "the documentation of the Python side is that of _core.pyi")]
+
+/// The docstring that a class, a member of one or a function has in `_core.pyi`; see build.rs.
+macro_rules! stub {
+    ($name:literal) => {
+        include_str!(concat!(env!("OUT_DIR"), "/", $name))
+    };
+}
 
 mod arguments;
 mod arrays;
 mod body;
 mod body_view;
 mod borrowed;
-mod chroma;
+mod camera;
 mod config;
+#[cfg(feature = "detect")]
 mod detect;
+mod detector;
 mod errors;
 mod estimate;
 mod frame;
@@ -35,9 +41,10 @@ mod _core {
     #[pymodule_export]
     use super::body_view::{PyBodyView, PyStillDepth, body_view};
     #[pymodule_export]
-    use super::chroma::{color_bins, joined_mask, mask_regions, skin_mask};
+    use super::camera::PyCamera;
     #[pymodule_export]
     use super::config::config_fields;
+    #[cfg(feature = "detect")]
     #[pymodule_export]
     use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
     #[pymodule_export]
@@ -49,21 +56,21 @@ mod _core {
     #[pymodule_export]
     use super::ik_view::PyView;
     #[pymodule_export]
-    use super::keypoints::{PyKeypointLayout, carried};
+    use super::keypoints::{PyKeypointLayout, carried, linear_sum_assignment};
     #[pymodule_export]
     use super::people::PyPeople;
     #[pymodule_export]
-    use super::registration::{nearest_surface, points_within, shown};
+    use super::registration::nearest_surface;
     #[pymodule_export]
     use super::render::render_depth;
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
     #[pymodule_export]
-    use super::sites::{PySiteGate, PySiteMotion, PySiteRay};
+    use super::sites::{PySiteGate, PySiteRay, expected_sites};
     #[pymodule_export]
-    use super::skin::{PySkinCue, PySkinTeacher, skin_candidates};
+    use super::skin::{PySkinCue, PySkinTeacher};
     #[pymodule_export]
-    use super::tracker::PyTracker;
+    use super::tracker::{PyTracker, body_before};
 
     #[pymodule_init]
     fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {

@@ -2,37 +2,63 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::{Aabb, Vec3};
 use voodoo_core::observation::frame::{Cloud, PositionRelation, RayRelation};
 use voodoo_core::people::Options;
-use voodoo_core::{Frame, People};
+use voodoo_core::{Frame, People, Tracker};
 
-use crate::arrays::PointArray;
 use crate::body::PyBody;
 use crate::borrowed::Borrowed;
 use crate::config::config;
-use crate::errors::IntoPy;
+use crate::detector::{detector, warn_of_detector};
+use crate::errors::{IntoPy, exception};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
-use crate::tracker::{places, site_positions};
+use crate::tracker::{PyTracker, site_positions};
 
+#[doc = stub!("People")]
 #[pyclass(name = "People", module = "voodoo._core")]
 pub struct PyPeople {
     people: People,
     names: Arc<Names>,
+    /// Steps in which a detector failed.
+    detector_failures: usize,
+}
+
+/// A tracker, or one of several persons by number.
+#[derive(FromPyObject)]
+pub enum TrackedBody<'py> {
+    Alone(PyRef<'py, PyTracker>),
+    Person(PyRef<'py, PyPeople>, usize),
+}
+
+impl TrackedBody<'_> {
+    /// Who follows the body.
+    pub fn tracker(&self) -> PyResult<&Tracker> {
+        match self {
+            Self::Alone(tracker) => Ok(&tracker.tracker),
+            Self::Person(people, id) => {
+                let found = people.people.there().find(|(there, _)| there == id);
+                let missing = || {
+                    let text = format!("person: expected one of those who are there, found {id}");
+                    exception(people.py(), "BodyError", text)
+                };
+                found.map(|(_, tracker)| tracker).ok_or_else(missing)
+            }
+        }
+    }
 }
 
 #[pymethods]
 impl PyPeople {
     #[new]
-    #[pyo3(signature = (body, values, *, limit, nearest, forget_after, region))]
+    #[pyo3(signature = (body, values, detector, *, limit, nearest, forget_after, region))]
     fn new(
         body: &PyBody,
         values: &Bound<'_, PyDict>,
+        detector: &Bound<'_, PyAny>,
         limit: Option<usize>,
         nearest: bool,
         forget_after: f64,
@@ -41,10 +67,13 @@ impl PyPeople {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
         let mut options = Options::default();
         (options.limit, options.nearest, options.forget_after, options.region) = (limit, nearest, forget_after, region);
-        let people =
+        let mut people =
             People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
+        if let Some(found) = self::detector(detector)? {
+            people = people.with_detector(found);
+        }
         let names = Arc::new(Names::of(people.prototype()));
-        Ok(Self { people, names })
+        Ok(Self { people, names, detector_failures: 0 })
     }
 
     /// One frame, and what was measured of some persons alone; releases the GIL. Number and estimate of everybody who is there.
@@ -76,6 +105,8 @@ impl PyPeople {
             own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
         let people = &mut self.people;
         py.detach(|| people.step(&input, &frames)).map_err(|error| error.into_py(py))?;
+        self.detector_failures += usize::from(people.detector_error().is_some());
+        warn_of_detector(py, self.people.detector_error())?;
         let found = self.people.there().map(|(id, tracker)| {
             let (estimate, names) = (tracker.estimate().clone(), self.names.clone());
             let own = own.iter().filter(|(of, _)| *of == id).flat_map(|(_, own)| &own.sources);
@@ -83,6 +114,11 @@ impl PyPeople {
             (id, PyEstimate { estimate, names, sources })
         });
         Ok(found.collect())
+    }
+
+    #[getter]
+    fn detector_failures(&self) -> usize {
+        self.detector_failures
     }
 
     /// Somebody is where these positions say; their number.
@@ -99,33 +135,6 @@ impl PyPeople {
     /// Follows these numbers alone; None: everybody.
     fn only(&mut self, ids: Option<Vec<usize>>) {
         self.people.only(ids);
-    }
-
-    /// Signed distances of world points `(N, 3)` to every limb of a person who is there, limb by limb; None: they are not there.
-    fn limb_distances<'py>(
-        &self,
-        py: Python<'py>,
-        id: usize,
-        points: &Bound<'py, PyAny>,
-    ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
-        let array = PointArray::new("points", points)?;
-        let view = array.view(py);
-        let Some((_, tracker)) = self.people.there().find(|(there, _)| *there == id) else { return Ok(None) };
-        let distances = tracker.limb_distances(view.slice()?).map_err(|error| error.into_py(py))?;
-        PyArray2::from_vec2(py, &distances).map(Some).map_err(|error| PyValueError::new_err(error.to_string()))
-    }
-
-    /// Length of body of a person who is there between each of some places and a camera's focal point, metres.
-    fn body_before<'py>(
-        &self,
-        id: usize,
-        sites: PyReadonlyArray2<'py, f64>,
-        camera: [f64; 3],
-    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
-        let (py, places) = (sites.py(), places(&sites)?);
-        let Some((_, tracker)) = self.people.there().find(|(there, _)| *there == id) else { return Ok(None) };
-        let found = tracker.body_before(&places, Vec3::from_array(camera)).map_err(|error| error.into_py(py))?;
-        Ok(Some(PyArray1::from_vec(py, found)))
     }
 
     /// The last estimate of a person who is there.

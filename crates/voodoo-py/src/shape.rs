@@ -9,15 +9,12 @@ use crate::arguments;
 use crate::arrays::{PointArray, vector};
 use crate::errors::IntoPy;
 
-/// The shape of a limb: axis +z from z = 0 to z = length, semi-axes a along x and b along y, linear in z.
-///
-/// Raises:
-///     BodyError: the numbers do not make a solid.
+#[doc = stub!("TaperedEllipticCylinder")]
 #[pyclass(name = "TaperedEllipticCylinder", module = "voodoo", frozen, eq, from_py_object)]
 #[derive(Clone, PartialEq)]
 pub struct PyShape(pub TaperedEllipticCylinder);
 
-/// Closest points (N, 3), outward normals (N, 3), signed distances (N,) and regions (N,), see REGIONS.
+#[doc = stub!("ClosestPoints")]
 #[pyclass(name = "ClosestPoints", module = "voodoo", frozen, get_all)]
 pub struct PyClosestPoints {
     points: Py<PyAny>,
@@ -43,40 +40,37 @@ impl PyShape {
         TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(|error| error.into_py(py))
     }
 
-    /// Length [m].
+    #[doc = stub!("TaperedEllipticCylinder.length")]
     #[getter]
     fn length(&self) -> f64 {
         self.0.length()
     }
 
-    /// Semi-axis along x at the proximal end [m].
+    #[doc = stub!("TaperedEllipticCylinder.a0")]
     #[getter]
     fn a0(&self) -> f64 {
         self.0.a0()
     }
 
-    /// Semi-axis along y at the proximal end [m].
+    #[doc = stub!("TaperedEllipticCylinder.b0")]
     #[getter]
     fn b0(&self) -> f64 {
         self.0.b0()
     }
 
-    /// Semi-axis along x at the distal end [m].
+    #[doc = stub!("TaperedEllipticCylinder.a1")]
     #[getter]
     fn a1(&self) -> f64 {
         self.0.a1()
     }
 
-    /// Semi-axis along y at the distal end [m].
+    #[doc = stub!("TaperedEllipticCylinder.b1")]
     #[getter]
     fn b1(&self) -> f64 {
         self.0.b1()
     }
 
-    /// Closest surface point (3,) [m], outward normal (3,) and signed distance [m] of one point, all in the limb frame.
-    ///
-    /// Raises:
-    ///     MeasurementError: not three finite numbers.
+    #[doc = stub!("TaperedEllipticCylinder.closest_point")]
     fn closest_point<'py>(
         &self,
         py: Python<'py>,
@@ -91,10 +85,7 @@ impl PyShape {
         Ok((array(found.point.to_array()), array(found.normal.to_array()), found.signed_distance))
     }
 
-    /// Closest surface points of many points (N, 3) [m] in the limb frame, by the tracker's SIMD kernel.
-    ///
-    /// Raises:
-    ///     MeasurementError: wrong shape or dtype, or points that are not finite.
+    #[doc = stub!("TaperedEllipticCylinder.closest_points")]
     fn closest_points(&self, py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<PyClosestPoints> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
@@ -111,7 +102,7 @@ impl PyShape {
             }
             let mut batch = SurfaceBatch::default();
             if bad.is_none() {
-                self.0.closest_points(&Pose::identity(), &queries, &mut batch);
+                self.0.closest_points(&Pose::IDENTITY, &queries, &mut batch);
             }
             (batch, bad)
         });

@@ -1,13 +1,14 @@
-//! Named sites: where they will be, gates around them, and rays on which they were seen.
+//! Named sites: where they are expected, gates around them, and rays on which they were seen.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
 use voodoo_core::math::Vec3;
-use voodoo_core::observation::sites::{SiteGate, SiteMotion, SiteRay};
+use voodoo_core::observation::sites::{SiteGate, SiteRay};
 
-use crate::arrays::{rows, vector};
-use crate::errors::exception;
+use crate::arrays::vector;
+use crate::errors::IntoPy;
+use crate::people::TrackedBody;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -29,62 +30,19 @@ pub fn places_of<'a>(places: &Bound<'_, PyAny>, sites: impl Iterator<Item = &'a 
         .collect()
 }
 
-#[pyclass(name = "SiteMotion", module = "voodoo._core")]
-pub struct PySiteMotion {
-    motion: SiteMotion,
-    /// Names of the sites, as they came.
-    names: Option<Py<PyTuple>>,
+#[doc = stub!("expected_sites")]
+#[pyfunction]
+pub fn expected_sites<'py>(py: Python<'py>, tracker: TrackedBody<'py>, stamp: f64) -> PyResult<Bound<'py, PyDict>> {
+    let tracker = tracker.tracker()?;
+    let places = tracker.expected_sites(stamp).map_err(|error| error.into_py(py))?;
+    let dict = PyDict::new(py);
+    for (site, place) in tracker.body().sites().iter().zip(places) {
+        dict.set_item(&site.name, row(py, place))?;
+    }
+    Ok(dict)
 }
 
-#[pymethods]
-impl PySiteMotion {
-    #[new]
-    #[pyo3(signature = (*, share, max_speed))]
-    fn new(share: f64, max_speed: f64) -> Self {
-        Self { motion: SiteMotion::new(share, max_speed), names: None }
-    }
-
-    fn __copy__(&self, py: Python<'_>) -> Self {
-        Self { motion: self.motion.clone(), names: self.names.as_ref().map(|names| names.clone_ref(py)) }
-    }
-
-    /// Takes up an estimate's named positions.
-    fn update(&mut self, stamp: f64, names: Bound<'_, PyTuple>, positions: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
-        // Estimates of one body have the same tuple.
-        let same = self.names.as_ref().is_some_and(|before| before.is(&names));
-        let known = if same { self.motion.names().clone() } else { names.extract::<Vec<String>>()?.into() };
-        let places = rows("positions", &positions)?;
-        if known.len() != places.len() {
-            let text = format!("positions: expected one of each of {} names, found {}", known.len(), places.len());
-            return Err(exception(names.py(), "MeasurementError", text));
-        }
-        self.motion.update(stamp, known, places.to_vec());
-        self.names = Some(names.unbind());
-        Ok(())
-    }
-
-    /// Name of every site and where it will be.
-    fn predict<'py>(&self, py: Python<'py>, stamp: f64) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        if let Some(names) = &self.names {
-            for (name, place) in names.bind(py).iter().zip(self.motion.at(stamp)) {
-                dict.set_item(name, PyArray1::from_slice(py, &place))?;
-            }
-        }
-        Ok(dict)
-    }
-
-    /// The same of all sites as rows.
-    fn positions<'py>(&self, py: Python<'py>, stamp: f64) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let places = self.motion.at(stamp);
-        PyArray1::from_slice(py, places.as_flattened()).reshape([places.len(), 3])
-    }
-
-    fn __len__(&self) -> usize {
-        self.motion.names().len()
-    }
-}
-
+#[doc = stub!("SiteGate")]
 #[pyclass(name = "SiteGate", module = "voodoo._core")]
 pub struct PySiteGate(pub SiteGate);
 
@@ -106,25 +64,9 @@ impl PySiteGate {
     fn accepts(&mut self, site: &str, distance: f64, stamp: f64, source: &str) -> bool {
         self.0.accepts(site, distance, stamp, source)
     }
-
-    #[getter]
-    fn accepted(&self) -> Vec<(&str, &str, f64)> {
-        self.0.accepted().collect()
-    }
 }
 
-/// A site was seen on a ray.
-///
-/// Args:
-///     site: its name.
-///     origin: focal point (3,) in the world [m].
-///     direction: (3,) unit vector in the world.
-///     sigma: standard deviation across the ray at the site [m].
-///     source: name for `Estimate.sources`.
-///     trust: factor of its weight, in [0, 1].
-///     bias: it may always be this far off [m]; see `Frame.add_position`.
-///     place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
-///     place_sigma: standard deviation of `place` along the ray [m].
+#[doc = stub!("SiteRay")]
 #[pyclass(name = "SiteRay", module = "voodoo._core", frozen)]
 pub struct PySiteRay(pub SiteRay);
 
@@ -149,68 +91,68 @@ impl PySiteRay {
         Ok(Self(SiteRay { site, origin, direction, sigma, source, trust, bias, place, place_sigma }))
     }
 
-    /// Its name.
+    #[doc = stub!("SiteRay.site")]
     #[getter]
     fn site(&self) -> &str {
         &self.0.site
     }
 
-    /// Focal point (3,) in the world [m].
+    #[doc = stub!("SiteRay.origin")]
     #[getter]
     fn origin<'py>(&self, py: Python<'py>) -> Row<'py> {
         row(py, self.0.origin)
     }
 
-    /// (3,) unit vector in the world.
+    #[doc = stub!("SiteRay.direction")]
     #[getter]
     fn direction<'py>(&self, py: Python<'py>) -> Row<'py> {
         row(py, self.0.direction)
     }
 
-    /// Standard deviation across the ray at the site [m].
+    #[doc = stub!("SiteRay.sigma")]
     #[getter]
     fn sigma(&self) -> f64 {
         self.0.sigma
     }
 
-    /// Name for `Estimate.sources`.
+    #[doc = stub!("SiteRay.source")]
     #[getter]
     fn source(&self) -> &str {
         &self.0.source
     }
 
-    /// Factor of its weight, in [0, 1].
+    #[doc = stub!("SiteRay.trust")]
     #[getter]
     fn trust(&self) -> f64 {
         self.0.trust
     }
 
-    /// It may always be this far off [m].
+    #[doc = stub!("SiteRay.bias")]
     #[getter]
     fn bias(&self) -> f64 {
         self.0.bias
     }
 
-    /// (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
+    #[doc = stub!("SiteRay.place")]
     #[getter]
     fn place<'py>(&self, py: Python<'py>) -> Option<Row<'py>> {
         self.0.place.map(|place| row(py, place))
     }
 
-    /// Standard deviation of `place` along the ray [m].
+    #[doc = stub!("SiteRay.place_sigma")]
     #[getter]
     fn place_sigma(&self) -> f64 {
         self.0.place_sigma
     }
 
-    /// The ray of a site that has gone on by (3,) [m] since it was seen.
+    #[doc = stub!("SiteRay.moved")]
     fn moved(&self, shift: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (shift, ray) = (vector("shift", shift)?, &self.0);
         let place = ray.place.map(|place| place + shift);
         Ok(Self(SiteRay { origin: ray.origin + shift, place, ..ray.clone() }))
     }
 
-    /// The ray with another trust.
+    #[doc = stub!("SiteRay.trusted")]
     fn trusted(&self, trust: f64) -> Self {
         Self(SiteRay { trust, ..self.0.clone() })
     }

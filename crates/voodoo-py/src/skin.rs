@@ -2,21 +2,21 @@
 
 use std::sync::Arc;
 
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::chroma::{CHROMA_BINS, LUMA_BINS};
 use voodoo_sensors::eye::Eye;
-use voodoo_sensors::skin::candidates::{Candidate, candidates};
-use voodoo_sensors::skin::cue::{Look, SkinCue, SkinSettings};
-use voodoo_sensors::skin::rules::{Expected, LimbDistances};
+use voodoo_sensors::skin::candidates::Candidate;
+use voodoo_sensors::skin::cue::{SkinCue, SkinInput, SkinSettings};
+use voodoo_sensors::skin::rules::Expected;
 use voodoo_sensors::skin::teacher::{Pace, Shown, Teacher};
 
 use crate::arrays::rows;
 use crate::body_view::{PyBodyView, rows_of};
+use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception};
+use crate::people::TrackedBody;
 use crate::sites::places_of;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -29,51 +29,14 @@ fn told(candidate: &Candidate) -> Place {
     ((u, v), candidate.region, candidate.area, candidate.hand)
 }
 
-/// Where in a mask a head or a hand may be, and the number of its region in each pixel.
-#[pyfunction]
-pub fn skin_candidates<'py>(
-    py: Python<'py>,
-    mask: PyReadonlyArray2<'py, bool>,
-    palm_px: f64,
-) -> PyResult<(Vec<Place>, Bound<'py, PyArray2<i32>>)> {
-    let (size, pixels) = ([mask.dims()[0], mask.dims()[1]], mask.as_slice()?);
-    let pixels: Vec<u8> = pixels.iter().map(|pixel| u8::from(*pixel)).collect();
-    let (found, part) = py.detach(|| candidates(&pixels, size[1], palm_px));
-    let mut labels = vec![0; pixels.len()];
-    for (row, values) in part.values.chunks_exact(part.size[1].max(1)).enumerate() {
-        labels[(part.first[0] + row) * size[1] + part.first[1]..][..values.len()].copy_from_slice(values);
-    }
-    Ok((found.iter().map(told).collect(), PyArray1::from_vec(py, labels).reshape(size)?))
-}
-
-fn eye(world_from_sensor: &PyReadonlyArray2<'_, f64>, intrinsics: [f64; 4]) -> PyResult<Eye> {
-    Ok(Eye { world_from_sensor: rows_of("world_from_sensor", world_from_sensor)?, intrinsics })
-}
-
-/// Two columns of what a function of Python makes of some rows.
-pub fn pairs<'py, const N: usize>(function: &Bound<'py, PyAny>, rows: &[[f64; N]]) -> PyResult<Vec<[f64; 2]>> {
-    let py = function.py();
-    let array = PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), N])?;
-    let found: PyReadonlyArray2<'py, f64> = function.call1((array,))?.extract()?;
-    if found.dims() != numpy::Ix2(rows.len(), 2) {
-        let text = format!("lens: expected two columns of {} rows, found {:?}", rows.len(), found.shape());
-        return Err(exception(py, "MeasurementError", text));
-    }
-    Ok(found.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect())
-}
-
 /// Places before a camera, and their pixels.
 type Before = (Vec<[f64; 3]>, Vec<[f64; 2]>);
 
 /// Places of the world before a camera, metres, and their columns and rows; NaN behind it, and where its lens shows nothing.
-pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>, project: Option<&Bound<'_, PyAny>>) -> PyResult<Before> {
+pub fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> Before {
     let inside: Vec<[f64; 3]> = places.map(|place| eye.in_sensor(place).to_array()).collect();
-    let pixel = |place: &[f64; 3]| if place[2] > 0.0 { eye.pixel(Vec3::from_array(*place)) } else { [f64::NAN; 2] };
-    let pixels = match project {
-        Some(project) => pairs(project, &inside)?,
-        None => inside.iter().map(pixel).collect(),
-    };
-    Ok((inside, pixels))
+    let pixels = inside.iter().map(|place| eye.pixel(Vec3::from_array(*place))).collect();
+    (inside, pixels)
 }
 
 fn image_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<(&'a [[u8; 3]], [usize; 2])> {
@@ -85,6 +48,7 @@ fn image_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<(&'a [[u8; 3]],
     Ok((image.as_slice()?.as_chunks().0, [size[0], size[1]]))
 }
 
+#[doc = stub!("SkinTeacher")]
 #[pyclass(name = "SkinTeacher", module = "voodoo._core")]
 #[derive(Default)]
 pub struct PySkinTeacher(Teacher);
@@ -108,7 +72,7 @@ impl PySkinTeacher {
     }
 
     /// Learns colours and background from a picture.
-    #[pyo3(signature = (cue, image, places, *, world_from_sensor, intrinsics, project, half_life, every, settled))]
+    #[pyo3(signature = (cue, image, places, *, world_from_sensor, camera, half_life, every, settled))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn learn<'py>(
         &mut self,
@@ -117,15 +81,15 @@ impl PySkinTeacher {
         image: Option<PyReadonlyArray3<'py, u8>>,
         places: PyReadonlyArray2<'py, f64>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        project: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         half_life: f64,
         every: u32,
         settled: u32,
     ) -> PyResult<()> {
-        let eye = eye(&world_from_sensor, intrinsics)?;
+        let camera = camera_of(camera)?;
+        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = rows("places", &places)?.iter().map(|place| Vec3::from_array(*place));
-        let (inside, pixels) = before(&eye, places, project)?;
+        let (inside, pixels) = before(&eye, places);
         let shown = |(site, (place, pixel)): (usize, (&[f64; 3], &[f64; 2]))| {
             let seen = place[2] > 0.1 && pixel.iter().all(|value| value.is_finite());
             let found = cue.cue.assigned.iter().any(|(other, _)| *other == site);
@@ -139,6 +103,7 @@ impl PySkinTeacher {
     }
 }
 
+#[doc = stub!("SkinCue")]
 #[pyclass(name = "SkinCue", module = "voodoo._core")]
 pub struct PySkinCue {
     cue: SkinCue,
@@ -185,7 +150,7 @@ impl PySkinCue {
 
     #[getter]
     fn candidates(&self) -> Vec<Place> {
-        self.cue.candidates().iter().map(told).collect()
+        self.cue.candidates.iter().map(told).collect()
     }
 
     #[getter]
@@ -205,10 +170,11 @@ impl PySkinCue {
             .collect()
     }
 
-    /// Looks for regions of skin and follows them; where their candidates are, none without any.
-    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, intrinsics, lens, body, settled, arm_lost, upper_arm_visible))]
+    /// Finds regions of skin in a picture, follows and names them: of each site that was found its number, a point and the direction
+    /// of its ray, its place, and its expected depth.
+    #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, camera, body, settled, arm_lost, upper_arm_visible, tracker, others))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
-    fn look<'py>(
+    fn observe<'py>(
         &mut self,
         py: Python<'py>,
         teacher: &PySkinTeacher,
@@ -216,14 +182,14 @@ impl PySkinCue {
         predicted: &Bound<'py, PyAny>,
         stamp: f64,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        intrinsics: [f64; 4],
-        lens: Option<&Bound<'py, PyAny>>,
+        camera: &Bound<'py, PyAny>,
         body: Option<&PyBodyView>,
         settled: bool,
         arm_lost: Vec<bool>,
         upper_arm_visible: Vec<bool>,
-    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let eye = eye(&world_from_sensor, intrinsics)?;
+        tracker: Option<TrackedBody<'py>>,
+        others: Vec<TrackedBody<'py>>,
+    ) -> PyResult<Vec<Ray<'py>>> {
         let count = self.arms.len();
         if arm_lost.len() != count || upper_arm_visible.len() != count {
             let found = [arm_lost.len(), upper_arm_visible.len()];
@@ -233,63 +199,37 @@ impl PySkinCue {
                 format!("arms: expected {count} marks each, found {found:?}"),
             ));
         }
-        let known = |place: &Vec3| !place.is_nan();
         let mut expected = Vec::new();
         for (site, names) in self.arms.iter().enumerate() {
             let places = places_of(predicted, names.iter().map(String::as_str))?;
-            let [here, shoulder, elbow, hand] = [0, 1, 2, 3].map(|index| places[index].filter(known));
-            let Some(here) = here else { continue };
-            let inside = eye.in_sensor(here);
-            if inside.is_finite() && inside.z > 0.1 {
-                expected.push(Expected {
-                    site,
-                    head: self.cue.settings.is_head(site),
-                    place: here,
-                    depth: inside.z,
-                    arm: [shoulder, elbow, hand],
-                    arm_lost: arm_lost[site],
-                    upper_arm_visible: upper_arm_visible[site],
-                });
-            }
+            let [here, shoulder, elbow, hand] = [0, 1, 2, 3].map(|index| places[index].filter(|place| !place.is_nan()));
+            let Some(place) = here else { continue };
+            expected.push(Expected {
+                site,
+                head: self.cue.settings.is_head(site),
+                place,
+                arm: [shoulder, elbow, hand],
+                arm_lost: arm_lost[site],
+                upper_arm_visible: upper_arm_visible[site],
+            });
         }
         let (image, size) = image_of(&image)?;
-        let look = Look {
+        let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
+        let camera = camera_of(camera)?;
+        let input = SkinInput {
             image,
             size,
             stamp,
-            focal: eye.focal(),
+            eye: Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera },
             body: body.map(|body| &body.0),
             teacher: &teacher.0,
-            expected: &expected,
             settled,
+            expected: &expected,
+            tracker: tracker.as_ref().map(TrackedBody::tracker).transpose()?,
+            others: &others,
         };
-        py.detach(|| self.cue.look(&look)).map_err(|error| error.into_py(py))?;
-        if self.cue.candidates().is_empty() {
-            return Ok(None);
-        }
-        let pixels: Vec<[f64; 2]> = self.cue.candidates().iter().map(|item| item.pixel).collect();
-        let flat = match lens {
-            Some(lens) => pairs(lens, &pixels)?,
-            None => pixels.iter().map(|pixel| eye.undistorted(*pixel)).collect(),
-        };
-        let directions: Vec<Vec3> = flat.into_iter().map(|xy| eye.direction(xy)).collect();
-        let sights = self.cue.place(&directions, eye.origin(), eye.axis()).map_err(|error| error.into_py(py))?;
-        let places = sights.iter().flat_map(|sight| sight.place.to_array()).collect();
-        PyArray1::from_vec(py, places).reshape([sights.len(), 3]).map(Some)
-    }
-
-    /// Which candidate each site is: its number, a point and the direction of its ray, its place, and its expected depth.
-    #[pyo3(signature = (limbs, away, strangers=None))]
-    fn name<'py>(
-        &mut self,
-        py: Python<'py>,
-        limbs: Vec<String>,
-        away: PyReadonlyArray2<'py, f32>,
-        strangers: Option<PyReadonlyArray1<'py, f32>>,
-    ) -> PyResult<Vec<Ray<'py>>> {
-        let limbs = LimbDistances { names: limbs, away: away.as_slice()?.to_vec() };
-        let strangers = strangers.as_ref().map(|away| away.as_slice()).transpose()?;
-        let found = self.cue.name(&limbs, strangers).map_err(|error| error.into_py(py))?;
+        let cue = &mut self.cue;
+        let found = py.detach(|| cue.observe(&input)).map_err(|error| error.into_py(py))?;
         let row = |place: Vec3| PyArray1::from_slice(py, &place.to_array());
         let told = found.iter();
         Ok(told

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,22 +10,27 @@ use voodoo_core::math::Vec3;
 use voodoo_core::observation::picture::ColorImage;
 use voodoo_core::{Body, Frame, Tracker};
 
-use crate::arrays::{PointArray, limb_poses, vector};
+use crate::arrays::{PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
 use crate::borrowed::{ColorArray, ColorView};
 use crate::config::config;
+use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
+use crate::people::TrackedBody;
 use crate::shape::PyShape;
 
+#[doc = stub!("Tracker")]
 #[pyclass(name = "Tracker", module = "voodoo._core")]
 pub struct PyTracker {
-    tracker: Tracker,
+    pub tracker: Tracker,
     names: Arc<Names>,
     sources: Vec<String>,
     /// Names of the cameras of colour pictures, in the order of their numbers.
     cameras: Vec<String>,
+    /// Steps in which the detector failed.
+    detector_failures: usize,
 }
 
 /// Named positions with the indices of their sites.
@@ -38,13 +43,17 @@ pub fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(
     joints.iter().map(place).collect()
 }
 
-/// Places from an array (N, 3).
-pub fn places(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec3>> {
-    if array.dims()[1] != 3 {
-        let text = format!("sites: expected shape (N, 3), found {:?}", array.shape());
-        return Err(exception(array.py(), "MeasurementError", text));
-    }
-    Ok(array.as_array().rows().into_iter().map(|row| Vec3::new(row[0], row[1], row[2])).collect())
+/// Length of body between each of some places (N, 3) and a camera's focal point, metres.
+#[pyfunction]
+pub fn body_before<'py>(
+    tracker: TrackedBody<'py>,
+    sites: PyReadonlyArray2<'py, f64>,
+    camera: [f64; 3],
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let py = sites.py();
+    let places: Vec<Vec3> = rows("sites", &sites)?.iter().map(|place| Vec3::from_array(*place)).collect();
+    let found = tracker.tracker()?.body_before(&places, Vec3::from_array(camera));
+    Ok(PyArray1::from_vec(py, found.map_err(|error| error.into_py(py))?))
 }
 
 impl PyTracker {
@@ -76,7 +85,7 @@ impl PyTracker {
         let mut colors = Vec::with_capacity(views.len());
         for view in views {
             let name = &frame.sources[usize::from(view.data.source)];
-            if view.data.distorted {
+            if view.data.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
                 return Err(exception(py, "MeasurementError", text));
             }
@@ -93,10 +102,13 @@ impl PyTracker {
 #[pymethods]
 impl PyTracker {
     #[new]
-    fn new(body: &PyBody, values: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
+    fn new(body: &PyBody, values: &Bound<'_, PyDict>, detector: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
+        if let Some(found) = self::detector(detector)? {
+            tracker = tracker.with_detector(found);
+        }
         let names = Arc::new(Names::of(tracker.body()));
-        Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new() })
+        Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new(), detector_failures: 0 })
     }
 
     fn _body(&self) -> PyBody {
@@ -125,6 +137,17 @@ impl PyTracker {
         Ok(self.snapshot())
     }
 
+    /// Whether somebody is looked for while there is no pose.
+    #[getter]
+    fn can_search(&self) -> bool {
+        self.tracker.can_search()
+    }
+
+    #[getter]
+    fn detector_failures(&self) -> usize {
+        self.detector_failures
+    }
+
     /// One frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = frame.borrow_for(py, self.tracker.body())?;
@@ -142,6 +165,8 @@ impl PyTracker {
         let tracker = &mut self.tracker;
         py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
         self.sources.clone_from(&frame.sources);
+        self.detector_failures += usize::from(self.tracker.detector_error().is_some());
+        warn_of_detector(py, self.tracker.detector_error())?;
         Ok(self.snapshot())
     }
 
@@ -176,7 +201,10 @@ impl PyTracker {
         let likely = PyDict::new(py);
         for ((pixels, picture), view) in found.into_iter().zip(&colors).zip(&views) {
             let name = &frame.sources[usize::from(view.data.source)];
-            likely.set_item(name, PyArray1::from_vec(py, pixels).reshape([picture.height, picture.width])?)?;
+            likely.set_item(
+                name,
+                PyArray1::from_vec(py, pixels).reshape([picture.camera.height(), picture.camera.width()])?,
+            )?;
         }
         Ok(likely)
     }
@@ -219,18 +247,6 @@ impl PyTracker {
         let slice = view.slice()?;
         let distances = py.detach(|| self.tracker.distance(slice)).map_err(|error| error.into_py(py))?;
         Ok(PyArray1::from_vec(py, distances))
-    }
-
-    /// Length of body between each of some places (N, 3) and a camera's focal point, metres.
-    fn body_before<'py>(
-        &self,
-        sites: PyReadonlyArray2<'py, f64>,
-        camera: [f64; 3],
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let py = sites.py();
-        let places = places(&sites)?;
-        let found = self.tracker.body_before(&places, Vec3::from_array(camera)).map_err(|error| error.into_py(py))?;
-        Ok(PyArray1::from_vec(py, found))
     }
 
     /// Signed distances `(limbs, N)` of world points `(N, 3)` to every limb of the posed body, metres, negative inside.

@@ -7,8 +7,9 @@ use std::sync::Arc;
 use crate::registration::{MeasuredPixels, ProjectedPoints};
 use crate::still::still;
 use crate::window::Window;
+use voodoo_core::camera::Camera;
 use voodoo_core::error::TrackError;
-use voodoo_core::observation::depth_view::NEAREST_SEEN;
+use voodoo_core::math::Vec3;
 use voodoo_core::observation::frame::DepthPixels;
 
 /// A pose whose entries change by less is that of a camera that stands.
@@ -112,11 +113,6 @@ impl StillDepth {
         self.last.push_back(Arc::new(z));
         Ok(found)
     }
-
-    /// The farthest that was seen in each pixel, metres.
-    pub fn farthest(&self) -> &[f32] {
-        &self.farthest
-    }
 }
 
 /// A depth camera beside a colour camera, and where the body is expected.
@@ -126,12 +122,8 @@ pub struct Beside<'a> {
     pub image: DepthPixels<'a>,
     /// Metres each of their units is.
     pub metres_per_unit: f64,
-    /// Rows and columns of the depth camera.
-    pub size: [usize; 2],
-    /// Its focal lengths and middle, pixels; none: its lens distorts.
-    pub intrinsics: Option<[f64; 4]>,
-    /// `(x/z, y/z)` of every pixel of it, row by row.
-    pub rays: &'a [[f32; 2]],
+    /// The depth camera.
+    pub camera: &'a Camera,
     /// Its pose.
     pub world_from_depth: Matrix,
     /// From its frame to the colour camera's.
@@ -171,9 +163,10 @@ impl Beside<'_> {
     /// # Errors
     /// [`TrackError::Measurement`] when sizes do not fit together.
     pub fn nearby(&self, scene: Option<&mut StillDepth>) -> Result<Nearby, TrackError> {
-        let (size, step) = (self.size.map(|size| size.div_ceil(self.step.max(1))), self.step.max(1));
-        if self.size[0].checked_mul(self.size[1]) != Some(self.image.len()) {
-            let found = format!("{} for {:?}", self.image.len(), self.size);
+        let (whole, step) = ([self.camera.height(), self.camera.width()], self.step.max(1));
+        let size = whole.map(|size| size.div_ceil(step));
+        if self.camera.pixels() != self.image.len() {
+            let found = format!("{} for {whole:?}", self.image.len());
             return Err(TrackError::measurement("depth", "a depth for every pixel of the camera", found));
         }
         let (low, high) = self.bounds();
@@ -181,7 +174,7 @@ impl Beside<'_> {
         let mut scene = scene;
         let depth = self.metres(scene.as_mut().map_or_else(Vec::new, |scene| scene.image()));
         let within = [rows.clone(), columns.clone()];
-        let window = Window { depth: &depth, size, rays: self.rays, camera: self.size, step, rows, columns };
+        let window = Window { depth: &depth, size, camera: self.camera, step, rows, columns };
         let (points, pixels) = window.within(low, high, &self.world_from_depth, &self.color_from_depth)?;
         let standing = match scene {
             Some(scene) => scene.see(depth, size, &self.world_from_depth, within)?,
@@ -194,7 +187,7 @@ impl Beside<'_> {
 
     /// Every step-th row and column, metres, into memory.
     fn metres(&self, mut metres: Vec<f32>) -> Vec<f32> {
-        let (scale, width, step) = (self.metres_per_unit as f32, self.size[1].max(1), self.step.max(1));
+        let (scale, width, step) = (self.metres_per_unit as f32, self.camera.width(), self.step.max(1));
         fn every<T: Copy>(pixels: &[T], width: usize, step: usize) -> impl Iterator<Item = T> {
             pixels.chunks(width).step_by(step).flat_map(move |row| row.iter().step_by(step)).copied()
         }
@@ -222,35 +215,21 @@ impl Beside<'_> {
         ([0, 1, 2].map(|axis| least(axis) - self.margin), [0, 1, 2].map(|axis| most(axis) + self.margin))
     }
 
-    /// Rows and columns of the depth image that can show the box between two corners; all where the lens distorts.
+    /// Rows and columns of the depth image that can show the box between two corners.
     fn window(&self, low: [f64; 3], high: [f64; 3]) -> [Range<usize>; 2] {
-        let all = self.size.map(|size| 0..size);
-        let Some([fx, fy, cx, cy]) = self.intrinsics else { return all };
-        let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for corner in 0..8 {
-            let place = [0, 1, 2].map(|axis| if corner >> axis & 1 == 1 { high[axis] } else { low[axis] });
-            let [x, y, z] = self.in_depth(place);
-            if !(z >= NEAREST_SEEN) {
-                return all;
-            }
-            for (axis, value) in [y / z * fy + cy, x / z * fx + cx].into_iter().enumerate() {
-                (least[axis], most[axis]) = (least[axis].min(value), most[axis].max(value));
-            }
-        }
-        let within = |value: f64, size: usize| value.clamp(0.0, size as f64) as usize;
-        [0, 1].map(|axis| {
-            let size = self.size[axis];
-            within(least[axis].floor(), size)..within(most[axis].ceil() + 1.0, size)
-        })
+        let corner = |index: usize| {
+            let place = [0, 1, 2].map(|axis| if index >> axis & 1 == 1 { high[axis] } else { low[axis] });
+            Vec3::from_array(self.in_depth(place))
+        };
+        let [columns, rows] = self.camera.window((0..8).map(corner));
+        [rows, columns]
     }
 }
 
 impl Nearby {
-    /// Columns and rows of the points, for a lens without distortion; NaN for points at or behind the camera.
-    pub fn projected(&self, [fx, fy, cx, cy]: [f64; 4]) -> Vec<[f64; 2]> {
-        let seen = |[x, y, z]: &[f64; 3]| {
-            if *z > 0.0 { [x / z * fx + cx, y / z * fy + cy] } else { [f64::NAN; 2] }
-        };
+    /// Columns and rows of the points in the picture of the color camera; NaN where it does not see them.
+    pub fn projected(&self, camera: &Camera) -> Vec<[f64; 2]> {
+        let seen = |point: &[f64; 3]| camera.project(Vec3::from_array(*point)).unwrap_or([f64::NAN; 2]);
         self.points.iter().map(seen).collect()
     }
 
@@ -298,23 +277,48 @@ mod tests {
         hand[11] = f32::NAN;
         let (still, before) = scene.see(hand, [3, 4], &LEVEL, [0..3, 0..4]).unwrap().unwrap();
         assert_eq!((still[5], before[5], still[0]), (false, true, true));
-        assert!(scene.farthest()[11].is_nan() && twin.farthest() == [3.0; 12]);
+        assert!(scene.farthest[11].is_nan() && *twin.farthest == [3.0; 12]);
         let moved = [[1.0, 0.0, 0.0, 0.01], LEVEL[1], LEVEL[2], LEVEL[3]];
         assert!(scene.see(vec![3.0; 12], [3, 4], &moved, [0..3, 0..4]).unwrap().is_none());
+    }
+
+    #[test]
+    fn noise_is_not_before_the_scene_but_a_hand_that_came_is_and_stays_so() {
+        let mut scene = StillDepth::default();
+        let (size, hand) =
+            ([60, 80], |index: usize| (20..30).contains(&(index / 80)) && (30..40).contains(&(index % 80)));
+        let mut found = None;
+        for step in 0..20_u32 {
+            // Of three hundredths of a metre to either side, another in every pixel and picture.
+            let noise =
+                |index: usize| (step * 4800 + index as u32).wrapping_mul(2_654_435_761) as f32 / u32::MAX as f32;
+            let depth = |index: usize| {
+                if step >= 8 && hand(index) { 2.5 } else { 3.0 + 0.06 * (noise(index) - 0.5) }
+            };
+            found = scene.see((0..4800).map(depth).collect(), size, &LEVEL, [0..60, 0..80]).unwrap();
+            assert_eq!(found.is_some(), step as usize >= STAYS_PICTURES);
+        }
+        let (still, before) = found.unwrap();
+        let within = |index: usize, margin: usize| {
+            let (row, column) = (index / 80, index % 80);
+            (20 + margin..30 - margin).contains(&row) && (30 + margin..40 - margin).contains(&column)
+        };
+        let around = |index: usize| (19..31).contains(&(index / 80)) && (29..41).contains(&(index % 80));
+        assert!((0..4800).filter(|index| within(*index, 1)).all(|index| before[index] && !still[index]));
+        let outside: Vec<usize> = (0..4800).filter(|index| !around(*index)).collect();
+        assert!(outside.iter().all(|index| !before[*index]));
+        assert!(20 * outside.iter().filter(|index| !still[**index]).count() < outside.len());
     }
 
     #[test]
     fn the_body_is_looked_for_in_its_box_alone() {
         let mut image = vec![4000_u16; 24 * 16];
         (6..10).for_each(|row| image[row * 24 + 8..row * 24 + 12].fill(2000));
-        let rays: Vec<[f32; 2]> =
-            (0..16).flat_map(|v| (0..24).map(move |u| [(u as f32 - 11.5) / 20.0, (v as f32 - 7.5) / 20.0])).collect();
+        let camera = Camera::pinhole(24, 16, [20.0, 20.0, 11.5, 7.5]).unwrap();
         let beside = Beside {
             image: DepthPixels::U16(&image),
             metres_per_unit: 0.001,
-            size: [16, 24],
-            intrinsics: Some([20.0, 20.0, 11.5, 7.5]),
-            rays: &rays,
+            camera: &camera,
             world_from_depth: LEVEL,
             color_from_depth: LEVEL,
             step: 1,
@@ -324,12 +328,13 @@ mod tests {
         assert_eq!(beside.away(), 2.0);
         let nearby = beside.nearby(None).unwrap();
         assert_eq!(nearby.points.len(), 16);
-        let pixels = nearby.projected([20.0, 20.0, 11.5, 7.5]);
+        let pixels = nearby.projected(&camera);
         let view = nearby.view(pixels, &vec![false; 24 * 16], 1, [16, 24]).unwrap();
         assert_eq!(view.mask.iter().filter(|pixel| **pixel).count(), 36);
         assert!((view.depths[0] - 2.0).abs() < 1e-6 && view.mask[5 * 24 + 7] && !view.mask[4 * 24 + 7]);
-        let coarse = Beside { step: 2, intrinsics: None, ..beside };
+        let coarse = Beside { step: 2, ..beside };
         assert_eq!(coarse.nearby(None).unwrap().points.len(), 4);
-        assert!(Beside { size: [16, 23], ..beside }.nearby(None).is_err());
+        let narrow = Camera::pinhole(23, 16, [20.0, 20.0, 11.5, 7.5]).unwrap();
+        assert!(Beside { camera: &narrow, ..beside }.nearby(None).is_err());
     }
 }

@@ -1,12 +1,58 @@
 //! Where points that were measured some time before the frame are at its time: each goes on with the limb that it lies on.
 
 use crate::body_view::Matrix;
+use voodoo_core::Tracker;
+use voodoo_core::error::TrackError;
+use voodoo_core::math::matrix;
+use voodoo_core::observation::frame::PointSlice;
 
+/// Points farther than this from every limb are the scene's and stay, metres.
+const NEAR: f64 = 0.20;
+/// A limb that is faster has jumped, metres a second; its points stay.
+const FASTEST_LIMB: f64 = 8.0;
+/// Points go on for so long at most, seconds...
+const LONGEST: f64 = 0.1;
+/// ... and those of no longer ago than this stay.
+const SAME_TIME: f64 = 1e-3;
 /// No limb is longer, metres: what is farther from all their origins is on none.
 const LONGEST_LIMB: f64 = 1.0;
 
+/// Where points that a sensor measured `elapsed` seconds before the tracker's next frame are at its time, in the sensor's frame (without
+/// its pose: the world), metres: those on a limb go on with it, the others stay. None where nothing moves.
+///
+/// # Errors
+/// [`TrackError`] when points near the body are not finite.
+pub fn carried(
+    points: PointSlice,
+    tracker: &Tracker,
+    elapsed: f64,
+    world_from_sensor: Option<&Matrix>,
+) -> Result<Option<Vec<[f64; 3]>>, TrackError> {
+    let Some(motion) = tracker.limb_motion().filter(|_| elapsed.abs() >= SAME_TIME) else { return Ok(None) };
+    let [poses, before] = [motion.now, motion.before].map(|poses| poses.iter().map(matrix).collect::<Vec<_>>());
+    let carrying = Carrying {
+        poses: &poses,
+        before: &before,
+        interval: motion.interval,
+        elapsed: elapsed.clamp(-LONGEST, LONGEST),
+        near: NEAR,
+        share: tracker.config().prediction,
+        max_speed: FASTEST_LIMB,
+    };
+    let mut moved: Vec<[f64; 3]> = (0..points.len()).map(|index| points.get(index).to_array()).collect();
+    world_from_sensor.iter().for_each(|pose| in_world(&mut moved, pose));
+    let around = carrying.around(&moved);
+    if !around.is_empty() {
+        let chosen: Vec<[f64; 3]> = around.iter().map(|index| moved[*index]).collect();
+        let away = tracker.limb_distances(PointSlice::F64(&chosen))?.concat();
+        carrying.carry(&mut moved, &around, &away);
+    }
+    world_from_sensor.iter().for_each(|pose| in_sensor(&mut moved, pose));
+    Ok(Some(moved))
+}
+
 /// Places of the world of points in a sensor's frame, metres.
-pub fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
+fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
     for point in points {
         let [x, y, z] = *point;
         *point = [0, 1, 2].map(|axis| pose[axis][0] * x + pose[axis][1] * y + pose[axis][2] * z + pose[axis][3]);
@@ -14,7 +60,7 @@ pub fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
 }
 
 /// The other way round.
-pub fn in_sensor(points: &mut [[f64; 3]], pose: &Matrix) {
+fn in_sensor(points: &mut [[f64; 3]], pose: &Matrix) {
     for point in points {
         let offset = [0, 1, 2].map(|axis| point[axis] - pose[axis][3]);
         // Of a rigid pose the inverse turns back.
@@ -24,26 +70,26 @@ pub fn in_sensor(points: &mut [[f64; 3]], pose: &Matrix) {
 
 /// How limbs moved, and how far points may go on with them.
 #[derive(Clone, Copy, Debug)]
-pub struct Carrying<'a> {
+struct Carrying<'a> {
     /// Poses of all limbs.
-    pub poses: &'a [Matrix],
+    poses: &'a [Matrix],
     /// Those of an estimate before.
-    pub before: &'a [Matrix],
+    before: &'a [Matrix],
     /// Time between the two, seconds.
-    pub interval: f64,
+    interval: f64,
     /// For so long points go on, seconds.
-    pub elapsed: f64,
+    elapsed: f64,
     /// Points farther than this from every limb are the scene's and stay, metres.
-    pub near: f64,
+    near: f64,
     /// Of the limbs' velocity that is believed.
-    pub share: f64,
+    share: f64,
     /// A limb that is faster has jumped, metres a second; its points stay.
-    pub max_speed: f64,
+    max_speed: f64,
 }
 
 impl Carrying<'_> {
     /// Which points may be on a limb.
-    pub fn around(&self, points: &[[f64; 3]]) -> Vec<usize> {
+    fn around(&self, points: &[[f64; 3]]) -> Vec<usize> {
         let origins = || self.poses.iter().map(|pose| [0, 1, 2].map(|axis| pose[axis][3]));
         let low = origins().fold([f64::INFINITY; 3], |low, place| [0, 1, 2].map(|axis| place[axis].min(low[axis])));
         let high =
@@ -55,7 +101,7 @@ impl Carrying<'_> {
     }
 
     /// Moves those points that may be on a limb, by their distances from each limb, limb by limb, metres.
-    pub fn carry(&self, points: &mut [[f64; 3]], around: &[usize], away: &[f32]) {
+    fn carry(&self, points: &mut [[f64; 3]], around: &[usize], away: &[f32]) {
         let count = around.len();
         if self.poses.len() != self.before.len() || away.len() != count * self.poses.len() {
             return;

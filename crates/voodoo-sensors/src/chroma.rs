@@ -145,6 +145,28 @@ impl Counter {
 mod tests {
     use super::*;
 
+    #[test]
+    fn bins_are_those_of_opencv() {
+        // (blue, green, red), and what cvtColor(COLOR_BGR2YCrCb) of OpenCV 5.0 makes of it: luma, Cr, Cb.
+        let known = [
+            ([17, 9, 28], [16, 137, 129]),
+            ([30, 21, 8], [18, 121, 135]),
+            ([255, 255, 255], [255, 128, 128]),
+            ([0, 0, 0], [0, 128, 128]),
+            ([255, 0, 0], [29, 107, 255]),
+            ([0, 255, 0], [150, 21, 43]),
+            ([0, 0, 255], [76, 255, 85]),
+            ([66, 39, 106], [62, 159, 130]),
+            ([213, 171, 45], [138, 62, 170]),
+            ([167, 57, 69], [73, 125, 181]),
+            ([153, 178, 215], [186, 149, 109]),
+        ];
+        for (color, [luma, cr, cb]) in known {
+            let dark = if luma < 30 { DARK } else { 0 };
+            assert_eq!(bins(&[color]), [(cr >> 2) * 512 + (cb >> 2) * 8 + (luma >> 5) + dark], "{color:?}");
+        }
+    }
+
     /// Luma and chroma by the definition, in double precision.
     fn defined([b, g, r]: [u8; 3]) -> [f64; 3] {
         let [b, g, r] = [b, g, r].map(f64::from);

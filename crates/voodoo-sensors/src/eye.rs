@@ -1,21 +1,23 @@
-//! A camera of pictures: where it stands, and without distortion where a place is in its picture.
+//! A camera of pictures and where it stands.
 
 use crate::body_view::Matrix;
+use voodoo_core::camera::Camera;
 use voodoo_core::math::Vec3;
 
-/// A camera, by its pose and what a pinhole of it would be.
+/// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
-pub struct Eye {
+pub struct Eye<'a> {
     /// Its pose.
     pub world_from_sensor: Matrix,
-    /// Focal lengths and middle, pixels.
-    pub intrinsics: [f64; 4],
+    /// Its calibration.
+    pub camera: &'a Camera,
 }
 
-impl Eye {
+impl Eye<'_> {
     /// Focal length, pixels.
     pub fn focal(&self) -> f64 {
-        (self.intrinsics[0] * self.intrinsics[1]).sqrt()
+        let [fx, fy] = self.camera.focal();
+        (fx * fy).sqrt()
     }
 
     /// Focal point in the world, metres.
@@ -38,16 +40,14 @@ impl Eye {
         Vec3::from_array([0, 1, 2].map(|column| offset.dot(self.column(column))))
     }
 
-    /// Column and row of a place in the camera's frame; for a lens without distortion.
+    /// Column and row of a place in the camera's frame; NaN where it is not seen.
     pub fn pixel(&self, place: Vec3) -> [f64; 2] {
-        let [fx, fy, cx, cy] = self.intrinsics;
-        [place.x / place.z * fx + cx, place.y / place.z * fy + cy]
+        self.camera.project(place).unwrap_or([f64::NAN; 2])
     }
 
-    /// `(x/z, y/z)` of a pixel; for a lens without distortion.
-    pub fn undistorted(&self, [u, v]: [f64; 2]) -> [f64; 2] {
-        let [fx, fy, cx, cy] = self.intrinsics;
-        [(u - cx) / fx, (v - cy) / fy]
+    /// `(x/z, y/z)` of a pixel; NaN where the lens puts nothing.
+    pub fn undistorted(&self, pixel: [f64; 2]) -> [f64; 2] {
+        self.camera.ray(pixel).unwrap_or([f64::NAN; 2])
     }
 
     /// Unit vector in the world through `(x/z, y/z)`.
@@ -57,14 +57,18 @@ impl Eye {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use voodoo_core::camera::Lens;
 
     #[test]
     fn the_ray_behind_a_pixel_leads_to_what_is_seen_there() {
         let world_from_sensor =
             [[0.0, 0.0, 1.0, 0.5], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.2], [0.0, 0.0, 0.0, 1.0]];
-        let eye = Eye { world_from_sensor, intrinsics: [300.0, 310.0, 159.5, 119.5] };
+        let lens = Lens::PlumbBob([-0.2, 0.05, 0.001, 0.0, 0.0]);
+        let camera = Camera::new(320, 240, [300.0, 310.0, 159.5, 119.5], lens).unwrap();
+        let eye = Eye { world_from_sensor, camera: &camera };
         let place = Vec3::new(2.5, 0.3, 1.7);
         let inside = eye.in_sensor(place);
         assert!((inside - Vec3::new(-0.3, -0.5, 2.0)).length() < 1e-12);

@@ -51,7 +51,7 @@ impl Part {
 #[derive(Clone, Copy, Debug)]
 pub struct Sensor<'a> {
     /// Where it stands.
-    pub eye: Eye,
+    pub eye: Eye<'a>,
     /// Its name.
     pub source: &'a str,
     /// Standard deviation of a keypoint that is believed, pixels.
@@ -190,7 +190,8 @@ mod tests {
     fn what_was_seen_becomes_a_ray_or_a_place_or_is_dropped() {
         let world_from_sensor =
             [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-        let eye = Eye { world_from_sensor, intrinsics: [300.0, 300.0, 160.0, 120.0] };
+        let camera = voodoo_core::Camera::pinhole(320, 240, [300.0, 300.0, 160.0, 120.0]).unwrap();
+        let eye = Eye { world_from_sensor, camera: &camera };
         let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
         let seen = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
         let sighting =

@@ -215,6 +215,83 @@ mod tests {
         assert!(regions(&[], 0).0.is_empty() && regions(&[0; 6], 3).0.is_empty());
     }
 
+    /// Numbers of the regions in each pixel, by filling one after the other.
+    fn flooded(mask: &[u8], width: usize) -> Vec<i32> {
+        let mut labels = vec![0; mask.len()];
+        let mut count = 0;
+        for start in 0..mask.len() {
+            if mask[start] == 0 || labels[start] != 0 {
+                continue;
+            }
+            count += 1;
+            let mut open = vec![start];
+            while let Some(index) = open.pop() {
+                if mask[index] == 0 || labels[index] != 0 {
+                    continue;
+                }
+                labels[index] = count;
+                let (row, column) = (index / width, index % width);
+                for row in row.saturating_sub(1)..(row + 2).min(mask.len() / width) {
+                    open.extend((column.saturating_sub(1)..(column + 2).min(width)).map(|column| row * width + column));
+                }
+            }
+        }
+        labels
+    }
+
+    #[test]
+    fn regions_are_those_that_filling_finds() {
+        let mut state = 3_u32;
+        for _ in 0..60 {
+            let mut next = || {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                state >> 16
+            };
+            let (height, width) = (1 + next() as usize % 30, 1 + next() as usize % 40);
+            let share = 20 + next() % 40;
+            let mask: Vec<u8> = (0..height * width).map(|_| u8::from(next() % 100 < share)).collect();
+            let (found, labels) = regions(&mask, width);
+            let flooded = flooded(&mask, width);
+            let mut pairs: Vec<(i32, i32)> = labels.iter().copied().zip(flooded).collect();
+            pairs.sort_unstable();
+            pairs.dedup();
+            assert!(pairs.iter().filter(|(own, _)| *own > 0).count() == found.len(), "one to one");
+            assert!(pairs.iter().all(|(own, other)| (*own == 0) == (*other == 0)));
+            for (region, number) in found.iter().zip(1..) {
+                let pixels = || (0..mask.len()).filter(|index| labels[*index] == number);
+                let span = |of: fn(usize, usize) -> usize| {
+                    let places = || pixels().map(|index| of(index, width));
+                    (places().min().unwrap(), places().max().unwrap() + 1, places().sum::<usize>())
+                };
+                let (rows, columns) = (span(|index, width| index / width), span(|index, width| index % width));
+                let expected = Region {
+                    rows: (rows.0, rows.1),
+                    columns: (columns.0, columns.1),
+                    area: pixels().count(),
+                    sums: [columns.2, rows.2],
+                };
+                assert_eq!(*region, expected);
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_shadow_parts_is_one_hand_and_arms_stay_apart() {
+        let (width, palm) = (240, 5.4);
+        let mut mask = vec![0; width * 160];
+        let mut fill = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+            rows.for_each(|row| mask[row * width..][columns.clone()].fill(1));
+        };
+        // Palm and fingers, and two forearms.
+        fill(100..108, 100..108);
+        fill(110..118, 100..108);
+        fill(100..150, 200..208);
+        fill(100..150, 210..218);
+        let (_, labels) = regions(&joined(&mask, width, 3.0 * palm), width);
+        let at = |row: usize, column: usize| labels[row * width + column];
+        assert!(at(104, 104) == at(114, 104) && at(104, 104) != 0 && at(120, 204) != at(120, 214));
+    }
+
     #[test]
     fn only_short_regions_are_joined_and_sizes_are_checked() {
         let mask = [[1, 0, 1, 1, 0, 0, 0], [1, 0, 1, 1, 0, 0, 0]].concat();
@@ -235,5 +312,135 @@ mod tests {
         assert_eq!(look(before).unwrap().1[..4], [1, 1, 1, 0]);
         assert!(look(SkinPicture { width: 5, ..picture }).is_err());
         assert!(look(SkinPicture { body: Some(&body[1..]), ..picture }).is_err());
+        assert!(look(SkinPicture { table: &table[1..], ..picture }).is_err());
+    }
+    /// Numbers in [0, 1) that look random and are the same in every run (Knuth's linear congruence).
+    fn numbers(mut state: u64) -> impl FnMut() -> f64 {
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        }
+    }
+
+    /// Pixels of a mask around one of them, itself included, within the picture.
+    fn around(index: usize, [height, width]: [usize; 2]) -> impl Iterator<Item = usize> {
+        let (row, column) = (index / width, index % width);
+        let span = |place: usize, size: usize| place.saturating_sub(1)..(place + 2).min(size);
+        span(row, height).flat_map(move |row| span(column, width).map(move |column| row * width + column))
+    }
+
+    /// Whether all, or any, of the pixels around each one are set.
+    fn morphed(mask: &[u8], size: [usize; 2], all: bool) -> Vec<u8> {
+        let pixel = |index: usize| around(index, size).filter(|other| mask[*other] != 0).count();
+        (0..mask.len())
+            .map(|index| u8::from(if all { pixel(index) == around(index, size).count() } else { pixel(index) > 0 }))
+            .collect()
+    }
+
+    /// Regions by filling them pixel by pixel.
+    fn filled(mask: &[u8], size: [usize; 2]) -> (Vec<Region>, Vec<i32>) {
+        let (mut owner, mut found) = (vec![usize::MAX; mask.len()], Vec::new());
+        for start in 0..mask.len() {
+            if mask[start] == 0 || owner[start] != usize::MAX {
+                continue;
+            }
+            let (number, mut todo) = (found.len(), vec![start]);
+            let mut region = Region { rows: (usize::MAX, 0), columns: (usize::MAX, 0), area: 0, sums: [0, 0] };
+            let mut block = (usize::MAX, usize::MAX);
+            owner[start] = number;
+            while let Some(index) = todo.pop() {
+                let (row, column) = (index / size[1], index % size[1]);
+                let one = Region { rows: (row, row + 1), columns: (column, column + 1), area: 1, sums: [column, row] };
+                region.join(&one);
+                block = block.min((row / 2, column / 2));
+                for other in around(index, size).filter(|other| mask[*other] != 0) {
+                    if owner[other] == usize::MAX {
+                        owner[other] = number;
+                        todo.push(other);
+                    }
+                }
+            }
+            found.push((block, number, region));
+        }
+        found.sort_by_key(|(block, ..)| *block);
+        let number_of =
+            |own: &usize| found.iter().position(|(_, number, _)| number == own).map_or(0, |place| place as i32 + 1);
+        (found.iter().map(|(.., region)| *region).collect(), owner.iter().map(number_of).collect())
+    }
+
+    #[test]
+    fn regions_gaps_and_skin_are_those_of_plain_loops() {
+        for seed in 0..40 {
+            let mut number = numbers(seed);
+            let size = [1 + (59.0 * number()) as usize, 1 + (89.0 * number()) as usize];
+            let count = size[0] * size[1];
+            // Noise that hangs together: the mean of what is around each pixel.
+            let noise: Vec<f64> = (0..count).map(|_| number()).collect();
+            let limit = 0.4 + 0.2 * number();
+            let mean = |index: usize| {
+                let (sum, count) =
+                    around(index, size).fold((0.0, 0.0), |(sum, count), other| (sum + noise[other], count + 1.0));
+                sum / count
+            };
+            let mask: Vec<u8> = (0..count).map(|index| u8::from(mean(index) > limit)).collect();
+            let longest = 3.0 + 21.0 * number();
+            let gaps_closed = |mask: &[u8]| {
+                let (regions, labels) = filled(mask, size);
+                let length = |(low, high): (usize, usize)| (high - low) as f64;
+                let short = |label: &i32| {
+                    let region = usize::try_from(label - 1).ok().map(|place| regions[place]);
+                    u8::from(region.is_some_and(|region| length(region.rows).hypot(length(region.columns)) <= longest))
+                };
+                // The part of the picture with something in it is all there is: beyond it nothing counts.
+                let [rows, columns] = bounds(mask, size[1]);
+                let short = cut(&labels.iter().map(short).collect::<Vec<_>>(), size[1], &rows, &columns);
+                let part = [rows.len(), columns.len()];
+                let closed = morphed(&morphed(&short, part, false), part, true);
+                let mut result = mask.to_vec();
+                for (place, pixel) in closed.into_iter().enumerate() {
+                    let index = (rows.start + place / part[1]) * size[1] + columns.start + place % part[1];
+                    result[index] |= pixel;
+                }
+                result
+            };
+            assert_eq!(regions(&mask, size[1]), filled(&mask, size), "{seed}");
+            assert_eq!(joined(&mask, size[1], longest), gaps_closed(&mask), "{seed}");
+
+            // The same of a picture, with all that may rule skin out.
+            let share = 0.3 + 0.5 * number();
+            let mut table: Vec<bool> = (0..chroma::BINS).map(|_| number() < share).collect();
+            table[5] = true;
+            let bins: Vec<u16> =
+                mask.iter().map(|pixel| if *pixel != 0 { 5 } else { (65_536.0 * number()) as u16 }).collect();
+            let body: Vec<bool> = (0..count).map(|_| number() < 0.9).collect();
+            let before: Vec<bool> = (0..count).map(|_| number() < 0.5).collect();
+            let always: Vec<f32> = (0..count).map(|_| 0.6 * number() as f32).collect();
+            let picture = SkinPicture {
+                bins: &bins,
+                width: size[1],
+                table: &table,
+                body: Some(&body),
+                always: Some(&always),
+                before: Some(&before),
+            };
+            let (mut seen, mut skin) = (Vec::new(), Vec::new());
+            picture.find(longest, &mut seen, &mut skin).unwrap();
+            let light: Vec<bool> = bins.iter().map(|bin| *bin < 32_768 && table[usize::from(*bin)]).collect();
+            // Most of nine, of which the border's go on beyond it.
+            let most = |index: usize| {
+                let near = |place: usize, offset: usize, size: usize| (place + offset).saturating_sub(1).min(size - 1);
+                let (row, column) = (index / size[1], index % size[1]);
+                let nine = (0..9).map(|n| near(row, n / 3, size[0]) * size[1] + near(column, n % 3, size[1]));
+                nine.filter(|other| light[*other]).count() > 4
+            };
+            let smooth: Vec<u8> = (0..count).map(|index| u8::from(most(index))).collect();
+            assert_eq!(seen, smooth, "{seed}");
+            let may = |index: usize| body[index] && (always[index] < 0.5 || before[index]);
+            let kept: Vec<u8> = (0..count).map(|index| smooth[index] & u8::from(may(index))).collect();
+            let opened = morphed(&morphed(&kept, size, true), size, false);
+            let expected: Vec<u8> =
+                gaps_closed(&opened).iter().zip(&body).map(|(pixel, body)| pixel & u8::from(*body)).collect();
+            assert_eq!(skin, expected, "{seed}");
+        }
     }
 }

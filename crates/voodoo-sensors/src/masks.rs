@@ -38,14 +38,7 @@ fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) 
     )
 }
 
-/// What most of each pixel and its eight neighbours are; beyond the border a picture goes on as it ends.
-pub fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
-    let mut found = Vec::new();
-    smooth(mask, width, &mut found);
-    found
-}
-
-/// The same, into `found`.
+/// What most of each pixel and its eight neighbours are, into `found`; beyond the border a picture goes on as it ends.
 pub fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
     found.resize(mask.len(), 0);
     fill_rows(
@@ -120,6 +113,12 @@ pub fn bounds(mask: &[u8], width: usize) -> [std::ops::Range<usize>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn smoothed(mask: &[u8], width: usize) -> Vec<u8> {
+        let mut found = Vec::new();
+        smooth(mask, width, &mut found);
+        found
+    }
 
     #[test]
     fn a_mask_grows_shrinks_and_is_smoothed() {

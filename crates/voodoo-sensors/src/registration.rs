@@ -194,7 +194,7 @@ impl MeasuredPixels<'_> {
             let found = format!("{} for {height} rows of {width}", labels.values.len());
             return Err(TrackError::measurement("labels", "one for every pixel", found));
         }
-        self.check(None)?;
+        self.check()?;
         // Neighbours in the list are near each other: most stretches of it are nowhere near a place.
         let stretches: Vec<[[f64; 2]; 2]> = self.places.chunks(POINTS_TOGETHER).map(bounds_of).collect();
         let look = |(place, region): &([f64; 2], i32)| {
@@ -220,33 +220,22 @@ impl MeasuredPixels<'_> {
     }
 
     /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
-    /// three points there. Where three of the points `among` are there, only those count.
+    /// three points there.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when there are not as many depths, or marks, as places.
-    pub fn nearest_surface(
-        &self,
-        place: [f64; 2],
-        radius: f64,
-        among: Option<&[bool]>,
-    ) -> Result<Option<(f64, bool)>, TrackError> {
-        self.check(among)?;
-        let (mut near, mut chosen) = (Vec::new(), Vec::new());
-        for (index, _) in self.places.iter().enumerate().filter(|(_, other)| is_near(other, &place, radius)) {
-            near.push(index);
-            if among.is_some_and(|among| among[index]) {
-                chosen.push(index);
-            }
-        }
-        Ok(self.surface_of(near, chosen))
+    pub fn nearest_surface(&self, place: [f64; 2], radius: f64) -> Result<Option<(f64, bool)>, TrackError> {
+        self.check()?;
+        let near = self.places.iter().enumerate().filter(|(_, other)| is_near(other, &place, radius));
+        Ok(self.surface_of(near.map(|(index, _)| index).collect(), Vec::new()))
     }
 
-    fn check(&self, among: Option<&[bool]>) -> Result<(), TrackError> {
-        let (count, marks) = (self.places.len(), [self.still, among]);
-        if self.depths.len() == count && marks.iter().flatten().all(|marks| marks.len() == count) {
+    fn check(&self) -> Result<(), TrackError> {
+        let count = self.places.len();
+        if self.depths.len() == count && self.still.is_none_or(|still| still.len() == count) {
             return Ok(());
         }
-        let found = format!("{} depths, {:?} marks", self.depths.len(), marks.map(|marks| marks.map(<[_]>::len)));
+        let found = format!("{} depths, {:?} marks", self.depths.len(), self.still.map(<[_]>::len));
         Err(TrackError::measurement("depths", "as many depths, and marks, as pixels", found))
     }
 
@@ -281,4 +270,105 @@ fn bounds_of(places: &[[f64; 2]]) -> [[f64; 2]; 2] {
         }
     }
     [low, high]
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    /// Numbers in [0, 1) that look random and are the same in every run (Knuth's linear congruence).
+    fn numbers(mut state: u64) -> impl FnMut() -> f64 {
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        }
+    }
+
+    /// 600 points in a picture 41 pixels wide and high: a surface at 2 m on its left half, one at 3 m on its right half.
+    fn two_surfaces() -> (Vec<[f64; 2]>, Vec<f64>) {
+        let mut number = numbers(5);
+        let places: Vec<[f64; 2]> = (0..600).map(|_| [40.0 * number(), 40.0 * number()]).collect();
+        let depths =
+            places.iter().map(|place| (if place[0] < 20.0 { 2.0 } else { 3.0 }) + 0.02 * (number() - 0.5)).collect();
+        (places, depths)
+    }
+
+    #[test]
+    fn the_nearest_surface_around_a_place_is_the_nearest_fifths() {
+        let (places, depths) = two_surfaces();
+        let still: Vec<bool> = places.iter().map(|place| place[0] < 20.0).collect();
+        let measured = MeasuredPixels { places: &places, depths: &depths, still: Some(&still) };
+        let mut near: Vec<f64> = places
+            .iter()
+            .zip(&depths)
+            .filter(|(place, _)| (place[0] - 20.0).hypot(place[1] - 20.0) < 8.0)
+            .map(|(_, depth)| *depth)
+            .collect();
+        near.sort_by(f64::total_cmp);
+        let fifth = near[(near.len() - 1) / 5];
+        near.retain(|depth| (depth - fifth).abs() < 0.1);
+        let expected = Some((near[near.len() / 2], true));
+        assert_eq!(measured.nearest_surface([20.0, 20.0], 8.0).unwrap(), expected);
+        let behind = MeasuredPixels { still: None, ..measured }.nearest_surface([35.0, 20.0], 8.0).unwrap().unwrap();
+        assert!((behind.0 - 3.0).abs() < 0.01 && !behind.1);
+        assert_eq!(measured.nearest_surface([90.0, 20.0], 8.0).unwrap(), None);
+        let two = MeasuredPixels { places: &places[..2], depths: &depths[..2], still: None };
+        assert_eq!(two.nearest_surface([20.0, 20.0], 99.0).unwrap(), None, "two points are no surface");
+        assert!(MeasuredPixels { depths: &depths[1..], ..measured }.nearest_surface([0.0; 2], 1.0).is_err());
+        assert!(MeasuredPixels { still: Some(&still[1..]), ..measured }.nearest_surface([0.0; 2], 1.0).is_err());
+    }
+
+    #[test]
+    fn each_place_is_looked_at_among_the_points_of_its_region() {
+        let (mut places, mut depths) = two_surfaces();
+        for outside in [[f64::NAN, 3.0], [-5.0, 3.0], [3.0, 99.0]] {
+            places.push(outside);
+            depths.push(1.0);
+        }
+        let right = |index: usize| if index % 41 >= 20 { 7 } else { 0 };
+        let labels = Labels { first: [0, 0], size: [41, 41], values: (0..41 * 41).map(right).collect() };
+        let measured = MeasuredPixels { places: &places, depths: &depths, still: None };
+        let at = |place: [f64; 2], region: i32| {
+            measured.nearest_surfaces(&labels, &[(place, region)], 8.0).unwrap()[0].map(|(depth, _)| depth.round())
+        };
+        assert_eq!(at([20.0, 20.0], 7), Some(3.0));
+        assert_eq!(at([20.0, 20.0], 0), Some(2.0));
+        assert_eq!(at([20.0, 20.0], 5), Some(2.0), "without a region of its own all that is near counts");
+        assert_eq!(at([90.0, 90.0], 7), None);
+        let alone = |region: i32| {
+            let chosen: Vec<usize> = (0..places.len()).filter(|index| labels.at(&places[*index]) == region).collect();
+            let places: Vec<[f64; 2]> = chosen.iter().map(|index| places[*index]).collect();
+            let depths: Vec<f64> = chosen.iter().map(|index| depths[*index]).collect();
+            MeasuredPixels { places: &places, depths: &depths, still: None }.nearest_surface([20.0; 2], 8.0).unwrap()
+        };
+        let found = measured.nearest_surfaces(&labels, &[([20.0; 2], 7), ([20.0; 2], 0)], 8.0).unwrap();
+        assert_eq!(found, [alone(7), alone(0)]);
+        let short = Labels { size: [41, 40], ..labels.clone() };
+        assert!(measured.nearest_surfaces(&short, &[], 8.0).is_err());
+    }
+
+    #[test]
+    fn points_are_put_into_their_pixels_and_grow_by_their_reach() {
+        let places = [[2.4, 1.6], [2.0, 2.0], [f64::NAN, 0.0], [5.5, 1.0], [-0.5, 0.0], [3.0, 2.0]];
+        let points = [3.0, 2.0, 1.0, 1.0, 4.0, 3.0].map(|depth| [0.0, 0.0, depth]);
+        let marks = [false, true, true, true, false, true];
+        let found = ProjectedPoints::new(&places, &points, Some(&marks), [4, 5]).unwrap();
+        // Halves go to the even pixel: column 5.5 is outside, -0.5 is not.
+        assert_eq!(found.inside, [0, 1, 4, 5]);
+        let mut beyond = [false; 20];
+        beyond[19] = true;
+        let (mask, before) = found.shown(&beyond, 0, [4, 5]).unwrap();
+        let seen = |mask: &[bool]| (0..20).filter(|index| mask[*index]).collect::<Vec<_>>();
+        assert_eq!((seen(&mask), seen(&before.unwrap())), (vec![0, 12, 19], vec![12]), "13 is behind an edge");
+        let near = ProjectedPoints::new(&places[..2], &points[..2], Some(&marks[..2]), [4, 5]).unwrap();
+        let (mask, before) = near.shown(&beyond, 1, [4, 5]).unwrap();
+        let around = vec![6, 7, 8, 11, 12, 13, 16, 17, 18];
+        assert_eq!((seen(&mask), seen(&before.unwrap())), ([around.clone(), vec![19]].concat(), around));
+        assert!(ProjectedPoints::new(&places, &points[1..], None, [4, 5]).is_err());
+        assert!(ProjectedPoints::new(&places, &points, Some(&marks[1..]), [4, 5]).is_err());
+        assert!(near.shown(&beyond[1..], 1, [4, 5]).is_err());
+        let unmarked = ProjectedPoints::new(&places, &points, None, [4, 5]).unwrap();
+        assert_eq!(unmarked.shown(&beyond, 1, [4, 5]).unwrap().1, None);
+    }
 }

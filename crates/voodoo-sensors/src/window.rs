@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use voodoo_core::camera::Camera;
 use voodoo_core::error::TrackError;
 use voodoo_core::math::widest;
 
@@ -12,10 +13,8 @@ pub struct Window<'a> {
     pub depth: &'a [f32],
     /// Rows and columns of that image.
     pub size: [usize; 2],
-    /// `(x/z, y/z)` of every pixel of the camera, row by row.
-    pub rays: &'a [[f32; 2]],
-    /// Rows and columns of the camera.
-    pub camera: [usize; 2],
+    /// The camera.
+    pub camera: &'a Camera,
     /// The image has every so-many-th row and column of the camera.
     pub step: usize,
     /// Rows of the image that are looked at.
@@ -27,26 +26,24 @@ pub struct Window<'a> {
 impl Window<'_> {
     fn check(&self) -> Result<(), TrackError> {
         let [height, width] = self.size;
+        let camera = [self.camera.height(), self.camera.width()];
         let fits = self.step > 0
-            && self.size.iter().zip(&self.camera).all(|(size, camera)| *size == camera.div_ceil(self.step.max(1)))
-            && self.camera[0].checked_mul(self.camera[1]) == Some(self.rays.len())
+            && self.size.iter().zip(&camera).all(|(size, camera)| *size == camera.div_ceil(self.step.max(1)))
             && height.checked_mul(width) == Some(self.depth.len());
         if fits && self.rows.end <= height && self.columns.end <= width {
             return Ok(());
         }
         let found = format!(
-            "{} depths for {:?}, {} rays for {:?}, step {}, rows {:?} and columns {:?}",
+            "{} depths for {:?}, a camera of {camera:?}, step {}, rows {:?} and columns {:?}",
             self.depth.len(),
             self.size,
-            self.rays.len(),
-            self.camera,
             self.step,
             self.rows,
             self.columns
         );
         Err(TrackError::measurement(
             "window",
-            "a depth, and a ray, for every pixel, and rows and columns of them",
+            "a depth for every pixel of the camera, and rows and columns of them",
             found,
         ))
     }
@@ -68,10 +65,11 @@ impl Window<'_> {
         // Values of single precision are between these where they are between the corners.
         let (low, high) = (low.map(below), high.map(|value| -below(-value)));
         let (rows, count) = (self.rows.clone(), self.columns.len());
+        let all_rays = self.camera.rays();
         let mut inside = vec![false; rows.len() * count];
         for (row, inside) in rows.clone().zip(inside.chunks_exact_mut(count.max(1))) {
             let depths = &self.depth[row * self.size[1]..][self.columns.clone()];
-            let rays = &self.rays[(row * self.camera[1] + self.columns.start) * self.step..];
+            let rays = &all_rays[(row * self.camera.width() + self.columns.start) * self.step..];
             widest(
                 #[inline(always)]
                 || {
@@ -89,7 +87,7 @@ impl Window<'_> {
         for (row, inside) in rows.zip(inside.chunks_exact(count.max(1))) {
             let first = row * self.size[1] + self.columns.start;
             let depths = &self.depth[first..][..count];
-            let rays = &self.rays[(row * self.camera[1] + self.columns.start) * self.step..];
+            let rays = &all_rays[(row * self.camera.width() + self.columns.start) * self.step..];
             // Most of the columns are passed over, some at once.
             for (block, inside) in inside.chunks(COLUMNS_TOGETHER).enumerate().filter(|(_, inside)| any(inside)) {
                 for (offset, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
@@ -139,5 +137,92 @@ fn gate<'a>(
             passes &= (place > low[axis]) & (place < high[axis]);
         }
         *inside = passes;
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use voodoo_core::camera::Lens;
+
+    const LOW: [f64; 3] = [-0.8, -0.6, 1.0];
+    const HIGH: [f64; 3] = [0.7, 0.9, 2.4];
+    const SIZE: [usize; 2] = [48, 64];
+
+    /// A turn about z, and a shift.
+    fn pose(angle: f64, shift: [f64; 3]) -> [[f64; 4]; 4] {
+        let (sin, cos) = angle.sin_cos();
+        [[cos, -sin, 0.0, shift[0]], [sin, cos, 0.0, shift[1]], [0.0, 0.0, 1.0, shift[2]], [0.0, 0.0, 0.0, 1.0]]
+    }
+
+    fn moved(pose: &[[f64; 4]; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| pose[axis][0] * x + pose[axis][1] * y + pose[axis][2] * z + pose[axis][3])
+    }
+
+    fn camera() -> Camera {
+        let lens = Lens::PlumbBob([-0.2, 0.05, 0.001, 0.0, 0.0]);
+        Camera::new(SIZE[1], SIZE[0], [50.0, 52.0, 31.5, 23.5], lens).unwrap()
+    }
+
+    /// Depths from 0.5 to 4 m, some of them no return.
+    fn noisy(count: usize) -> Vec<f32> {
+        let depth =
+            |index: usize| 0.5 + 3.5 * ((index as u32).wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let mut depths: Vec<f32> = (0..count).map(|index| if index % 11 == 3 { 0.0 } else { depth(index) }).collect();
+        [depths[70], depths[71], depths[72]] = [f32::NAN, f32::INFINITY, -1.0];
+        depths
+    }
+
+    #[test]
+    fn the_points_are_those_in_the_box_seen_from_the_other_camera() {
+        let camera = camera();
+        let rays = camera.rays();
+        let (to_world, to_other) = (pose(0.3, [0.1, 0.0, -0.2]), pose(-0.1, [0.05, 0.02, 0.01]));
+        for step in [1, 3] {
+            let size = SIZE.map(|pixels| pixels.div_ceil(step));
+            let depth = noisy(size[0] * size[1]);
+            let (rows, columns) = (2..size[0] - 1, 1..size[1] - 3);
+            let window = Window { depth: &depth, size, camera: &camera, step, rows, columns };
+            let (points, pixels) = window.within(LOW, HIGH, &to_world, &to_other).unwrap();
+            let mut expected = Vec::new();
+            for row in window.rows.clone() {
+                for column in window.columns.clone() {
+                    let z = depth[row * size[1] + column];
+                    let ray = rays[(row * 64 + column) * step];
+                    let place = [ray[0] * z, ray[1] * z, z].map(f64::from);
+                    let world = moved(&to_world, place);
+                    if z.is_finite()
+                        && z > 0.0
+                        && (0..3).all(|axis| LOW[axis] < world[axis] && world[axis] < HIGH[axis])
+                    {
+                        expected.push((row * size[1] + column, moved(&to_other, place)));
+                    }
+                }
+            }
+            assert!(expected.len() > 20 && 2 * expected.len() < depth.len());
+            assert!(pixels.iter().map(|pixel| *pixel as usize).eq(expected.iter().map(|(pixel, _)| *pixel)));
+            for (point, (_, place)) in points.iter().zip(&expected) {
+                assert!((0..3).all(|axis| (point[axis] - place[axis]).abs() < 1e-6), "{point:?} {place:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_that_does_not_fit_is_refused() {
+        let (camera, depth, level) = (camera(), noisy(48 * 64), pose(0.0, [0.0; 3]));
+        let whole = Window { depth: &depth, size: SIZE, camera: &camera, step: 1, rows: 0..48, columns: 0..64 };
+        let look = |window: Window| window.within(LOW, HIGH, &level, &level).map_err(|error| error.to_string());
+        assert!(look(whole.clone()).is_ok());
+        for wrong in [
+            Window { rows: 0..49, ..whole.clone() },
+            Window { columns: 0..65, ..whole.clone() },
+            Window { step: 2, ..whole.clone() },
+            Window { step: 0, ..whole.clone() },
+            Window { depth: &depth[1..], ..whole.clone() },
+            Window { size: [48, 63], ..whole.clone() },
+        ] {
+            assert!(look(wrong).unwrap_err().contains("window: expected"));
+        }
     }
 }

@@ -56,7 +56,9 @@ def eval_command(
 
     A recording with truth_people.csv beside it is tracked with --people any and judged for MOTA, IDF1, switches of identity,
     false bodies and joints. With --result a .csv that any program wrote is judged: stamp_s, person, status, residual_m, then
-    NAME_x, NAME_y, NAME_z. It needs pip install 'voodoo-tracker[eval]'; --out gets people.csv and people.md.
+    NAME_x, NAME_y, NAME_z. --out gets people.csv and people.md.
+
+    Several people, and the pictures of --out, need pip install 'voodoo-tracker[eval]'.
 
     Examples
 
@@ -74,6 +76,7 @@ def eval_command(
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.ablation import ablate, table, variants, write_tables
     from voodoo.evaluation.evaluate import evaluate_all
+    from voodoo.evaluation.figure import new_figure
     from voodoo.evaluation.people_evaluate import evaluate_all_people, has_people
     from voodoo.evaluation.report import markdown, write_reports
     from voodoo.evaluation.search import find_recordings
@@ -116,6 +119,8 @@ def eval_command(
         paths = [path for path in paths if path not in several]
         if not paths:
             return
+        if out is not None:
+            new_figure(1.0, 1.0)  # what is missing is said before the work, not after it
         done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
         ordered = sorted(finished, key=lambda item: item[0])

@@ -12,6 +12,7 @@ from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
     DepthRangeOption,
+    DetectorOption,
     ExcludeOption,
     FrameOption,
     HeightOption,
@@ -43,6 +44,7 @@ def live_command(
     height: HeightOption = None,
     model: ModelOption = None,
     config: ConfigOption = None,
+    detector: DetectorOption = None,
     people: PeopleOption = "1",
     out: OutOption = None,
     record: Annotated[
@@ -100,7 +102,7 @@ def live_command(
     """
     from voodoo.cli.live_run import Wishes, entered, run
     from voodoo.cli.people import limit_of, no_starts
-    from voodoo.cli.running import boxes_of, config_of, depth_filter_of, kinds_of
+    from voodoo.cli.running import boxes_of, config_of, depth_filter_of, detector_of, kinds_of
     from voodoo.export.files import check_target
     from voodoo.pipeline.start import beginning_of
 
@@ -121,6 +123,7 @@ def live_command(
             kinds=kinds_of(use),
             depth_filter=depth_filter_of(depth_range),
             boxes=boxes_of(exclude),
+            detector=detector_of(detector),
             targets=tuple(out or ()),
             record=record,
             view=view,

@@ -19,6 +19,7 @@ import numpy as np
 from voodoo.cli.common import say
 from voodoo.cli.people import body_of
 from voodoo.config import Config
+from voodoo.detectors import AnyDetector
 from voodoo.errors import VoodooError
 from voodoo.export.ros2 import instant
 from voodoo.live.assembly import LiveFrame
@@ -69,6 +70,7 @@ class Wishes:
     kinds: tuple[str, ...] | None
     depth_filter: DepthFilter | None
     boxes: tuple[Box, ...]
+    detector: AnyDetector = "shipped"
     targets: tuple[Path, ...] = ()
     record: Path | None = None
     view: bool = False
@@ -164,7 +166,10 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
     )
     if wishes.several:
         body = body_of(wishes.body, height=wishes.height, model=wishes.model)
-        return Follower(people=lambda: People(body, config=wishes.config, limit=wishes.limit), settings=settings)
+        config, detector = wishes.config, wishes.detector
+        return Follower(
+            people=lambda: People(body, config=config, detector=detector, limit=wishes.limit), settings=settings
+        )
     tracker = start_tracker(
         look,
         init=wishes.beginning,
@@ -173,6 +178,7 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
         model=wishes.model,
         config=wishes.config,
         use=wishes.kinds,
+        detector=wishes.detector,
     )
     return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, look))
 

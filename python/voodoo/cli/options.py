@@ -41,6 +41,14 @@ InitOption = Annotated[
         "recording. By default the recording's own start; auto where none comes with it.",
     ),
 ]
+DetectorOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--detector",
+        metavar="FILE.onnx",
+        help="A network that finds people in depth images, instead of the shipped one (pip install 'voodoo-tracker[onnx]').",
+    ),
+]
 ExcludeOption = Annotated[
     list[str] | None,
     typer.Option(

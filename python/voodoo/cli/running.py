@@ -11,6 +11,7 @@ import numpy as np
 
 from voodoo.cli.common import progressing
 from voodoo.config import Config
+from voodoo.detectors import AnyDetector, OnnxDetector
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.pipeline.run import track
@@ -99,6 +100,15 @@ def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
 def config_of(path: Path | None) -> Config:
     """The configuration of a file; the defaults for None."""
     return Config() if path is None else Config.load(path)
+
+
+def detector_of(path: Path | None) -> AnyDetector:
+    """The network of an ONNX file; the shipped detector for None.
+
+    Raises:
+        ConfigError: no such network.
+    """
+    return "shipped" if path is None else OnnxDetector(path)
 
 
 def run(

@@ -13,6 +13,7 @@ from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
     DepthRangeOption,
+    DetectorOption,
     ExcludeOption,
     FrameOption,
     HeightOption,
@@ -43,6 +44,7 @@ def track_command(
     height: HeightOption = None,
     model: ModelOption = None,
     config: ConfigOption = None,
+    detector: DetectorOption = None,
     people: PeopleOption = "1",
     out: OutOrNameOption = None,
     overlay: Annotated[
@@ -123,7 +125,17 @@ def track_command(
     from dataclasses import replace
 
     from voodoo.cli.people import Outputs, body_of, follow_people, limit_of, no_starts
-    from voodoo.cli.running import bare_for, boxes_of, config_of, depth_filter_of, kinds_of, opened, run, viewer_of
+    from voodoo.cli.running import (
+        bare_for,
+        boxes_of,
+        config_of,
+        depth_filter_of,
+        detector_of,
+        kinds_of,
+        opened,
+        run,
+        viewer_of,
+    )
     from voodoo.export.files import check_target
     from voodoo.export.files import save as export
     from voodoo.model.body import Body
@@ -171,7 +183,8 @@ def track_command(
         for target in targets:
             check_target(target, inputs=(recording, *(with_ or ())))
         if several:
-            everybody = People(body_of(body, height=height, model=model), config=config_of(config), limit=limit)
+            followed = body_of(body, height=height, model=model)
+            everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
             with viewer_of(view, save, source.name) as viewer:
                 follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer), left_out)
@@ -186,6 +199,7 @@ def track_command(
             config=config_of(config),
             markers=markers,
             use=kinds,
+            detector=detector_of(detector),
         )
         with viewer_of(view, save, source.name) as viewer:
             settings = replace(

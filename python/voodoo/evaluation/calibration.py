@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +10,10 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import erf
 
 from voodoo._core import Estimate
 from voodoo.evaluation import metrics
+from voodoo.evaluation.figure import new_figure
 from voodoo.evaluation.metrics import mean_or_nan
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -164,17 +165,13 @@ def calibration_markdown(calibration: Calibration, against: str) -> str:
 
 def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     """Shares within so many standard deviations, beside error over standard deviation."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
     measured = np.concatenate([each.measured for each in found])
     known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
-    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2)
     steps = np.linspace(0.0, 4.0, 81)
-    normal = erf(steps / np.sqrt(2.0))
+    normal = [math.erf(step / math.sqrt(2.0)) for step in steps]
     left.plot(steps, normal, color="#333333", linestyle="--", linewidth=1.0, label="normal distribution")
     groups = (
         ("shoulders and hips", np.broadcast_to(_TRUNK, known.shape), "#7a8ca3"),

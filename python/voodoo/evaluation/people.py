@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
 
+import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.metrics import FloatArray
@@ -243,7 +243,7 @@ def match(truth: PeopleTruth, rows: PeopleRows, frames: _Frames) -> Matches:
 def _at_others(away: FloatArray, expected: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Which bodies (N,) are those of persons who are not expected, by distances (P, N) [m], NaN where too far."""
     cost = np.where(np.isnan(away), _NEVER, away + np.where(expected, 0.0, _LAST)[:, None])
-    persons, columns = linear_sum_assignment(cost)
+    persons, columns = np.array(_core.linear_sum_assignment(cost), dtype=np.intp).reshape(-1, 2).T
     other = ~expected[persons] & (cost[persons, columns] < _NEVER)
     return np.isin(np.arange(away.shape[1]), columns[other])
 

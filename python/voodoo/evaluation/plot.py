@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from voodoo.evaluation.figure import new_figure
 from voodoo.evaluation.score import Score
 from voodoo.evaluation.summary import CLASSES
 
@@ -15,12 +16,8 @@ _CLASS_COLORS = ("#c8553d", "#e8b04b", "#4c8c6b")
 
 def plot_errors(path: Path, scores: Sequence[Score]) -> None:
     """Error over the sequences, coloured by class, beside how many are in each class."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    figure = new_figure(11.0, 4.2)
     done = [score for score in scores if np.isfinite(score.error_m) and score.tracking_class is not None]
-    figure = Figure(figsize=(11.0, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2, width_ratios=(4, 1))
     colors = [_CLASS_COLORS[score.tracking_class or 0] for score in done]
     left.bar(range(len(done)), [100.0 * score.error_m for score in done], color=colors, width=0.9)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
+from voodoo.model.rotations import euler_angles
 
 _Y_UP = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """(x, y, z) of BVH = (y, z, x) of the standing frame: X to the left, Y up, Z forward."""
@@ -53,7 +53,7 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     local = _Y_UP @ posed.local() @ _Y_UP.T
     angles = np.empty((len(track), len(parts), 3))
     for index in range(len(parts)):
-        angles[:, index] = Rotation.from_matrix(local[:, index]).as_euler("ZXY", degrees=True)
+        angles[:, index] = np.degrees(euler_angles(local[:, index], "ZXY"))
     offsets[:, 0] = posed.heads[:, 0]
     moving[0] = True
     places = offsets @ _Y_UP.T * scale

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from voodoo.export.skeleton import FloatArray, Skeleton
+from voodoo.model.rotations import euler_angles, quaternions
 
 
 def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
@@ -46,12 +44,9 @@ def _relative(parent: FloatArray, child: FloatArray) -> FloatArray:
 
 
 def _euler(turns: FloatArray, order: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    with warnings.catch_warnings():
-        # A hanging arm has no direction to the side; scipy then sets the third angle to zero, which is one right
-        # answer.
-        warnings.filterwarnings("ignore", message="Gimbal lock")
-        angles = Rotation.from_matrix(turns).as_euler(order)
-    return angles[:, 0], angles[:, 1], angles[:, 2]
+    # A hanging arm has no direction to the side; the third angle is then zero, which is one right answer.
+    first, second, third = euler_angles(turns, order).T
+    return first, second, third
 
 
 def _wrapped(angles: FloatArray) -> FloatArray:
@@ -60,5 +55,5 @@ def _wrapped(angles: FloatArray) -> FloatArray:
 
 def _turn_about_y(turns: FloatArray) -> FloatArray:
     """Angle of the twist about y in the swing-twist decomposition."""
-    quaternions = Rotation.from_matrix(turns).as_quat()
-    return _wrapped(2.0 * np.arctan2(quaternions[:, 1], quaternions[:, 3]))
+    _, y, _, w = quaternions(turns).T
+    return _wrapped(2.0 * np.arctan2(y, w))

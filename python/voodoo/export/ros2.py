@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
-from scipy.spatial.transform import Rotation
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
@@ -23,6 +22,7 @@ from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
+from voodoo.model.rotations import quaternions
 
 _SIDE = {
     "upperarm": "shoulder", "forearm": "elbow", "hand": "wrist", "thigh": "hip", "calf": "knee", "foot": "ankle",
@@ -188,7 +188,7 @@ def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, pers
     poses = np.array([pose for _, pose in frames.values()])
     above = np.array([np.eye(4) if parent is None else frames[parent][1] for parent, _ in frames.values()])
     relative = np.linalg.inv(above) @ poses
-    turns = Rotation.from_matrix(relative[:, :3, :3]).as_quat().tolist()
+    turns = quaternions(relative[:, :3, :3]).tolist()
     places = relative[:, :3, 3].tolist()
     result = []
     for (name, (parent, _)), (x, y, z), (qx, qy, qz, qw) in zip(frames.items(), places, turns, strict=True):
@@ -213,7 +213,7 @@ def _body_pose(track: Track, posed: Skeleton, index: int, person: str) -> Any:  
     x, y, z = pose[:3, 3] - track.world_from_limb[index, 0, :3, 3]
     moved = np.eye(6)
     moved[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-    turn = [float(value) for value in Rotation.from_matrix(pose[:3, :3]).as_quat()]
+    turn = quaternions(pose[:3, :3]).tolist()
     return _new(
         "geometry_msgs/msg/PoseWithCovariance",
         pose=_new(
@@ -228,7 +228,7 @@ def _body_pose(track: Track, posed: Skeleton, index: int, person: str) -> Any:  
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
     result = []
     poses = track.world_from_limb[index]
-    turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    turns = quaternions(poses[:, :3, :3])
     for number, (limb, pose) in enumerate(zip(body.limbs, poses, strict=True)):
         middle = pose[:3, :3] @ np.array([0.0, 0.0, limb.shape.length / 2]) + pose[:3, 3]
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
@@ -241,7 +241,7 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
         if np.isfinite(covariance).all():
             variances, axes = np.linalg.eigh(covariance)
             axes[:, 0] *= np.sign(np.linalg.det(axes))
-            turn, radii = Rotation.from_matrix(axes).as_quat(), np.sqrt(np.maximum(variances, 0.0))
+            turn, radii = quaternions(axes), np.sqrt(np.maximum(variances, 0.0))
             size = (2.0 * radii[0], 2.0 * radii[1], 2.0 * radii[2])
             place = track.joints[index, number]
             result.append(_marker(header, "uncertainty", number, _SPHERE, place, turn, size, (0.9, 0.9, 0.9), [], 0.3))

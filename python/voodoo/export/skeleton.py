@@ -12,11 +12,11 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.model.body import Body
+from voodoo.model.rotations import matrix_of_turn
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def bones(body: Body) -> tuple[Bone, ...]:
     _, limbs, _ = body.core.parts()
     names = [limb[0] for limb in limbs]
     axes = [place[1] for limb in limbs if limb[3] is not None for place in limb[3][1:3]]
-    from_joints = iter(Rotation.from_rotvec(np.array(axes, dtype=np.float64).reshape(-1, 3)).as_matrix())
+    from_joints = iter([matrix_of_turn(axis) for axis in axes])
     for name, parent, shape, joint, _ in limbs:
         if joint is None or parent is None:
             turn, shift, place, above, joint_name = np.eye(3), np.zeros(3), np.zeros(3), None, name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
@@ -34,7 +35,7 @@ class Silhouette:
         border: float = 1.0,
         depth: npt.ArrayLike | None = None,
     ) -> None:
-        """Transform a mask; lens distortion is taken out of it first.
+        """Transform a mask; lens distortion is taken out of it, and of depths, first.
 
         Args:
             mask: (height, width), true (or not 0) where the person is.
@@ -47,7 +48,7 @@ class Silhouette:
 
         Raises:
             MeasurementError: the border is no number of pixels, mask or depth have not the camera's size, depths are
-                whole numbers (millimetres), negative or of a camera with lens distortion, or the pose is not rigid.
+                whole numbers (millimetres) or negative, or the pose is not rigid.
         """
         if not isinstance(camera, Camera):
             raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
@@ -73,12 +74,11 @@ class Silhouette:
         self.empty = not person.any()
         pose = rigid(world_from_camera, name="world_from_camera")
         seen = None if depth is None else _depths(depth, camera, person)
-        intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
         # It is rigid, so the inverse rotation is the transposed one.
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, self.thickness, seen, self.border, intrinsics, inverse)
+        self._core = _core.View(self.distance, self.thickness, seen, self.border, _pinhole(camera), inverse)
 
     @property
     def core(self) -> _core.View:
@@ -163,10 +163,16 @@ def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8])
             f"{int((found < 0.0).sum())} of them negative"
         )
     if camera.distorted:
-        # Interpolated depths would be between two surfaces; depth cameras deliver rectified pictures.
-        raise MeasurementError(f"depth: expected a camera without lens distortion, found {camera.distortion}")
+        # Interpolated depths would be between two surfaces.
+        at = _distorted_pixels(camera)
+        found = np.asarray(cv2.remap(found, at[..., 0], at[..., 1], cv2.INTER_NEAREST), dtype=np.float64)
     # Beside the person it is the silhouette that says so.
     return np.ascontiguousarray(np.where(person != 0, found, 0.0), dtype=np.float32)
+
+
+def _pinhole(camera: Camera) -> Camera:
+    """The camera without its lens."""
+    return replace(camera, distortion=(), model="plumb_bob")
 
 
 def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:
@@ -181,8 +187,9 @@ def _distorted_pixels(camera: Camera) -> npt.NDArray[np.float32]:
     """Where (height, width, 2) the distorted picture shows what each pixel of that pinhole camera sees. Kept: every picture of
     a camera has the same, and it takes longer than all the rest of a silhouette."""
     u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
-    rays = [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)]
-    pixels = camera.project(np.stack(rays, axis=-1).reshape(-1, 3)).astype(np.float32)
-    at = pixels.reshape(camera.height, camera.width, 2)
+    rays = _pinhole(camera).undistorted(np.column_stack([u.reshape(-1), v.reshape(-1)]))
+    # What the lens does not show is off the picture.
+    pixels = np.nan_to_num(camera.project(np.column_stack([rays, np.ones(len(rays))])), nan=-9.0)
+    at = pixels.astype(np.float32).reshape(camera.height, camera.width, 2)
     at.setflags(write=False)
     return at

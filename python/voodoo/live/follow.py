@@ -14,7 +14,6 @@ from voodoo.people import People, PeopleEstimate, Person
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.people import PeopleFrontEnd
 from voodoo.pipeline.run import decodable
-from voodoo.pipeline.search import knows
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
@@ -123,11 +122,11 @@ class Follower:
         """
         if self._one is not None:
             tracker = self._one.tracker
-            if not tracker.estimate.joints or (gone and knows(tracker.body)):
+            if not tracker.estimate.joints or (gone and tracker.can_search):
                 tracker.search()
             else:
                 poses = dict(tracker.estimate.world_from_limb)
-                tracker = Tracker(tracker.body, config=tracker.config)
+                tracker = Tracker(tracker.body, config=tracker.config, detector=tracker.detector)
                 tracker.reset_pose(poses)
             self._one = FrontEnd(tracker, settings=self._settings)
         elif self._make is not None and back:

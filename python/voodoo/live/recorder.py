@@ -13,7 +13,6 @@ import numpy as np
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
-from scipy.spatial.transform import Rotation
 
 from voodoo.errors import VoodooError
 from voodoo.export.ros2 import cdr, instant
@@ -21,6 +20,7 @@ from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
+from voodoo.model.rotations import quaternions
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
 _TF = "tf2_msgs/msg/TFMessage"
@@ -121,7 +121,7 @@ class Recorder(Output):
 def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401
     """A tf2_msgs/TFMessage of one transform (4, 4)."""
     x, y, z = (float(value) for value in parent_from_child[:3, 3])
-    qx, qy, qz, qw = (float(value) for value in Rotation.from_matrix(parent_from_child[:3, :3]).as_quat())
+    qx, qy, qz, qw = quaternions(parent_from_child[:3, :3]).tolist()
     transform = _new(
         "geometry_msgs/msg/TransformStamped",
         header=_header(stamp, parent),

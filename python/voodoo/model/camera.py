@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Literal, get_args
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.errors import CameraError
 from voodoo.model.joint import as_numbers, short
 
@@ -32,13 +32,8 @@ _ALIASES = {
     "None": "plumb_bob", "Brown Conrady": "plumb_bob", "Modified Brown Conrady": "plumb_bob",
     "Inverse Brown Conrady": "inverse_plumb_bob", "Kannala Brandt4": "equidistant",
 }  # fmt: skip
-_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-10)
-"""The default of five fixed-point iterations leaves whole pixels of error on wide lenses."""
-_ROUND_TRIP_PX = 0.1
 MOST_PIXELS = 2**25
 """Of an image: those of an 8K picture. What is larger was mistyped, and would take gigabytes; the core has the same limit."""
-_STRIP = 2**20
-"""Pixels whose rays are found at a time: the memory of the whole picture's would be eight times as much."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +41,8 @@ class Camera:
     """A calibrated camera in its optical frame: x right, y down, z forward.
 
     Integer pixel coordinates are pixel centres; (0, 0) is the centre of the top-left pixel. Without distortion
-    u = fx x/z + cx and v = fy y/z + cy.
+    u = fx x/z + cx and v = fy y/z + cy. Projections and rays are those of the compiled core, which all parts of the
+    tracker use.
 
     Args:
         width, height: image size [px].
@@ -153,7 +149,8 @@ class Camera:
             points_cam: (N, 3) [m] in the optical frame.
 
         Returns:
-            (N, 2) pixel coordinates (u, v), not clipped to the image; NaN for points at or behind z = 0.
+            (N, 2) pixel coordinates (u, v), not clipped to the image; NaN for points at or behind z = 0, and beyond the
+            radius at which the lens's distortion stops growing: there, two directions would fall on one pixel.
 
         Raises:
             CameraError: the shape is not (N, 3).
@@ -164,86 +161,40 @@ class Camera:
             raise CameraError(f"points: expected shape (N, 3), found {short(points_cam)}") from None
         if points.ndim != 2 or points.shape[1] != 3:
             raise CameraError(f"points: expected shape (N, 3), found {points.shape}")
-        # What is not finite anywhere is not in the sum.
-        if not len(points) or (points[:, 2].min() > 0.0 and math.isfinite(points.sum())):
-            return self._seen(points)
-        pixels = np.full((len(points), 2), np.nan)
-        front = np.isfinite(points).all(axis=1) & (points[:, 2] > 0.0)
-        if front.any():
-            pixels[front] = self._seen(points[front])
-        return pixels
+        return self.core.project(np.ascontiguousarray(points, dtype=np.float64))
 
     def rays(self) -> npt.NDArray[np.float32]:
         """Normalized image coordinates x/z, y/z of every pixel centre, lens distortion removed.
 
         Returns:
             (height, width, 2) float32, read-only and cached; depth (along z) times (x, y, 1) is the point. NaN where
-            the lens model cannot be inverted (it does not come back to the pixel within 0.1 px), as happens in the
-            corners of strongly distorted images.
+            the lens puts no direction, as happens in the corners of strongly distorted images.
         """
         return _rays(self)
-
-    def _seen(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Pixels (N, 2) of points (N, 3) before the camera."""
-        # Column by column: loops over rows of two are slow.
-        xy = np.empty((len(points), 2))
-        for axis in (0, 1):
-            np.divide(points[:, axis], points[:, 2], out=xy[:, axis])
-        return self._distorted(xy)
-
-    def _distorted(self, xy: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Pixels (N, 2) of normalized coordinates (N, 2)."""
-        if not self.distorted:
-            flat = np.empty_like(xy)
-            for axis, (focal, centre) in enumerate(((self.fx, self.cx), (self.fy, self.cy))):
-                flat[:, axis] = xy[:, axis] * focal + centre
-            return flat
-        if self.model == "inverse_plumb_bob":
-            source = np.ascontiguousarray(xy[:, None, :])
-            distorted = cv2.undistortPoints(source, np.eye(3), self._coefficients(), criteria=_UNTIL).reshape(-1, 2)
-            return np.asarray(distorted * (self.fx, self.fy) + (self.cx, self.cy), dtype=np.float64)
-        points = np.column_stack([xy, np.ones(len(xy))])[:, None, :]
-        zero = np.zeros(3)
-        if self.model == "equidistant":
-            pixels, _ = cv2.fisheye.projectPoints(points, zero, zero, self.matrix, self._coefficients())
-        else:
-            pixels, _ = cv2.projectPoints(points, zero, zero, self.matrix, self._coefficients())
-        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
 
     def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Normalized coordinates x/z, y/z (N, 2) of pixels (N, 2) at any subpixel position, lens distortion removed.
 
-        NaN where the lens model cannot be inverted, see `rays`. The shape is not checked, see voodoo.sensors.pixels.normalized.
+        NaN where the lens puts no direction, see `rays`. The shape is not checked, see voodoo.sensors.pixels.normalized.
         """
-        if not self.distorted or not len(pixels):
-            return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
-        if self.model == "inverse_plumb_bob":
-            flat = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
-            points, zero = np.column_stack([flat, np.ones(len(flat))])[:, None, :], np.zeros(3)
-            found, _ = cv2.projectPoints(points, zero, zero, np.eye(3), self._coefficients())
-        else:
-            undistort = cv2.fisheye.undistortPoints if self.model == "equidistant" else cv2.undistortPoints
-            source = np.ascontiguousarray(pixels[:, None, :])
-            found = undistort(source, self.matrix, self._coefficients(), criteria=_UNTIL)
-        xy = np.array(found, dtype=np.float64).reshape(-1, 2)
-        with np.errstate(all="ignore"):
-            error = np.abs(self._distorted(xy) - pixels).max(axis=1)
-        xy[~(error < _ROUND_TRIP_PX)] = np.nan
-        return xy
+        return self.core.undistorted(np.ascontiguousarray(pixels, dtype=np.float64))
 
-    def _coefficients(self) -> npt.NDArray[np.float64]:
-        return np.array(self.distortion or (0.0,) * 4)
+    @cached_property
+    def core(self) -> _core.Camera:
+        """The camera of the compiled core."""
+        return _core_of(self)
+
+
+@lru_cache(maxsize=16)
+def _core_of(camera: Camera) -> _core.Camera:
+    """Equal cameras share one, and its rays."""
+    intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
+    return _core.Camera(camera.width, camera.height, intrinsics, camera.model, camera.distortion)
 
 
 @lru_cache(maxsize=16)
 def _rays(camera: Camera) -> npt.NDArray[np.float32]:
-    rays = np.empty((camera.height, camera.width, 2), dtype=np.float32)
-    columns = np.arange(camera.width, dtype=np.float64)
-    rows_together = max(_STRIP // camera.width, 1)
-    for start in range(0, camera.height, rows_together):
-        rows = np.arange(start, min(start + rows_together, camera.height), dtype=np.float64)
-        pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-        rays[start : start + len(rows)] = camera.undistorted(pixels).reshape(len(rows), camera.width, 2)
+    rays = camera.core.rays()
     rays.setflags(write=False)
     return rays
 

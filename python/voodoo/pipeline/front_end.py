@@ -14,9 +14,8 @@ from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.search import Search, nobody
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.sensors.adapters import Context, Memory, adapters_of, all_adapters
-from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.sensor import KeypointReport
-from voodoo.sensors.motion import LimbMotion
 from voodoo.sensors.rays import SiteRay, add_rays, agreed
 from voodoo.sensors.settings import LEVEL_FRAMES, FrontEndSettings
 from voodoo.sensors.skin.tracker import SkinTracker
@@ -42,7 +41,7 @@ class FrontEnd:
     def __init__(
         self, tracker: Tracker, *, settings: FrontEndSettings | None = None, starts: Starts | None = None
     ) -> None:
-        """Take up the tracker's current estimate as the first prediction."""
+        """Begin with the tracker as it is."""
         self.tracker = tracker
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
@@ -52,16 +51,11 @@ class FrontEnd:
         self._begin()
 
     def _begin(self) -> None:
-        """Predict from the tracker's pose as it stands, if it has one."""
+        """A new person: nothing was measured of them."""
         chosen = self.settings
         # Somebody set the pose, or a source other than the tracker did.
         self._vouched = self.search.posed
-        self._predictor = SitePredictor()
-        self._motion = LimbMotion()
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
-        if self.search.posed:
-            posed = self.tracker.estimate
-            self._predictor.update(float("nan"), posed.joint_names, posed.joint_positions)
 
     @property
     def frozen(self) -> tuple[str, ...]:
@@ -113,8 +107,6 @@ class FrontEnd:
         return estimate
 
     def _learn(self, recorded: RecordedFrame, estimate: Estimate) -> None:
-        self._predictor.update(recorded.stamp, estimate.joint_names, estimate.joint_positions)
-        self._motion.update(recorded.stamp, estimate.limb_poses)
         for item in recorded.measurements:
             for adapter in adapters_of(item):
                 adapter.learn(item, estimate, self.memory, vouched=self._vouched)
@@ -135,8 +127,6 @@ class FrontEnd:
             "_frozen": copy(self._frozen),
             "_gate": copy(self._gate),
             "search": copy(self.search),
-            "_predictor": self._predictor,
-            "_motion": self._motion,
             "_vouched": self._vouched,
         }
 
@@ -153,15 +143,13 @@ class FrontEnd:
             frame.exclude(low, high)
         if self.settings.ground_z is not None:
             frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
-        predicted = self._predictor.predict(recorded.stamp) if self.search.posed else {}
+        predicted = self.tracker.predict(recorded.stamp) if self.search.posed else {}
         context = Context(
             stamp=recorded.stamp,
             measurements=alive,
             predicted=predicted,
             settings=self.settings,
             tracker=self.tracker,
-            predictor=self._predictor,
-            motion=self._motion,
             gate=self._gate,
             memory=self.memory,
         )

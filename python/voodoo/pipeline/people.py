@@ -17,9 +17,8 @@ from voodoo.pipeline.run import stepped
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import Context, Memory, adapters_of
-from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.kinds import inputs_of
-from voodoo.sensors.motion import LimbMotion
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
@@ -77,8 +76,6 @@ class PeopleFrontEnd:
             predicted={},
             settings=chosen,
             tracker=self._nobody,
-            predictor=SitePredictor(),
-            motion=LimbMotion(),
             gate=SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest),
             memory=self.memory,
         )

@@ -16,9 +16,8 @@ from voodoo.people import Followed, People, PeopleEstimate
 from voodoo.pipeline.starts.base import Seen
 from voodoo.pipeline.starts.cameras import everybody
 from voodoo.sensors.adapters import Adapter, Context, Memory, adapters_of
-from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.people import shared_out
-from voodoo.sensors.motion import LimbMotion
 from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.rays import add_rays, agreed
 from voodoo.sensors.settings import FrontEndSettings
@@ -33,18 +32,10 @@ class _Person:
     """What is kept of one person between frames."""
 
     gate: SiteGate
-    predictor: SitePredictor = field(default_factory=SitePredictor)
-    motion: LimbMotion = field(default_factory=LimbMotion)
     memory: Memory = field(default_factory=Memory)
 
     def __copy__(self) -> _Person:
-        return replace(
-            self,
-            gate=copy(self.gate),
-            predictor=copy(self.predictor),
-            motion=copy(self.motion),
-            memory=copy(self.memory),
-        )
+        return replace(self, gate=copy(self.gate), memory=copy(self.memory))
 
 
 class PeopleOwn:
@@ -80,7 +71,7 @@ class PeopleOwn:
         pictured = [item for item in used if isinstance(item, ColorImage) and self.skin]
         depths = [item for item in used if isinstance(item, DepthImage)]
         self._cameras.update(item.sensor for item in images)
-        predicted = {number: person.predictor.predict(stamp) for number, person in self._persons.items()}
+        predicted = {number: Followed(self._people, number).predict(stamp) for number in self._persons}
         shared = [shared_out(item, predicted) for item in images]
         pictures = {number: [each.of[number] for each in shared if number in each.of] for number in predicted}
         for number, joints in self._come(stamp, [each.rest for each in shared], predicted).items():
@@ -100,8 +91,6 @@ class PeopleOwn:
         self._persons = {number: kept for number, kept in self._persons.items() if number in there}
         for number, found in there.items():
             person = self._persons.setdefault(number, self._new())
-            person.predictor.update(estimate.stamp, found.joint_names, found.joint_positions)
-            person.motion.update(estimate.stamp, found.limb_poses)
             for item in pictured:
                 for adapter in _own_adapters(item, self._settings):
                     adapter.learn(item, found, person.memory, vouched=False)
@@ -154,8 +143,6 @@ class PeopleOwn:
             settings=chosen,
             tracker=Followed(self._people, number),
             others=tuple(Followed(self._people, other) for other in everybody_predicted if other != number),
-            predictor=person.predictor,
-            motion=person.motion,
             gate=person.gate,
             memory=person.memory,
         )

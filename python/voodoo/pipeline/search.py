@@ -8,7 +8,6 @@ from typing import Any
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
-from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.pipeline.starts.base import Found, Seen, StartFinder
 from voodoo.pipeline.starts.chosen import Starts, automatic_starts
@@ -17,13 +16,6 @@ from voodoo.tracker import Tracker
 
 GONE_S = 3.0
 """A body that a source found is gone when it was lost for so long [s]: neither source nor tracker found it again."""
-
-_KNOWN = {
-    "head_center", "vc7", "humanoid_root",
-    *(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist", "hand", "hip", "knee", "ankle")),
-}  # fmt: skip
-"""Sites that the tracker's own search finds; a body without one of them needs another start."""
-
 
 RESTART_S = 0.5
 """A body that was lost for so long [s] starts anew where a source finds it: the tracker's own search has had its turn."""
@@ -88,7 +80,7 @@ class Search:
     @property
     def by_tracker(self) -> bool:
         """Whether the tracker looks for somebody in the depth images itself."""
-        return self._starts.by_tracker and knows(self._tracker.body)
+        return self._starts.by_tracker and self._tracker.can_search
 
     def learn(self, estimate: Estimate) -> Estimate:
         """Take up what a step found; the same, or an estimate of nobody where the person is gone for good.
@@ -118,8 +110,3 @@ class Search:
 def nobody(stamp: float) -> Estimate:
     """The estimate of a frame in which nobody is tracked: status "searching", no joints, no limbs."""
     return _core._estimate((stamp, SEARCHING, float("nan"), 0), ([], [], [], []), ([], [], [], [], [], [], []))
-
-
-def knows(body: Body) -> bool:
-    """Whether a tracker looks for a body in depth images itself: it knows people."""
-    return set(body.site_names) >= _KNOWN

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from voodoo._core import Estimate
 from voodoo.config import Config
+from voodoo.detectors.base import AnyDetector
 from voodoo.errors import VoodooError, a_path
 from voodoo.export.result_file import SUFFIXES
 from voodoo.export.skeleton import bones
@@ -21,7 +22,6 @@ from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.search import knows
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
 from voodoo.pipeline.starts.legs import serves
@@ -144,6 +144,7 @@ def start_tracker(
     config: Config | None = None,
     markers: MarkerMap | None = None,
     use: Sequence[str] | None = None,
+    detector: AnyDetector = "shipped",
 ) -> Tracker:
     """A tracker for a recording: in its first pose, or without one, so that it looks for somebody.
 
@@ -157,6 +158,7 @@ def start_tracker(
         config: None means the defaults.
         markers: those worn on limbs become sites of the body.
         use: kinds of inputs in use; None: all.
+        detector: see `Tracker`.
 
     Raises:
         VoodooError: the first pose does not fix that of this body, both body and height are given, a marker stands for a
@@ -179,9 +181,9 @@ def start_tracker(
             raise VoodooError(
                 f"marker {marker}: expected one of the sites {', '.join(body.site_names)}, found {short(site)}"
             )
-    tracker = Tracker(body, config=config if config is not None else Config())
+    tracker = Tracker(body, config=config if config is not None else Config(), detector=detector)
     if init == AUTO:
-        _check_findable(recording, body, use)
+        _check_findable(recording, tracker, use)
     if isinstance(init, Init) and init.stamp_s is None:
         tracker.reset(joints=dict(init.in_root_frame(recording).joints), fit_sizes=True)
     return tracker
@@ -274,11 +276,11 @@ def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
     return _kinds(recording, use) - {"skin", "color"} == {"scan"}
 
 
-def _check_findable(recording: Recording, body: Body, use: Sequence[str] | None) -> None:
+def _check_findable(recording: Recording, tracker: Tracker, use: Sequence[str] | None) -> None:
     """Refuse to look for a body that nothing in the recording can show."""
-    kinds = _kinds(recording, use)
+    kinds, body = _kinds(recording, use), tracker.body
     blind = {"points", "skin", "color"}
-    if not knows(body):
+    if not tracker.can_search:
         blind.add("depth")
     if not serves(body):
         blind.add("scan")

@@ -8,10 +8,10 @@ from collections import deque
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
+from voodoo.model.rotations import turned_between
 from voodoo.recordings.ros_messages import Message
 
 WAVERS_M, WAVERS_RAD = 0.05, math.radians(2.0)
@@ -50,9 +50,8 @@ def inverse(a_from_b: FloatArray) -> FloatArray:
 
 def between(first: FloatArray, second: FloatArray, share: float) -> FloatArray:
     """The rigid transform (4, 4) at a share, 0 to 1, of the way from one to another: straight on, turning evenly."""
-    turns = Rotation.from_matrix([first[:3, :3], second[:3, :3]])
     result = np.eye(4)
-    result[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
+    result[:3, :3] = turned_between(first[:3, :3], second[:3, :3], share)
     result[:3, 3] = (1.0 - share) * first[:3, 3] + share * second[:3, 3]
     return result
 

@@ -53,14 +53,12 @@ def body_view(
     lens = depth_camera
     return _core.body_view(
         depth,
-        lens.rays(),
+        lens,
         np.ascontiguousarray(joints, dtype=np.float64),
         metres_per_unit=metres_per_unit,
-        intrinsics=None if lens.distorted else (lens.fx, lens.fy, lens.cx, lens.cy),
         world_from_depth=world_from_depth,
         color_from_depth=_between(*poses),
-        color_intrinsics=(color_camera.fx, color_camera.fy, color_camera.cx, color_camera.cy),
-        project=color_camera.project if color_camera.distorted else None,
+        color_camera=color_camera,
         # A few centimetres of the body's distance move what is beyond by less than a pixel.
         beyond=lambda away: _beyond(lens, poses[1], color_camera, poses[0], max(round(away, 1), 0.1)),
         # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
@@ -69,6 +67,33 @@ def body_view(
         margin=margin,
         scene=scene,
     )
+
+
+_SIDE, _OUTWARDS = 16, 32
+"""Places on each side of a depth image's border, and on the way from its middle to each of them."""
+
+
+def _corners(camera: Camera) -> FloatArray:
+    """Rays (4, 3) with z = 1 of the corners of an image."""
+    right, bottom = camera.width - 1, camera.height - 1
+    corners = np.ones((4, 3))
+    corners[:, :2] = camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]]
+    return corners
+
+
+@lru_cache(maxsize=8)
+def _border(camera: Camera) -> FloatArray:
+    """Rays (4 _SIDE _OUTWARDS, 3) with z = 1 from the middle of an image to places on its border, place by place; NaN where the
+    lens has none."""
+    right, bottom = camera.width - 1.0, camera.height - 1.0
+    corners = np.array([(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)])
+    share = np.arange(_SIDE)[:, None] / _SIDE
+    sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    border = np.concatenate([first + share * (second - first) for first, second in sides])
+    middle = np.clip((camera.cx, camera.cy), 0.0, (right, bottom))
+    outwards = np.linspace(1.0 / _OUTWARDS, 1.0, _OUTWARDS)[:, None]
+    places = (middle + outwards * (border[:, None] - middle)).reshape(-1, 2)
+    return np.column_stack([camera.undistorted(places), np.ones(len(places))])
 
 
 @lru_cache(maxsize=16)
@@ -84,17 +109,21 @@ def _beyond(
 ) -> npt.NDArray[np.bool_]:
     """(H, W) of the colour image: True where the depth camera does not look, at a distance from it [m]; read-only."""
     world_from_depth, world_from_color = (np.frombuffer(pose).reshape(4, 4) for pose in (depth_pose, color_pose))
-    right, bottom = depth_camera.width - 1, depth_camera.height - 1
-    rays = depth_camera.rays()[[0, 0, bottom, bottom], [0, right, right, 0]]
-    corners = np.ones((4, 3))
-    corners[:, :2] = rays
-    corners = (z * corners) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
-    outline = color_camera.project(in_sensor(world_from_color, corners))
+    bent = depth_camera.distorted or color_camera.distorted
+    rays = _border(depth_camera) if bent else _corners(depth_camera)
+    border = (z * rays) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
+    outline = color_camera.project(in_sensor(world_from_color, border))
+    if bent:
+        # Of each way from the middle outwards the last place that both lenses show.
+        outline = outline.reshape(-1, _OUTWARDS, 2)
+        last = np.isfinite(outline).all(axis=2).cumprod(axis=1).sum(axis=1) - 1
+        outline = outline[last >= 0, last[last >= 0]]
     # The corners are the centres of the outermost pixels.
     middle = outline.mean(axis=0)
     outline = middle + (outline - middle) * (1.0 + 4.0 / min(depth_camera.width, depth_camera.height))
     away = np.ones((color_camera.height, color_camera.width), dtype=np.uint8)
-    if np.isfinite(outline).all():
-        cv2.fillConvexPoly(away, outline.round().clip(-9999, 9999).astype(np.int32), 0)
+    if len(outline) > 2 and np.isfinite(outline).all():
+        places = outline.round().clip(-9999, 9999).astype(np.int32)
+        cv2.fillPoly(away, [places], 0) if bent else cv2.fillConvexPoly(away, places, 0)
     away.setflags(write=False)
     return away.view(np.bool_)

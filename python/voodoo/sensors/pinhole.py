@@ -46,7 +46,8 @@ class Pinhole:
             places = camera.project(np.column_stack([rays, np.ones(len(rays))]))
             # The reduced picture is what is looked into.
             places = (places + 0.5) * (x, y) - 0.5
-            maps = places.astype(np.float32).reshape(height, width, 2)
+            # What the lens does not show is off the picture.
+            maps = np.nan_to_num(places, nan=-9.0).astype(np.float32).reshape(height, width, 2)
             self._maps = cv2.convertMaps(maps[..., 0], maps[..., 1], cv2.CV_16SC2)
 
     def apply(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

@@ -22,7 +22,7 @@ def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:
         pixels: (N, 2) coordinates (u, v).
 
     Returns:
-        (N, 2); NaN where the lens model cannot be inverted (it does not come back to the pixel within 0.1 px).
+        (N, 2); NaN where the lens puts no direction.
 
     Raises:
         MeasurementError: the shape is not (N, 2).

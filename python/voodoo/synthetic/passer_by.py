@@ -157,9 +157,9 @@ def _uncovered(joints: FloatArray, item: DepthImage, nearer: npt.NDArray[np.floa
     sensor_from_root = np.linalg.inv(item.root_from_sensor)
     places = known @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
     camera = item.camera
-    columns = np.rint(camera.fx * places[:, 0] / places[:, 2] + camera.cx)
-    rows = np.rint(camera.fy * places[:, 1] / places[:, 2] + camera.cy)
-    inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height) & (places[:, 2] > 0.0)
+    # NaN, where the camera does not see a place, is in no pixel.
+    columns, rows = np.rint(camera.project(places)).T
+    inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
     there = nearer[rows[inside].astype(int), columns[inside].astype(int)]
     covered = (there > 0.0) & (there < places[inside, 2])
     return float(np.count_nonzero(~covered) / max(len(known), 1)) if len(known) else math.nan

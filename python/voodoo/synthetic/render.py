@@ -57,10 +57,7 @@ def render_depth(
     depth, limb = _core.render_depth(
         body.core,
         ordered_poses(body, world_from_limb),
-        width=camera.width,
-        height=camera.height,
-        intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-        rays=camera.rays() if camera.distorted else None,
+        camera=camera,
         world_from_sensor=None if world_from_sensor is None else rigid(world_from_sensor),
     )
     return RenderedDepth(depth, limb, body.limb_names)

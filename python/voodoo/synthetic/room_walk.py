@@ -44,6 +44,7 @@ class Walk:
         appears: furniture that stands there from a time on.
         noise_m: standard deviation of the depth at 2.4 m [m]; it grows with the square of the depth.
         seed: of the noise.
+        camera: through which the room is seen, with its lens; nothing returns where that shows nothing.
     """
 
     body: Body
@@ -53,6 +54,7 @@ class Walk:
     appears: Sequence[tuple[float, Box]] = ()
     noise_m: float = 0.004
     seed: int = 1
+    camera: Camera = CAMERA
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -78,29 +80,29 @@ class Walk:
             time = index / _RATE_HZ
             poses, sites = self.truth(time)
             boxes = [*FURNITURE, *(box for start, box in self.appears if time >= start)]
-            depth = _room(boxes)
+            depth = _room(self.camera, boxes)
             if not any(start <= time < end for start, end in self.away):
-                seen = render_depth(self.body, poses, camera=CAMERA, world_from_sensor=_WORLD_FROM_SENSOR).depth
+                seen = render_depth(self.body, poses, camera=self.camera, world_from_sensor=_WORLD_FROM_SENSOR).depth
                 depth = np.where((seen > 0.0) & (seen < depth), seen, depth)
             depth = depth + self.noise_m * (depth / _NOISE_AT_M) ** 2 * rng.standard_normal(depth.shape)
             if any(start <= time < end for start, end in self.covered):
                 depth = np.zeros_like(depth)
-            image = np.rint(depth / METRES_PER_UNIT).astype(np.uint16)
+            image = np.rint(np.nan_to_num(depth) / METRES_PER_UNIT).astype(np.uint16)
             yield VirtualFrame(time, image, sites, np.zeros(0), poses)
 
     def measurement(self, frame: VirtualFrame) -> _core.Frame:
         """The frame as a tracker takes it, with the floor known."""
         found = _core.Frame(frame.stamp)
         found.add_depth(
-            frame.image, camera=CAMERA, metres_per_unit=METRES_PER_UNIT, world_from_sensor=_WORLD_FROM_SENSOR
+            frame.image, camera=self.camera, metres_per_unit=METRES_PER_UNIT, world_from_sensor=_WORLD_FROM_SENSOR
         )
         found.set_ground(normal=(0.0, 0.0, 1.0), offset=0.0)
         return found
 
 
-def _room(boxes: Sequence[Box]) -> FloatArray:
-    """Depth (height, width) [m] of floor, wall and boxes."""
-    rays = CAMERA.rays().astype(np.float64)
+def _room(camera: Camera, boxes: Sequence[Box]) -> FloatArray:
+    """Depth (height, width) [m] of floor, wall and boxes; NaN where the lens shows nothing."""
+    rays = camera.rays().astype(np.float64)
     directions = np.stack([np.ones(rays.shape[:2]), -rays[..., 0], -rays[..., 1]], axis=-1)
     origin = _WORLD_FROM_SENSOR[:3, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -111,4 +113,4 @@ def _room(boxes: Sequence[Box]) -> FloatArray:
             near = np.minimum(first, second).max(axis=-1)
             far = np.maximum(first, second).min(axis=-1)
             depth = np.where((near <= far) & (near > 0.0) & (near < depth), near, depth)
-    return depth
+    return np.where(np.isnan(rays[..., 0]), np.nan, depth)

@@ -82,7 +82,7 @@ class VirtualSequence:
         frames: how many, at 30 Hz.
         noise_m: standard deviation of the depth at 2.4 m [m]; it grows with the square of the depth.
         seed: of phases and noise.
-        camera: what it looks like.
+        camera: through which the person is seen, with its lens; nothing returns where that shows nothing.
     """
 
     body: Body
@@ -139,6 +139,7 @@ class VirtualSequence:
     def __iter__(self) -> Iterator[VirtualFrame]:
         """The frames in order, rendered one by one."""
         rng = np.random.default_rng([self.seed, 1])
+        blind = ~np.isfinite(self.camera.rays()).all(axis=2)
         for index in range(self.frames):
             time = index / _RATE_HZ
             poses, sites = self.truth(time)
@@ -146,6 +147,7 @@ class VirtualSequence:
             depth = np.where(seen > 0.0, seen, _WALL_M)
             depth += self.noise_m * (depth / _NOISE_AT_M) ** 2 * rng.standard_normal(depth.shape)
             image = np.rint(depth / METRES_PER_UNIT).astype(np.uint16)
+            image[blind] = 0
             yield VirtualFrame(time, image, sites, self.angles(time), poses)
 
     def measurement(self, frame: VirtualFrame) -> _core.Frame:

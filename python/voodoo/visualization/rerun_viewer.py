@@ -14,12 +14,12 @@ from types import ModuleType, TracebackType
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.errors import VoodooError
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
+from voodoo.model.rotations import quaternions
 from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.search import nobody
@@ -248,7 +248,7 @@ class Viewer:
             self._rr.Ellipsoids3D(
                 centers=estimate.joint_positions[known],
                 half_sizes=np.sqrt(np.maximum(variances, 0.0)),
-                quaternions=Rotation.from_matrix(axes).as_quat() if known.any() else None,
+                quaternions=quaternions(axes) if known.any() else None,
                 line_radii=0.001,
                 colors=(255, 255, 255),
             ),

@@ -154,14 +154,14 @@ mod tests {
     /// A body, and points around it, the last ten known to lie on limb 3.
     fn scene() -> (Body, Vec<Pose>, Candidates) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let poses = body.rest_pose(Pose::identity());
+        let poses = body.rest_pose(Pose::IDENTITY);
         let points: Vec<[f64; 3]> = (0..3000_usize)
             .map(|n| [0.4, 0.9, 2.4].map(|size| size * 1e-3 * ((n * 7919 + (size * 1e3) as usize * n) % 1000) as f64))
             .map(|[x, y, z]| [x - 0.2, y - 0.45, z - 1.2])
             .collect();
         let cloud = |points, scope| Cloud {
             points: PointSlice::F64(points),
-            world_from_sensor: Pose::identity(),
+            world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             scope,
             source: 0,
@@ -250,7 +250,7 @@ mod tests {
             matches.measured.push(place.map(|value| value as f32));
             matches.base_weight.push(0.7);
         }
-        match_limb(limb, &Pose::identity(), 0.15, &mut matches);
+        match_limb(limb, &Pose::IDENTITY, 0.15, &mut matches);
         assert_eq!(matches.weight, [0.7, 0.0, 0.0], "beside the limb, too far, beyond the elbow");
     }
 }

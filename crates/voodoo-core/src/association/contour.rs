@@ -100,7 +100,8 @@ impl ContourSearch {
     /// the image does not tell, or when no edge comes within reach.
     #[inline(always)]
     fn edge(&self, view: &DepthView) -> Option<(f64, Vec3)> {
-        let focal = view.image.intrinsics[0].max(view.image.intrinsics[1]);
+        let [fx, fy] = view.image.camera.focal();
+        let focal = fx.max(fy);
         let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
         let deep = self.thickness + DEPTH_REACH;
         // Long strides as far as the first look past the body, then what lies between is halved.

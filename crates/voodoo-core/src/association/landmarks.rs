@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn the_bands_of_a_limb_weigh_a_fixed_share_of_its_measurements() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let poses = body.rest_pose(Pose::identity());
+        let poses = body.rest_pose(Pose::IDENTITY);
         let mut all = Correspondences::default();
         all.limbs.resize_with(poses.len(), LimbMatches::default);
         for (limb, matches) in all.limbs.iter_mut().enumerate() {
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn a_position_within_its_bias_says_nothing() {
         let body = Body::human(1.75, HumanModel::Papers).unwrap();
-        let poses = body.rest_pose(Pose::identity());
+        let poses = body.rest_pose(Pose::IDENTITY);
         let site = body.site_index("r_hip").unwrap();
         let x = poses[body.sites()[site].limb] * body.sites()[site].position;
         let position =

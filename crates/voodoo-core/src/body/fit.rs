@@ -79,7 +79,7 @@ impl Body {
                 format!("{scale:.4} times"),
             ));
         }
-        let rest = body.rest_pose(Pose::identity());
+        let rest = body.rest_pose(Pose::IDENTITY);
         let mut poses: Vec<Pose> = Vec::with_capacity(rest.len());
         for limb in 0..rest.len() {
             let (prior, anchor) = match &body.limbs()[limb].parent {
@@ -168,7 +168,7 @@ impl Body {
     /// Orientation of the whole body: the landmarks of the trunk (the root and what its joints hold nearly upright on it)
     /// where they fix it, else all sites, against the rest pose.
     fn overall_orientation(&self, positions: &[(usize, Vec3)]) -> Result<Pose, TrackError> {
-        let rest = self.rest_pose(Pose::identity());
+        let rest = self.rest_pose(Pose::IDENTITY);
         let mut trunk = vec![true];
         for limb in &self.limbs()[1..] {
             let steady =

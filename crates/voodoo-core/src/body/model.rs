@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn a_start_is_fitted_from_the_given_sizes_not_from_those_of_the_start_before() {
         let mut model = human();
-        let poses = model.body.rest_pose(Pose::identity());
+        let poses = model.body.rest_pose(Pose::IDENTITY);
         let sites: Vec<(usize, Vec3)> =
             (0..model.body.sites().len()).map(|site| (site, model.body.site_position(&poses, site))).collect();
         let (first, _) = model.fit(&sites, true).unwrap();

@@ -64,7 +64,7 @@ mod tests {
 
     fn human() -> (Body, Vec<Pose>) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let poses = body.rest_pose(Pose::identity());
+        let poses = body.rest_pose(Pose::IDENTITY);
         (body, poses)
     }
 

@@ -1,4 +1,4 @@
-//! How people move, in numbers: made by `python -m training.pose_prior`, not to be edited.
+//! How people move, in numbers: made by `python -m lab.training.pose_prior`, not to be edited.
 //!
 //! The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from NSF EIA-0196217.
 

@@ -52,7 +52,7 @@ mod tests {
     /// A body, and its poses with the left arm sideways, so far from hanging down, radians.
     fn sideways(angle: f64) -> (Body, Vec<Pose>) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let mut poses = body.rest_pose(Pose::identity());
+        let mut poses = body.rest_pose(Pose::IDENTITY);
         for name in ["l_upperarm", "l_forearm", "l_hand"] {
             let limb = body.limb_index(name).unwrap();
             poses[limb].rotation = Quat::from_axis_angle(Vec3::X, angle) * poses[limb].rotation;

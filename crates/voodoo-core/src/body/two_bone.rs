@@ -141,7 +141,7 @@ mod tests {
     fn reaches_targets_on_bodies_of_any_size() {
         for scale in [1.0, 1e-3] {
             let body = Body::human(1.75, HumanModel::Full).unwrap().scaled(scale).unwrap();
-            let rest = body.rest_pose(Pose::identity());
+            let rest = body.rest_pose(Pose::IDENTITY);
             for chain in TwoBone::of(&body) {
                 let target = chain.root(&body, &rest) + Vec3::new(0.6, 0.2, -0.3) * chain.stretched_length();
                 for swivel in 0..6 {

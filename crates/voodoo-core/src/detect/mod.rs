@@ -1,49 +1,125 @@
-//! Finding people in a depth image: what may be one, what a network says of it, and where its joints are.
+//! Detections: what a detector reports of the persons in a depth image, and the trait that a detector implements.
+//!
+//! The core holds no detector of its own. One is handed in, see [`Tracker::with_detector`](crate::Tracker::with_detector); its
+//! joints go by the names of the body's sites.
 
-mod components;
-mod convolution;
-pub mod crop;
-mod floor;
-mod names;
-pub mod network;
-mod product;
-mod rejections;
-pub mod segmentation;
+mod bound;
+mod joint_map;
+mod placement;
 mod skeleton;
-mod view;
-pub mod weights;
-mod winograd;
+
+pub use bound::{BoundDetector, PlacedDetection};
+pub use joint_map::{Detected, JointMap};
+pub(crate) use placement::{is_sized_like, place, posed, sized};
 
 use crate::body::Body;
 use crate::math::{Aabb, Pose, Vec3};
+use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Ground};
-pub use components::Candidate;
-use crop::Crop;
-pub use names::{JOINTS, LENGTHS};
-use network::{Answer, Memory, Network};
-use rejections::Rejections;
-use segmentation::Segmentation;
-pub use skeleton::{lengths, take_lengths};
-use std::sync::{Arc, OnceLock};
-pub use view::Surroundings;
-use weights::WeightsError;
+use crate::observation::share::NOBODY;
+use std::fmt::Debug;
 
-/// Log odds from which on a candidate is taken for a person.
-const PERSON: f32 = 0.0;
-/// Candidates of an image that the network looks at where everybody is wanted: costs time in proportion.
-const MOST_LOOKS: usize = 12;
-/// The standard deviation of a Laplace distribution is this many times its scale.
-const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
+/// Why a detector could not look at an image. The frame is processed without detections.
+pub type DetectError = Box<dyn std::error::Error + Send + Sync>;
 
-/// What is looked for.
+/// A box about joints is this much larger than they span, metres: limbs are thicker than their joints.
+const AROUND_JOINTS: f64 = 0.2;
+
+/// Finds persons in depth images.
+///
+/// ```
+/// use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+/// use voodoo_core::math::Vec3;
+/// use voodoo_core::observation::frame::DepthImage;
+///
+/// /// Somebody always stands at the same place.
+/// #[derive(Clone, Debug)]
+/// struct Standing;
+///
+/// impl Detect for Standing {
+///     fn joints(&self) -> Vec<String> {
+///         ["l_shoulder", "r_shoulder", "l_hip", "r_hip"].map(String::from).to_vec()
+///     }
+///
+///     fn detect(
+///         &mut self,
+///         _image: &DepthImage,
+///         _around: &Surroundings,
+///         _query: DetectionQuery,
+///     ) -> Result<Vec<Detection>, DetectError> {
+///         let places = [[2.4, -0.2, 1.45], [2.4, 0.2, 1.45], [2.4, -0.09, 0.94], [2.4, 0.09, 0.94]];
+///         let joint = |at| Some(DetectedJoint { position: Vec3::from_array(at), sigma: 0.05, visible: 1.0 });
+///         Ok(vec![Detection::new(places.map(joint).to_vec(), 5.0)])
+///     }
+///
+///     fn fresh(&self) -> Box<dyn Detect> {
+///         Box::new(self.clone())
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use voodoo_core::body::HumanModel;
+/// use voodoo_core::{Body, Config, Tracker};
+///
+/// let tracker = Tracker::new(Body::human(1.75, HumanModel::Full)?, Config::default())?.with_detector(Box::new(Standing));
+/// assert!(tracker.can_search());
+/// # Ok(())
+/// # }
+/// ```
+pub trait Detect: Debug + Send + Sync {
+    /// Names of the joints that it reports: those of sites of the body, for humans H-Anim's (ISO/IEC 19774). Names that the body
+    /// lacks are ignored.
+    fn joints(&self) -> Vec<String>;
+
+    /// Names of the lengths that it reports, of `upper_arm`, `forearm`, `thigh`, `shank`, `shoulder_width`, `hip_width`, `trunk`
+    /// (`humanoid_root` to `vc7`), `neck` (`vc7` to `head_center`) and `stature`. Other names are ignored.
+    fn lengths(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Whether it can find this body. By default: the body has sites with the names of its joints, and they fix its pose.
+    fn knows(&self, body: &Body) -> bool {
+        placement::fixes_pose(body, &self.joints())
+    }
+
+    /// Another detector of the same kind that has seen no image: one of several persons gets its own.
+    fn fresh(&self) -> Box<dyn Detect>;
+
+    /// The persons in an image, the most probable first.
+    ///
+    /// A detector may leave out whom the `query` does not ask for; it need not.
+    ///
+    /// # Errors
+    ///
+    /// Whatever keeps it from looking; the tracker then goes on without it in this frame, see
+    /// [`Tracker::detector_error`](crate::Tracker::detector_error).
+    fn detect(
+        &mut self,
+        image: &DepthImage,
+        around: &Surroundings,
+        query: DetectionQuery,
+    ) -> Result<Vec<Detection>, DetectError>;
+
+    /// Log odds that what stands nearest to the place of the last [`DetectionQuery::Near`] is a person, with its box in the world;
+    /// none if nothing of a person's size is there, or where the detector does not tell. A track on what is no person ends by this.
+    fn nearest(&self) -> Option<(f64, Aabb)> {
+        None
+    }
+
+    /// The detection with this index of the last image is not followed: [`DetectionQuery::Any`] and [`DetectionQuery::New`] may
+    /// look at others first.
+    fn reject(&mut self, _index: usize) {}
+}
+
+/// Whom a detector is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wanted {
+pub enum DetectionQuery {
     /// Everybody.
     All,
-    /// Anybody: one candidate is looked at in each image, those first that were not found to be nobody in the images before.
-    Anybody,
+    /// Anybody: one candidate an image will do, those first that were not found to be nobody in the images before.
+    Any,
     /// Anybody, but nothing that was found to be nobody a few images ago.
-    News,
+    New,
     /// The person at this place of the world, metres.
     Near(Vec3),
 }
@@ -62,211 +138,79 @@ pub struct DetectedJoint {
 /// A person in a depth image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Detection {
-    /// Every joint of [`JOINTS`].
-    pub joints: Vec<DetectedJoint>,
-    /// Length and relative standard deviation of everything in [`LENGTHS`]; empty where the network does not tell it.
+    /// The joints of [`Detect::joints`], in that order; `None` for one that was not found.
+    pub joints: Vec<Option<DetectedJoint>>,
+    /// Length (metres) and relative standard deviation of everything in [`Detect::lengths`], in that order; or empty.
     pub lengths: Vec<[f64; 2]>,
-    /// Log odds that the trunk faces the camera.
-    pub facing: f64,
-    /// Log odds that it is a person.
+    /// Log odds that the trunk faces the camera; `None` where the detector does not tell.
+    pub facing: Option<f64>,
+    /// Log odds that it is a person. About 4, over one look or several, make a person: `ln(p / (1 - p))` of a probability `p`.
     pub person: f64,
     /// What the image shows of it: corners of its box in the world, metres.
     pub low: Vec3,
     /// The other corner.
     pub high: Vec3,
-    /// The floor as the image shows it or as it was told, world frame.
+    /// The floor as the image shows it or as [`Surroundings::ground`] gives it, world frame.
     pub floor: Option<Ground>,
-    /// Number of its candidate, see [`Detector::mask`].
-    pub(crate) candidate: usize,
-}
-
-/// Finds people in depth images.
-#[derive(Debug)]
-pub struct Detector {
-    network: Arc<Network>,
-    memory: Memory,
-    segmentation: Segmentation,
-    found: Vec<Detection>,
-    /// Log odds that what was looked at first of the last image is a person, and its box in the world.
-    nearest: Option<(f64, Aabb)>,
-    rejections: Rejections,
-}
-
-/// The network that comes with the library, read once.
-fn shipped() -> Result<Arc<Network>, WeightsError> {
-    static NETWORK: OnceLock<Result<Arc<Network>, WeightsError>> = OnceLock::new();
-    let read = || Network::read(include_bytes!("person.weights")).map(Arc::new);
-    NETWORK.get_or_init(read).clone()
+    /// Indices of the pixels that show it; empty: those that lie within its box.
+    pub pixels: Vec<usize>,
 }
 
 impl Detection {
-    /// A joint by its name in [`JOINTS`].
-    pub fn joint(&self, name: &str) -> Option<&DetectedJoint> {
-        JOINTS.iter().position(|joint| *joint == name).and_then(|index| self.joints.get(index))
-    }
-
-    /// The joint that is a site of a body, by the site's name.
-    pub(crate) fn at_site(&self, body: &Body, site: usize) -> Option<&DetectedJoint> {
-        self.joint(&body.sites()[site].name)
-    }
-
-    /// Where the person is: the root of its body, world frame, metres.
-    pub(crate) fn place(&self) -> Option<Vec3> {
-        self.joint("humanoid_root").map(|root| root.position)
-    }
-
-    /// The person's sizes as in [`LENGTHS`], metres: those that the network tells, else the joints' distances without the stature.
-    pub fn sizes(&self) -> Vec<f64> {
-        if !self.lengths.is_empty() {
-            return self.lengths.iter().map(|length| length[0]).collect();
-        }
-        let joints: Vec<Vec3> = self.joints.iter().map(|joint| joint.position).collect();
-        lengths(&joints)
+    /// A person with these joints, which span its box, and log odds; nothing else is reported.
+    pub fn new(joints: Vec<Option<DetectedJoint>>, person: f64) -> Self {
+        let positions = || joints.iter().flatten().map(|joint| joint.position);
+        let around = Vec3::splat(AROUND_JOINTS);
+        let low = positions().reduce(Vec3::min).unwrap_or_default() - around;
+        let high = positions().reduce(Vec3::max).unwrap_or_default() + around;
+        Self { low, high, joints, person, ..Self::default() }
     }
 }
 
-impl Detector {
-    /// A detector with the network that comes with the library.
-    pub fn new() -> Result<Self, WeightsError> {
-        Ok(Self::of(shipped()?))
+/// What is known of the place beside the image.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Surroundings<'a> {
+    /// The floor, world frame.
+    pub ground: Option<Ground>,
+    /// Direction upwards where no floor is known, world frame, unit length.
+    pub up: Option<Vec3>,
+    /// Depth of the learnt background at every pixel, metres; empty where none was learnt.
+    pub background: &'a [f32],
+    /// Boxes of the world that hold nobody.
+    pub excluded: &'a [Aabb],
+    /// Who explains each pixel, and who does not matter among them; empty where nobody does.
+    pub owners: &'a [u16],
+    /// Whose pixels may be the person all the same.
+    pub own: Option<u16>,
+}
+
+impl Surroundings<'_> {
+    /// Whether a pixel with a depth of `z` metres shows the background, or somebody who is tracked already.
+    pub fn explains(&self, index: usize, z: f32) -> bool {
+        let others = self.owners.get(index).is_some_and(|owner| *owner != NOBODY && Some(*owner) != self.own);
+        others || self.background.get(index).is_some_and(|depth| Background::holds(*depth, z))
     }
 
-    /// A detector with a network of one's own.
-    pub fn with_weights(bytes: &[u8]) -> Result<Self, WeightsError> {
-        let network = Network::read(bytes)?;
-        if network.joints() != JOINTS.len() {
-            return Err(WeightsError::new(format!("{} joints", JOINTS.len()), network.joints().to_string()));
-        }
-        Ok(Self::of(Arc::new(network)))
+    /// Whether a place of the world is in one of the boxes that hold nobody.
+    pub fn excludes(&self, point: Vec3) -> bool {
+        self.excluded.iter().any(|bounds| bounds.contains(point))
     }
 
-    fn of(network: Arc<Network>) -> Self {
-        Self {
-            network,
-            memory: Memory::default(),
-            segmentation: Segmentation::default(),
-            found: Vec::new(),
-            nearest: None,
-            rejections: Rejections::default(),
-        }
-    }
-
-    /// The people in an image, the surest first.
-    pub fn detect(&mut self, image: &DepthImage, around: &Surroundings, wanted: Wanted) -> &[Detection] {
-        let Self { network, memory, segmentation, found, nearest, rejections } = self;
-        found.clear();
-        *nearest = None;
-        rejections.next_image();
-        segmentation.find(image, around);
-        let camera_from_world = image.world_from_sensor.inverse();
-        let mut order: Vec<usize> = (0..segmentation.candidates().len()).collect();
-        let at = |number: usize| &segmentation.candidates()[number];
-        match wanted {
-            Wanted::All => {}
-            Wanted::Anybody => order.sort_by_key(|number| rejections.last(at(*number))),
-            Wanted::News => {
-                order.retain(|number| !rejections.is_old(at(*number)));
-                order.sort_by_key(|number| rejections.last(at(*number)));
-            }
-            Wanted::Near(place) => {
-                let place = camera_from_world * place;
-                order.sort_by(|a, b| at(*a).distance(place).total_cmp(&at(*b).distance(place)));
-            }
-        }
-        let mut looks = 0;
-        for number in order {
-            let candidate = &segmentation.candidates()[number];
-            let Some(crop) = segmentation.crop(candidate) else { continue };
-            let answer = network.look(&crop.pixels, memory);
-            looks += 1;
-            if nearest.is_none() {
-                *nearest = Some((f64::from(answer.person), in_world(candidate, &image.world_from_sensor)));
-            }
-            if answer.person > PERSON {
-                found.push(detection(&answer, &crop, candidate, number, &image.world_from_sensor));
-            }
-            rejections.note(candidate, answer.person > PERSON);
-            if looks == MOST_LOOKS || wanted != Wanted::All {
-                break;
-            }
-        }
-        found.sort_by(|a, b| b.person.total_cmp(&a.person));
-        // Of candidates that share parts the surest stays.
-        let shared = |a: &Detection, b: &Detection| {
-            let [a, b] = [a, b].map(|detection| &segmentation.candidates()[detection.candidate]);
-            a.shares(b)
-        };
-        let mut kept: Vec<Detection> = Vec::new();
-        for detection in found.drain(..) {
-            if !kept.iter().any(|other| shared(other, &detection)) {
-                kept.push(detection);
-            }
-        }
-        let floor = segmentation.floor().map(|floor| {
-            let normal = image.world_from_sensor.rotation * floor.normal;
-            Ground { normal, offset: floor.offset + normal.dot(image.world_from_sensor.translation) }
-        });
-        kept.iter_mut().for_each(|detection| detection.floor = floor);
-        *found = kept;
-        found
-    }
-
-    /// Log odds that what was looked at first of the last image is a person, with its box in the world; none if nothing there
-    /// has a person's size.
-    pub fn first_look(&self) -> Option<(f64, Aabb)> {
-        self.nearest
-    }
-
-    /// Nobody asks for a person of the last image: others are looked at before them.
-    pub fn refuse(&mut self, detection: &Detection) {
-        if let Some(candidate) = self.segmentation.candidates().get(detection.candidate) {
-            self.rejections.note(candidate, false);
-        }
-    }
-
-    /// Indices of the pixels of a detection of the last image.
-    pub fn mask(&self, detection: &Detection, into: &mut Vec<usize>) {
-        into.clear();
-        if let Some(candidate) = self.segmentation.candidates().get(detection.candidate) {
-            self.segmentation.mask(candidate, into);
-        }
+    /// The depth of every pixel of an image, metres; 0 where nothing returned, and where it is known that what returned is nobody who
+    /// is asked for.
+    pub fn open_depth(&self, image: &DepthImage, depth: &mut Vec<f32>) {
+        depth.clear();
+        depth.extend((0..image.pixels.len()).map(|index| {
+            let z = image.pixels.get(index) * image.metres_per_unit as f32;
+            let open = z > 0.0 && z.is_finite() && !self.explains(index, z);
+            let excluded = || self.excludes(world_point(image, index, z));
+            if open && (self.excluded.is_empty() || !excluded()) { z } else { 0.0 }
+        }));
     }
 }
 
-/// The box about a candidate's box.
-fn in_world(candidate: &Candidate, world_from_camera: &Pose) -> Aabb {
-    let corners = [candidate.low, candidate.high];
-    let corner = |number: usize| {
-        let pick = |bit: usize, axis: usize| corners[(number >> bit) & 1][axis];
-        *world_from_camera * Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2))
-    };
-    Aabb::from_points((0..8).map(corner))
-}
-
-/// What the network said, in the world.
-fn detection(
-    answer: &Answer,
-    crop: &Crop,
-    candidate: &Candidate,
-    number: usize,
-    world_from_camera: &Pose,
-) -> Detection {
-    let joint = |((place, log_scale), visible): ((&[f32; 3], &f32), &f32)| DetectedJoint {
-        position: *world_from_camera * crop.to_camera(Vec3::from_array(place.map(f64::from))),
-        sigma: SIGMA_BY_SCALE * f64::from(*log_scale).exp(),
-        visible: 1.0 / (1.0 + f64::from(-visible).exp()),
-    };
-    let joints = answer.joints.iter().zip(&answer.log_scale).zip(&answer.visible).map(joint).collect();
-    let length = |(length, scale): (&f32, &f32)| [f64::from(*length).exp(), SIGMA_BY_SCALE * f64::from(*scale).exp()];
-    let bounds = in_world(candidate, world_from_camera);
-    Detection {
-        joints,
-        lengths: answer.log_lengths.iter().zip(&answer.log_length_scale).map(length).collect(),
-        facing: f64::from(answer.facing),
-        person: f64::from(answer.person),
-        low: bounds.mins,
-        high: bounds.maxs,
-        floor: None,
-        candidate: number,
-    }
+/// The place in the world that a pixel shows at a depth of `z` metres.
+fn world_point(image: &DepthImage, index: usize, z: f32) -> Vec3 {
+    let world_from_sensor: &Pose = &image.world_from_sensor;
+    *world_from_sensor * image.back_project(index, z)
 }

@@ -1,86 +1,194 @@
-//! Joints at the distances that a person's sizes demand: every joint by itself is drawn towards the mean of where it may be,
+//! A person's joints at the distances that their sizes demand: every joint by itself is drawn towards the mean of where it may be,
 //! which makes limbs short.
 
-use super::names::JOINTS;
 use crate::math::Vec3;
 
-/// Sides of the body, the person's own.
-const SIDES: [&str; 2] = ["l_", "r_"];
+/// The lengths that joints can be put at, in this order; [`Skeleton::new`] says between which joints they are.
+const LENGTHS: [&str; COUNT] =
+    ["upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck"];
+const COUNT: usize = 8;
 
-/// Gives the limbs of joints as in [`JOINTS`] the lengths of [`LENGTHS`](super::names::LENGTHS), in directions that stay. The trunk's
-/// middle stays where it is.
-pub fn take_lengths(joints: &mut [Vec3], lengths: &[f64]) {
-    Skeleton { joints }.take_lengths(lengths);
+/// Some of [`LENGTHS`], metres.
+pub(super) type Lengths = [Option<f64>; COUNT];
+
+/// Numbers of a detector's joints and lengths; none of those that it does not report.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Skeleton {
+    root: Option<usize>,
+    top: Option<usize>,
+    head: Option<usize>,
+    /// Shoulder, elbow, wrist and hand of the left and the right arm.
+    arms: [[Option<usize>; 4]; 2],
+    /// Hip, knee and ankle.
+    legs: [[Option<usize>; 3]; 2],
+    lengths: [Option<usize>; COUNT],
 }
 
-/// What [`take_lengths`] takes, of joints: the mean of both sides.
-pub fn lengths(joints: &[Vec3]) -> Vec<f64> {
-    let at = |name: &str| index(name).map_or(Vec3::ZERO, |index| joints[index]);
-    let bone = |from: &str, to: &str| {
-        0.5 * SIDES.iter().map(|side| at(&format!("{side}{from}")).distance(at(&format!("{side}{to}")))).sum::<f64>()
-    };
-    let across = |name: &str| at(&format!("l_{name}")).distance(at(&format!("r_{name}")));
-    vec![
-        bone("shoulder", "elbow"),
-        bone("elbow", "wrist"),
-        bone("hip", "knee"),
-        bone("knee", "ankle"),
-        across("shoulder"),
-        across("hip"),
-        at("humanoid_root").distance(at("vc7")),
-        at("vc7").distance(at("head_center")),
-    ]
-}
-
-/// Where joints were seen, by name.
-#[derive(Debug)]
-struct Skeleton<'a> {
-    joints: &'a mut [Vec3],
-}
-
-impl Skeleton<'_> {
-    fn get(&self, name: &str) -> Vec3 {
-        index(name).map_or(Vec3::ZERO, |index| self.joints[index])
-    }
-
-    fn set(&mut self, name: &str, position: Vec3) {
-        if let Some(index) = index(name) {
-            self.joints[index] = position;
+impl Skeleton {
+    /// What has which number, by H-Anim's names of joints and by names of lengths.
+    pub(super) fn new(joint: impl Fn(&str) -> Option<usize>, length: impl Fn(&str) -> Option<usize>) -> Self {
+        let of_side = |side: &str, stem: &str| joint(&format!("{side}_{stem}"));
+        Self {
+            root: joint("humanoid_root"),
+            top: joint("vc7"),
+            head: joint("head_center"),
+            arms: ["l", "r"].map(|side| ["shoulder", "elbow", "wrist", "hand"].map(|stem| of_side(side, stem))),
+            legs: ["l", "r"].map(|side| ["hip", "knee", "ankle"].map(|stem| of_side(side, stem))),
+            lengths: LENGTHS.map(length),
         }
     }
 
-    fn take_lengths(&mut self, lengths: &[f64]) {
-        let [upper_arm, forearm, thigh, shank, shoulders, hips, trunk, neck, ..] = *lengths else { return };
-        let (root, top) = (self.get("humanoid_root"), self.get("vc7"));
-        let (middle, along) = (0.5 * (root + top), (top - root).normalize_or_zero());
-        let up = middle + 0.5 * trunk * along - top;
-        let down = middle - 0.5 * trunk * along - root;
-        let head = self.get("head_center") - top;
-        self.set("humanoid_root", root + down);
-        self.set("vc7", top + up);
-        self.set("head_center", top + up + neck * head.normalize_or_zero());
-        self.limbs(["shoulder", "elbow", "wrist", "hand"], shoulders, [upper_arm, forearm], up);
-        self.limbs(["hip", "knee", "ankle", ""], hips, [thigh, shank], down);
+    /// The lengths that a detector reports in its own order.
+    pub(super) fn reported<T: Copy>(&self, lengths: &[T]) -> [Option<T>; COUNT] {
+        self.lengths.map(|index| lengths.get(index?).copied())
     }
 
-    /// Two arms or legs: the distance of their roots, their lengths, and by how much the trunk's end was moved.
-    fn limbs(&mut self, names: [&str; 4], width: f64, lengths: [f64; 2], moved: Vec3) {
-        let [roots, bends, ends, tips] = names.map(|name| SIDES.map(|side| format!("{side}{name}")));
-        let [left, right] = [self.get(&roots[0]), self.get(&roots[1])];
+    /// The distances of joints: the mean of both sides, or that of the one that is known.
+    pub(super) fn measure(&self, joints: &[Option<Vec3>]) -> Lengths {
+        let at = |index: Option<usize>| joints.get(index?).copied().flatten();
+        let apart = |from: Option<usize>, to: Option<usize>| Some(at(from)?.distance(at(to)?));
+        let mean = |sides: [Option<f64>; 2]| match sides {
+            [Some(left), Some(right)] => Some(0.5 * (left + right)),
+            [left, right] => left.or(right),
+        };
+        let of_arms = |bone: usize| mean(self.arms.map(|arm| apart(arm[bone], arm[bone + 1])));
+        let of_legs = |bone: usize| mean(self.legs.map(|leg| apart(leg[bone], leg[bone + 1])));
+        [
+            of_arms(0),
+            of_arms(1),
+            of_legs(0),
+            of_legs(1),
+            apart(self.arms[0][0], self.arms[1][0]),
+            apart(self.legs[0][0], self.legs[1][0]),
+            apart(self.root, self.top),
+            apart(self.top, self.head),
+        ]
+    }
+
+    /// Gives limbs these lengths, in directions that stay. The trunk's middle stays where it is.
+    pub(super) fn take_lengths(&self, joints: &mut [Option<Vec3>], lengths: &Lengths) {
+        let [upper_arm, forearm, thigh, shank, shoulders, hips, trunk, neck] = *lengths;
+        let at = |index: Option<usize>| joints.get(index?).copied().flatten();
+        let (root, top, head) = (at(self.root), at(self.top), at(self.head));
+        let [mut up, mut down] = [Vec3::ZERO; 2];
+        if let (Some(root), Some(top), Some(trunk)) = (root, top, trunk) {
+            let (middle, along) = (0.5 * (root + top), (top - root).normalize_or_zero());
+            up = middle + 0.5 * trunk * along - top;
+            down = middle - 0.5 * trunk * along - root;
+        }
+        let head = head.map(|head| match (top, neck) {
+            (Some(top), Some(neck)) => top + up + neck * (head - top).normalize_or_zero(),
+            _ => head + up,
+        });
+        set(joints, self.root, root.map(|root| root + down));
+        set(joints, self.top, top.map(|top| top + up));
+        set(joints, self.head, head);
+        limbs(joints, &self.arms, shoulders, [upper_arm, forearm], up);
+        limbs(joints, &self.legs, hips, [thigh, shank], down);
+    }
+}
+
+fn set(joints: &mut [Option<Vec3>], index: Option<usize>, position: Option<Vec3>) {
+    if let Some(joint) = index.and_then(|index| joints.get_mut(index)) {
+        *joint = position;
+    }
+}
+
+/// Two arms or legs: the distance of their roots, the lengths of their bones, and by how much the trunk's end was moved.
+fn limbs<const N: usize>(
+    joints: &mut [Option<Vec3>],
+    sides: &[[Option<usize>; N]; 2],
+    width: Option<f64>,
+    lengths: [Option<f64>; 2],
+    moved: Vec3,
+) {
+    let before = sides.map(|side| side.map(|index| joints.get(index?).copied().flatten()));
+    let mut roots = before.map(|side| side[0].map(|root| root + moved));
+    if let ([Some(left), Some(right)], Some(width)) = (before.map(|side| side[0]), width) {
         let (middle, half) = (0.5 * (left + right) + moved, 0.5 * width * (left - right).normalize_or_zero());
-        for (side, place) in [middle + half, middle - half].into_iter().enumerate() {
-            let [root, bend, end] = [&roots, &bends, &ends].map(|names| self.get(&names[side]));
-            let bend_now = place + lengths[0] * (bend - root).normalize_or_zero();
-            let end_now = bend_now + lengths[1] * (end - bend).normalize_or_zero();
-            let tip = self.get(&tips[side]);
-            self.set(&tips[side], tip + end_now - end);
-            self.set(&roots[side], place);
-            self.set(&bends[side], bend_now);
-            self.set(&ends[side], end_now);
+        roots = [Some(middle + half), Some(middle - half)];
+    }
+    for ((side, before), root) in sides.iter().zip(&before).zip(roots) {
+        set(joints, side[0], root);
+        // What is nearest before a joint: where it was, and where it is now.
+        let mut last = before[0].zip(root);
+        for number in 1..N {
+            let Some(old) = before[number] else { continue };
+            let bone = lengths.get(number - 1).copied().flatten().filter(|_| before[number - 1].is_some());
+            let new = match (last, bone) {
+                (Some((from, now)), Some(length)) => now + length * (old - from).normalize_or_zero(),
+                (Some((from, now)), None) => old + now - from,
+                (None, _) => old + moved,
+            };
+            set(joints, side[number], Some(new));
+            last = Some((old, new));
         }
     }
 }
 
-fn index(name: &str) -> Option<usize> {
-    JOINTS.iter().position(|joint| *joint == name)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: [&str; 10] = [
+        "humanoid_root",
+        "vc7",
+        "head_center",
+        "l_shoulder",
+        "r_shoulder",
+        "l_elbow",
+        "l_wrist",
+        "l_hand",
+        "r_wrist",
+        "l_knee",
+    ];
+
+    fn skeleton(names: &[&str]) -> Skeleton {
+        Skeleton::new(|name| names.iter().position(|joint| *joint == name), |_| None)
+    }
+
+    fn joints() -> Vec<Option<Vec3>> {
+        [
+            [0.0, 0.0, 0.9],
+            [0.0, 0.0, 1.5],
+            [0.0, 0.0, 1.7],
+            [0.0, 0.2, 1.4],
+            [0.0, -0.2, 1.4],
+            [0.0, 0.5, 1.4],
+            [0.0, 0.7, 1.4],
+            [0.0, 0.8, 1.4],
+            [0.0, -0.7, 1.4],
+            [0.0, 0.1, 0.5],
+        ]
+        .map(|place| Some(Vec3::from_array(place)))
+        .to_vec()
+    }
+
+    #[test]
+    fn joints_are_put_at_the_lengths_that_are_given_and_what_hangs_on_them_moves_along() {
+        let skeleton = skeleton(&NAMES);
+        let mut joints = joints();
+        let mut lengths = skeleton.measure(&joints);
+        assert_eq!(lengths.map(|length| length.is_some()), [true, true, false, false, true, false, true, true]);
+        lengths[0] = Some(0.35);
+        lengths[4] = Some(0.5);
+        skeleton.take_lengths(&mut joints, &lengths);
+        let place = |index: usize| joints[index].unwrap_or(Vec3::NAN);
+        assert!((place(3) - Vec3::new(0.0, 0.25, 1.4)).length() < 1e-12, "the left shoulder is farther out");
+        assert!((place(5) - Vec3::new(0.0, 0.6, 1.4)).length() < 1e-12, "its elbow is farther still");
+        assert!((place(7) - Vec3::new(0.0, 0.9, 1.4)).length() < 1e-12, "the hand goes with the wrist");
+        // The right elbow is not reported: the wrist moves with the shoulder.
+        assert!((place(8) - Vec3::new(0.0, -0.75, 1.4)).length() < 1e-12);
+        assert!((place(9) - Vec3::new(0.0, 0.1, 0.5)).length() < 1e-12, "nothing is known of a leg without its hip");
+    }
+
+    #[test]
+    fn of_few_joints_few_lengths_are_known_and_all_others_stay() {
+        let skeleton = skeleton(&["l_wrist", "r_wrist", "head_center"]);
+        let mut joints = joints()[..3].to_vec();
+        let before = joints.clone();
+        assert_eq!(skeleton.measure(&joints), [None; COUNT]);
+        skeleton.take_lengths(&mut joints, &[Some(0.3); COUNT]);
+        assert_eq!(joints, before);
+    }
 }

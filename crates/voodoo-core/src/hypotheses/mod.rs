@@ -22,7 +22,7 @@ pub use unexplained::CLUTTER;
 
 use crate::association::correspondence::RegionSupport;
 use crate::body::{Body, Model};
-use crate::detect::Detection;
+use crate::detect::Detected;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
 use crate::visibility::LITTLE;
@@ -97,7 +97,7 @@ impl Hypotheses {
         fit: &mut Fit,
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
-        detection: Option<&Detection>,
+        detection: Option<Detected>,
         detected: &[Pose],
     ) -> usize {
         self.make_room(context, fit);
@@ -195,7 +195,7 @@ impl Hypotheses {
     }
 
     /// Fills the pool with other configurations of one arm or leg.
-    fn propose(&mut self, at: Extremity, detection: Option<&Detection>, detected: &[Pose]) {
+    fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &[Pose]) {
         let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);

@@ -1,14 +1,178 @@
 //! The one vocabulary for 3-D geometry.
 //!
-//! Points, rotations and poses are the glam types that parry uses, taken through parry so that both always agree on the
-//! version. nalgebra is used for linear algebra only (eigen-problems, Cholesky) and only inside `solver`.
+//! Points and rotations are glam's. nalgebra is used for linear algebra only (eigen-problems, Cholesky) and only inside `solver`.
 //!
 //! Conventions, fixed here for the whole project:
 //! * a transform is named `a_from_b` and maps coordinates in `b` to coordinates in `a`;
 //! * a twist is `(omega, v)`, radians and metres, and perturbs on the left: `T' = exp(xi) T`.
 
-pub use parry3d_f64::bounding_volume::Aabb;
-pub use parry3d_f64::glamx::{DMat3 as Mat3, DPose3 as Pose, DQuat as Quat, DVec3 as Vec3};
+pub use glam::{DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3};
+use std::ops::Mul;
+
+/// A rigid transform: a rotation, then a translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// A unit quaternion.
+    pub rotation: Quat,
+    /// Where the origin goes, metres.
+    pub translation: Vec3,
+}
+
+impl Pose {
+    /// Nothing moves.
+    pub const IDENTITY: Self = Self { rotation: Quat::IDENTITY, translation: Vec3::ZERO };
+
+    /// A pose of its two parts.
+    #[inline]
+    pub fn from_parts(translation: Vec3, rotation: Quat) -> Self {
+        Self { rotation, translation }
+    }
+
+    /// A translation alone, metres.
+    #[inline]
+    pub fn from_translation(translation: Vec3) -> Self {
+        Self::from_parts(translation, Quat::IDENTITY)
+    }
+
+    /// A rotation alone.
+    #[inline]
+    pub fn from_rotation(rotation: Quat) -> Self {
+        Self::from_parts(Vec3::ZERO, rotation)
+    }
+
+    /// A translation, metres, and a rotation vector, radians.
+    #[inline]
+    pub fn new(translation: Vec3, rotation_vector: Vec3) -> Self {
+        Self::from_parts(translation, Quat::from_scaled_axis(rotation_vector))
+    }
+
+    /// The transform back.
+    #[inline]
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.inverse();
+        Self { rotation, translation: rotation * (-self.translation) }
+    }
+
+    /// `self.inverse() * other`, with a rounding error less.
+    #[inline]
+    pub fn inv_mul(&self, other: &Self) -> Self {
+        let rotation = self.rotation.inverse();
+        Self { translation: rotation * (other.translation - self.translation), rotation: rotation * other.rotation }
+    }
+
+    /// A point, transformed.
+    #[inline]
+    pub fn transform_point(&self, point: Vec3) -> Vec3 {
+        self.rotation * point + self.translation
+    }
+
+    /// A point, transformed back.
+    #[inline]
+    pub fn inverse_transform_point(&self, point: Vec3) -> Vec3 {
+        self.rotation.inverse() * (point - self.translation)
+    }
+
+    /// A direction, rotated back.
+    #[inline]
+    pub fn inverse_transform_vector(&self, vector: Vec3) -> Vec3 {
+        self.rotation.inverse() * vector
+    }
+
+    /// The pose a share `t` of the way to another one: spherical for the rotation, linear for the translation.
+    #[inline]
+    pub fn lerp(&self, other: &Self, t: f64) -> Self {
+        Self {
+            rotation: self.rotation.slerp(other.rotation, t),
+            translation: self.translation.lerp(other.translation, t),
+        }
+    }
+
+    /// Whether no number of it is NaN or infinite.
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        self.rotation.is_finite() && self.translation.is_finite()
+    }
+}
+
+impl Default for Pose {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+impl Mul for Pose {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        Self {
+            rotation: self.rotation * other.rotation,
+            translation: self.translation + self.rotation * other.translation,
+        }
+    }
+}
+
+impl Mul<Vec3> for Pose {
+    type Output = Vec3;
+
+    #[inline]
+    fn mul(self, point: Vec3) -> Vec3 {
+        self.transform_point(point)
+    }
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// The corner with the smallest coordinates, metres.
+    pub mins: Vec3,
+    /// The corner with the largest.
+    pub maxs: Vec3,
+}
+
+impl Aabb {
+    /// Holds nothing: the box about it and another one is the other one.
+    pub const EMPTY: Self = Self { mins: Vec3::MAX, maxs: Vec3::MIN };
+
+    /// The box between two corners.
+    #[inline]
+    pub fn new(mins: Vec3, maxs: Vec3) -> Self {
+        Self { mins, maxs }
+    }
+
+    /// The box about points.
+    pub fn from_points(points: impl IntoIterator<Item = Vec3>) -> Self {
+        let grow = |all: Self, point| Self { mins: all.mins.min(point), maxs: all.maxs.max(point) };
+        points.into_iter().fold(Self::EMPTY, grow)
+    }
+
+    /// The middle.
+    #[inline]
+    pub fn center(&self) -> Vec3 {
+        self.mins.midpoint(self.maxs)
+    }
+
+    /// Lengths of the sides.
+    #[inline]
+    pub fn extents(&self) -> Vec3 {
+        self.maxs - self.mins
+    }
+
+    /// Whether a point lies in the box or on it.
+    #[inline]
+    pub fn contains(&self, point: Vec3) -> bool {
+        !(point.cmplt(self.mins) | point.cmpgt(self.maxs)).any()
+    }
+
+    /// The eight corners.
+    pub fn corners(&self) -> [Vec3; 8] {
+        let (low, high) = (self.mins, self.maxs);
+        std::array::from_fn(|corner| {
+            let pick = |axis: usize| if (corner >> axis) & 1 == 1 { high[axis] } else { low[axis] };
+            Vec3::new(pick(0), pick(1), pick(2))
+        })
+    }
+}
 
 /// No place lies farther from its origin, metres: three times as far as the Moon. Beyond, squares and products of coordinates
 /// have no digits left for a body, and at last are infinite.
@@ -22,6 +186,14 @@ pub fn is_place(place: Vec3) -> bool {
 /// Whether a pose can be meant: a place, and a unit quaternion.
 pub fn is_rigid(pose: &Pose) -> bool {
     is_place(pose.translation) && pose.rotation.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6
+}
+
+/// A pose as the rows of a 4x4 matrix.
+pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
+    let rows = Mat3::from_quat(pose.rotation).transpose().to_cols_array_2d();
+    let t = pose.translation;
+    let row = |index: usize, shift: f64| [rows[index][0], rows[index][1], rows[index][2], shift];
+    [row(0, t.x), row(1, t.y), row(2, t.z), [0.0, 0.0, 0.0, 1.0]]
 }
 
 /// Single-precision points as a structure of arrays, the layout the SIMD kernels read. Metres.

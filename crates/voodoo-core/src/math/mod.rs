@@ -3,12 +3,14 @@
 mod absolute_orientation;
 mod cholesky;
 mod geometry;
+mod linear_sum_assignment;
 mod simd;
 mod weighted_points;
 
 pub use absolute_orientation::Moments;
 pub use cholesky::{factor, half_substitute, solve_in_place};
 pub use geometry::*;
+pub use linear_sum_assignment::{CostTable, linear_sum_assignment};
 pub use simd::{LANES, has_avx512, widest};
 pub use weighted_points::WeightedPoints;
 

@@ -71,7 +71,7 @@ impl Background {
     }
 
     pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
-        self.width == image.width && self.depth.len() == image.pixels.len()
+        self.width == image.camera.width() && self.depth.len() == image.pixels.len()
     }
 
     /// Learns from neighbouring pixels, without a branch.
@@ -134,7 +134,7 @@ impl Backgrounds {
     pub(super) fn adopt(&mut self, frame: &Frame, scene: &Self, mut change: impl FnMut(usize, &mut [f32])) {
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
-            (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.width);
+            (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.camera.width());
             own.depth.clear();
             match scene.of(image) {
                 Some(known) => own.depth.extend_from_slice(&known.depth),
@@ -175,7 +175,7 @@ impl Backgrounds {
             forget_body(image, &mut depth);
             self.images.push(Background {
                 world_from_sensor: Some(image.world_from_sensor),
-                width: image.width,
+                width: image.camera.width(),
                 depth,
                 rays: Vec::new(),
                 row: 0,
@@ -195,15 +195,15 @@ impl Backgrounds {
 
     /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. What a
     /// camera learnt that moved since is carried along; one that is silent in this frame is remembered.
-    pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> (Range<usize>, Range<usize>)) {
+    pub fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> [Range<usize>; 2]) {
         for image in frame.images {
             let known = self.images.iter().position(|background| background.fits(image));
             let index = known.unwrap_or_else(|| self.carry(image, frame).0);
             let background = &mut self.images[index];
-            let (columns, rows) = window(image);
+            let [columns, rows] = window(image);
             background.row = (background.row + 1) % ROW_STEP;
-            for row in (background.row..image.height).step_by(ROW_STEP) {
-                let (start, end) = (row * image.width, (row + 1) * image.width);
+            for row in (background.row..image.camera.height()).step_by(ROW_STEP) {
+                let (start, end) = (row * image.camera.width(), (row + 1) * image.camera.width());
                 if rows.contains(&row) {
                     background.learn(image, start..start + columns.start);
                     background.learn(image, start + columns.end..end);
@@ -238,6 +238,7 @@ fn fill_row(row: &mut [f32]) {
 mod tests {
     use super::*;
     use crate::math::Vec3;
+    use crate::testing::pinhole;
 
     #[test]
     fn a_gap_is_filled_from_its_sides() {
@@ -255,11 +256,8 @@ mod tests {
         let pixels = [3.0_f32; 4 * ROW_STEP];
         let image = |x: f64| DepthImage {
             pixels: DepthPixels::F32(&pixels),
-            width: 4,
-            height: ROW_STEP,
+            camera: pinhole(4, ROW_STEP, [4.0, 4.0, 2.0, 4.0]),
             metres_per_unit: 1.0,
-            intrinsics: [4.0, 4.0, 2.0, 4.0],
-            rays: None,
             world_from_sensor: Pose::from_translation(Vec3::new(x, 0.0, 0.0)),
             weight: 1.0,
             source: 0,
@@ -267,7 +265,7 @@ mod tests {
         let mut backgrounds = Backgrounds::default();
         let mut learn = |images: &[DepthImage]| {
             let frame = Frame { images, ..Frame::empty(0.0) };
-            backgrounds.update(&frame, |_| (0..0, 0..0));
+            backgrounds.update(&frame, |_| [0..0, 0..0]);
             [0.0, 1.0, 2.0].map(|x| {
                 let learnt = backgrounds.of(&image(x)).map(Background::depth);
                 learnt.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count() / 4)

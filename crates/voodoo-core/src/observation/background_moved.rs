@@ -2,7 +2,7 @@
 
 use super::background::{Background, Backgrounds, apart};
 use super::frame::{DepthImage, Frame};
-use crate::math::Pose;
+use crate::math::{Pose, Vec3};
 
 /// A camera that moved by more than this from one image to the next is another one: metres, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
@@ -32,13 +32,13 @@ impl Backgrounds {
             self.images.push(Background::default());
         }
         let background = &mut self.images[index];
-        let before = background.world_from_sensor.filter(|_| nearest.is_some() && image.rays.is_none());
+        let before = background.world_from_sensor.filter(|_| nearest.is_some());
         match &before {
             Some(before) => background.move_to(image, before),
             None => background.forget(image),
         }
         background.world_from_sensor = Some(image.world_from_sensor);
-        background.width = image.width;
+        background.width = image.camera.width();
         (index, before.is_some())
     }
 }
@@ -57,30 +57,38 @@ impl Background {
     fn move_to(&mut self, image: &DepthImage, before: &Pose) {
         let moved = image.world_from_sensor.inverse() * *before;
         let turn = glam_columns(&moved);
-        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
-        let (width, height) = (image.width as f32, image.height as f32);
+        let camera = image.camera;
+        let width = camera.width();
+        let ([fx, fy], [cx, cy]) = (camera.focal().map(|f| f as f32), camera.center().map(|c| c as f32));
+        let center = |index: usize| match camera.distorts() {
+            true => camera.rays()[index],
+            false => [((index % width) as f32 - cx) / fx, ((index / width) as f32 - cy) / fy],
+        };
+        let seen_at = |ray: [f32; 2]| {
+            if camera.distorts() {
+                return camera.index_of(Vec3::new(f64::from(ray[0]), f64::from(ray[1]), 1.0));
+            }
+            let (column, row) = ((fx * ray[0] + cx).round(), (fy * ray[1] + cy).round());
+            let inside = column >= 0.0 && column < width as f32 && row >= 0.0 && row < camera.height() as f32;
+            inside.then(|| row as usize * width + column as usize)
+        };
         let (old, old_rays) = (std::mem::take(&mut self.depth), std::mem::take(&mut self.rays));
         self.depth.resize(old.len(), 0.0);
         self.rays.resize(old.len(), NO_RAY);
         for (index, z) in old.iter().enumerate().filter(|(_, z)| **z > 0.0) {
-            let centre = || [((index % image.width) as f32 - cx) / fx, ((index / image.width) as f32 - cy) / fy];
-            let [x, y] = old_rays.get(index).copied().filter(|ray| *ray != NO_RAY).unwrap_or_else(centre);
+            let [x, y] = old_rays.get(index).copied().filter(|ray| *ray != NO_RAY).unwrap_or_else(|| center(index));
             let place =
                 [0, 1, 2].map(|axis| z * (turn[0][axis] * x + turn[1][axis] * y + turn[2][axis]) + turn[3][axis]);
-            if place[2] < NEAREST_CARRIED {
+            if !(place[2] >= NEAREST_CARRIED) {
                 continue;
             }
             let ray = [place[0] / place[2], place[1] / place[2]];
-            let (column, row) = ((fx * ray[0] + cx).round(), (fy * ray[1] + cy).round());
-            if !(column >= 0.0 && column < width && row >= 0.0 && row < height) {
-                continue;
-            }
-            let target = row as usize * image.width + column as usize;
+            let Some(target) = seen_at(ray) else { continue };
             if self.depth[target] == 0.0 || place[2] < self.depth[target] {
                 (self.depth[target], self.rays[target]) = (place[2], ray);
             }
         }
-        for step in [1, image.width] {
+        for step in [1, width] {
             self.close_cracks(step);
         }
     }
@@ -101,26 +109,28 @@ pub(super) const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
 
 /// Columns of the rotation, then the translation.
 fn glam_columns(pose: &Pose) -> [[f32; 3]; 4] {
-    let axes = [crate::math::Vec3::X, crate::math::Vec3::Y, crate::math::Vec3::Z].map(|axis| pose.rotation * axis);
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| pose.rotation * axis);
     [axes[0], axes[1], axes[2], pose.translation].map(|column| column.to_array().map(|value| value as f32))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Quat, Vec3};
+    use crate::camera::{Camera, Lens};
+    use crate::math::Quat;
     use crate::observation::frame::DepthPixels;
 
     const SIZE: (usize, usize) = (64, 48);
 
-    fn image(pixels: &[f32], world_from_sensor: Pose) -> DepthImage<'_> {
+    fn camera(lens: Lens) -> Camera {
+        Camera::new(SIZE.0, SIZE.1, [60.0, 60.0, 31.5, 23.5], lens).unwrap()
+    }
+
+    fn image<'a>(pixels: &'a [f32], camera: &'a Camera, world_from_sensor: Pose) -> DepthImage<'a> {
         DepthImage {
             pixels: DepthPixels::F32(pixels),
-            width: SIZE.0,
-            height: SIZE.1,
+            camera,
             metres_per_unit: 1.0,
-            intrinsics: [60.0, 60.0, 31.5, 23.5],
-            rays: None,
             world_from_sensor,
             weight: 1.0,
             source: 0,
@@ -128,11 +138,11 @@ mod tests {
     }
 
     /// A wall at z = 3 with a step to 4 on the right of x = 0.2.
-    fn seen(world_from_sensor: &Pose) -> Vec<f32> {
+    fn seen(camera: &Camera, world_from_sensor: &Pose) -> Vec<f32> {
         (0..SIZE.0 * SIZE.1)
             .map(|index| {
-                let ray =
-                    Vec3::new(((index % SIZE.0) as f64 - 31.5) / 60.0, ((index / SIZE.0) as f64 - 23.5) / 60.0, 1.0);
+                let [x, y] = camera.pixel_ray(index % SIZE.0, index / SIZE.0);
+                let ray = Vec3::new(x, y, 1.0);
                 let (from, along) = (world_from_sensor.translation, world_from_sensor.rotation * ray);
                 let near = (3.0 - from.z) / along.z;
                 let far = (4.0 - from.z) / along.z;
@@ -147,15 +157,22 @@ mod tests {
 
     #[test]
     fn what_was_learnt_stays_where_it_is_while_the_camera_moves_on() {
+        for lens in [Lens::Pinhole, Lens::PlumbBob([-0.3, 0.1, 0.002, -0.001, 0.0]), Lens::Fisheye([0.0; 4])] {
+            moves_on(&camera(lens));
+        }
+    }
+
+    fn moves_on(camera: &Camera) {
         let mut backgrounds = Backgrounds::default();
-        let first = seen(&pose(0.0, 0.0));
-        backgrounds.start(&Frame { images: &[image(&first, pose(0.0, 0.0))], ..Frame::empty(0.0) }, |_, _| {});
+        let first = seen(camera, &pose(0.0, 0.0));
+        let images = [image(&first, camera, pose(0.0, 0.0))];
+        backgrounds.start(&Frame { images: &images, ..Frame::empty(0.0) }, |_, _| {});
         let mut known = 0;
         for step in 1..=80 {
             // A sixth of a pixel at a time: rounding alone would leave everything where it was in the image.
             let now = pose(0.002 * f64::from(step), 0.0025 * f64::from(step));
-            let pixels = seen(&now);
-            let frame = [image(&pixels, now)];
+            let pixels = seen(camera, &now);
+            let frame = [image(&pixels, camera, now)];
             let frame = Frame { images: &frame, ..Frame::empty(f64::from(step)) };
             backgrounds.meet(&frame, |_, _| {});
             let depth = backgrounds.of(&frame.images[0]).map(Background::depth).unwrap_or_default();
@@ -174,10 +191,11 @@ mod tests {
 
     #[test]
     fn a_camera_that_wavers_stands_and_one_that_leaps_is_another() {
-        let pixels = seen(&pose(0.0, 0.0));
+        let camera = camera(Lens::Pinhole);
+        let pixels = seen(&camera, &pose(0.0, 0.0));
         let mut backgrounds = Backgrounds::default();
         let mut known = |now: Pose| {
-            let frame = [image(&pixels, now)];
+            let frame = [image(&pixels, &camera, now)];
             let frame = Frame { images: &frame, ..Frame::empty(0.0) };
             backgrounds.meet(&frame, |_, _| {});
             if now == pose(0.0, 0.0) {

@@ -23,7 +23,7 @@ impl Backgrounds {
             self.fill();
         }
         self.update(frame, |image: &DepthImage| match expected.searched {
-            Some(_) => (0..0, 0..0),
+            Some(_) => [0..0, 0..0],
             None => image_window(image, &shifted(&image.world_from_sensor, expected.origin), bounds),
         });
     }
@@ -64,7 +64,7 @@ impl Backgrounds {
             pixels.clear();
             for (index, z) in depth.iter().enumerate().filter(|(_, z)| **z > 0.0) {
                 let point = working_from_sensor * image.back_project(index, *z);
-                if bounds.contains_local_point(point) {
+                if bounds.contains(point) {
                     queries.push(point.to_array().map(|value| value as f32));
                     pixels.push(index);
                 }

@@ -5,7 +5,6 @@ use crate::config::Config;
 use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, widest};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::clusters::Clusters;
-use crate::observation::depth_view::NEAREST_SEEN;
 use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
 use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
 
@@ -38,7 +37,7 @@ const ROUGH_POINTS: usize = 700;
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
 pub fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
-    let mut total = Aabb::new_invalid();
+    let mut total = Aabb::EMPTY;
     for (limb, pose) in body.limbs().iter().zip(poses) {
         let bounds = limb.shape.aabb(pose);
         total.mins = total.mins.min(bounds.mins);
@@ -141,7 +140,7 @@ impl Candidates {
             }
             let point = self.points.get(index) + origin;
             let measured = self.limb[index] != ANY_LIMB;
-            if measured || !boxes.iter().any(|bounds| bounds.contains_local_point(point)) {
+            if measured || !boxes.iter().any(|bounds| bounds.contains(point)) {
                 let [x, y, z] = [self.points.x[index], self.points.y[index], self.points.z[index]];
                 self.points.set(kept, [x, y, z]);
                 self.weight[kept] = self.weight[index];
@@ -183,12 +182,13 @@ impl Candidates {
         max_points: usize,
     ) {
         let working_from_sensor = shifted(&image.world_from_sensor, origin);
-        let (columns, rows) = image_window(image, &working_from_sensor, bounds);
+        let [columns, rows] = image_window(image, &working_from_sensor, bounds);
         let m = columns_f32(&working_from_sensor);
         let points = &mut self.points;
         // A pixel stands for a patch of surface: its size follows from the distance of the body.
         let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(NEAREST_BODY);
-        let patch = distance * distance / (image.intrinsics[0] * image.intrinsics[1]);
+        let [fx, fy] = image.camera.focal();
+        let patch = distance * distance / (fx * fy);
         let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
         let weight = image.weight * patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
         let stride = grid.columns;
@@ -220,35 +220,9 @@ const VISIBLE_AREA: f64 = 0.6;
 /// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
 pub const REFERENCE_PATCH: f64 = 0.012 * 0.012;
 
-/// The pixels that can show anything inside the box: the bounds of its projected corners, the whole image when a corner
-/// lies behind the camera or the lens distorts.
-pub fn image_window(
-    image: &DepthImage,
-    working_from_sensor: &Pose,
-    bounds: &Aabb,
-) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
-    let whole = (0..image.width, 0..image.height);
-    if image.rays.is_some() {
-        return whole;
-    }
-    let [fx, fy, cx, cy] = image.intrinsics;
-    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-    for corner in bounds.vertices() {
-        let corner = working_from_sensor.inverse_transform_point(corner);
-        if corner.z < NEAREST_SEEN {
-            return whole;
-        }
-        for (axis, pixel) in [fx * corner.x / corner.z + cx, fy * corner.y / corner.z + cy].into_iter().enumerate() {
-            low[axis] = low[axis].min(pixel);
-            high[axis] = high[axis].max(pixel);
-        }
-    }
-    let range = |axis: usize, size: usize| {
-        let start = low[axis].floor().clamp(0.0, size as f64) as usize;
-        let end = (high[axis].ceil() + 1.0).clamp(0.0, size as f64) as usize;
-        start..end.max(start)
-    };
-    (range(0, image.width), range(1, image.height))
+/// Columns and rows that can show anything inside the box, see [`crate::Camera::window`].
+pub fn image_window(image: &DepthImage, working_from_sensor: &Pose, bounds: &Aabb) -> [std::ops::Range<usize>; 2] {
+    image.camera.window(bounds.corners().into_iter().map(|corner| working_from_sensor.inverse_transform_point(corner)))
 }
 
 /// Columns of the rotation, then the translation.
@@ -291,7 +265,7 @@ mod tests {
             .map(|index| world_from_sensor * images[0].back_project(index, pixels[index]))
             .filter(|point| point.z >= 0.5 + config.ground_clearance)
             .map(|point| point - origin)
-            .filter(|point| bounds.contains_local_point(*point))
+            .filter(|point| bounds.contains(*point))
             .collect();
         assert!(expected.len() > 100 && expected.len() < 700, "{}", expected.len());
         assert_eq!(found.len(), expected.len());
@@ -329,7 +303,7 @@ mod tests {
         let points = [[9.0, 9.0, 9.0], [0.1, 0.0, 0.0]];
         let cloud = |scope| Cloud {
             points: PointSlice::F64(&points),
-            world_from_sensor: Pose::identity(),
+            world_from_sensor: Pose::IDENTITY,
             weight: 2.0,
             scope,
             source: 0,

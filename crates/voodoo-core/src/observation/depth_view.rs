@@ -1,5 +1,6 @@
 //! What the pixels of a depth image say about a place in space.
 
+use crate::camera::NEAREST_SEEN;
 use crate::math::{Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
@@ -30,8 +31,6 @@ pub enum Pixel {
     Other(f64),
 }
 
-/// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
-pub const NEAREST_SEEN: f64 = 0.05;
 /// An image with more pixels without return than this share was segmented: a sensor alone loses less of a room.
 const SEGMENTED_SHARE: f64 = 0.5;
 /// Every so manyth pixel is asked for that; a prime, so that all columns take part.
@@ -64,32 +63,14 @@ impl<'a> DepthViews<'a> {
 }
 
 impl DepthView<'_> {
-    /// What the pixel that a point (camera frame) falls in shows. Images of distorting lenses say nothing: their rays are
-    /// known by the pixel, not the pixel by the ray.
+    /// What the pixel that a point (camera frame) falls in shows.
     #[inline(always)]
     pub fn at(&self, point: Vec3) -> Pixel {
-        if self.image.rays.is_some() {
-            return Pixel::Unknown;
-        }
-        self.about(point)
-    }
-
-    /// The same; a lens's distortion is left out.
-    #[inline(always)]
-    pub fn about(&self, point: Vec3) -> Pixel {
         let image = self.image;
-        let [fx, fy, cx, cy] = image.intrinsics;
         if point.z < NEAREST_SEEN {
             return Pixel::Unknown;
         }
-        let near = 1.0 / point.z;
-        // Half a pixel on, so that cutting off rounds.
-        let (column, row) = (fx * point.x * near + (cx + 0.5), fy * point.y * near + (cy + 0.5));
-        if !(column >= 0.0 && row >= 0.0 && column < image.width as f64 && row < image.height as f64) {
-            return Pixel::Unknown;
-        }
-        // Within the image; a signed cast costs least.
-        let index = row as i32 as usize * image.width + column as i32 as usize;
+        let Some(index) = image.camera.index_of(point) else { return Pixel::Unknown };
         let z = f64::from(image.pixels.get(index)) * image.metres_per_unit;
         if z.is_nan() || z <= 0.0 {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
@@ -124,6 +105,7 @@ pub fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::{Camera, Lens};
     use crate::testing::image;
 
     /// Every pixel of this image has a depth of its own, metres.
@@ -132,11 +114,34 @@ mod tests {
     }
 
     #[test]
+    fn a_place_is_seen_in_the_pixel_of_its_ray_through_every_lens() {
+        let pixels = distinct(24 * 16);
+        for lens in [
+            Lens::PlumbBob([-0.3, 0.1, 0.002, -0.001, 0.0]),
+            Lens::Fisheye([0.02, -0.01, 0.0, 0.0]),
+            Lens::InversePlumbBob([0.2, 0.05, 0.0, 0.001, 0.0]),
+        ] {
+            let camera = Camera::new(24, 16, [20.0, 20.0, 11.5, 7.5], lens).unwrap();
+            let image = DepthImage { camera: &camera, ..image(&pixels, 24, 20.0) };
+            let view =
+                DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
+            for (index, depth) in pixels.iter().enumerate() {
+                let [column, row] = [index % 24, index / 24].map(|at| at as f64);
+                for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
+                    let [x, y] = camera.ray([column + u, row + v]).unwrap();
+                    let found = view.at(Vec3::new(x, y, 1.0) * z);
+                    assert_eq!(found, Pixel::Foreground(f64::from(*depth)), "pixel {index} through {lens:?}");
+                }
+            }
+            assert_eq!(view.at(Vec3::new(2.0, 0.0, 1.0)), Pixel::Unknown, "outside of {lens:?}");
+        }
+    }
+
+    #[test]
     fn a_place_is_seen_in_the_pixel_whose_ray_passes_nearest() {
         let pixels = distinct(24 * 16);
         let image = image(&pixels, 24, 20.0);
-        let view =
-            DepthView { image: &image, background: None, working_from_camera: Pose::identity(), segmented: false };
+        let view = DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
         for (index, depth) in pixels.iter().enumerate() {
             // Anywhere on the pixel, and at any depth: its edges are half a pixel from its centre.
             for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
@@ -167,11 +172,6 @@ mod tests {
                 DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &segmented, origin: Vec3::ZERO };
             assert!(views.iter().all(|view| view.at(empty) == expected));
         }
-        let rays = vec![[0.0_f32; 2]; pixels.len()];
-        let distorted = DepthImage { rays: Some(&rays), ..image };
-        let view =
-            DepthView { image: &distorted, background: None, working_from_camera: Pose::identity(), segmented: true };
-        assert_eq!(view.at(Vec3::Z), Pixel::Unknown, "a distorted image does not know the pixel of a place");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What is measured at one instant, from any number of sensors (K06 IV-A). Borrowed: nothing is copied on the way in.
 
 use crate::body::Body;
+use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
@@ -99,18 +100,12 @@ impl DepthPixels<'_> {
 /// An organised depth image; its pixels are free points.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthImage<'a> {
-    /// `width * height` pixels.
+    /// All pixels of the camera.
     pub pixels: DepthPixels<'a>,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
+    /// Its calibration; its lens may distort.
+    pub camera: &'a Camera,
     /// Length of one unit of the pixels, metres.
     pub metres_per_unit: f64,
-    /// Focal lengths and principal point `(fx, fy, cx, cy)`, pixels; integer coordinates are pixel centres.
-    pub intrinsics: [f64; 4],
-    /// For a lens with distortion: undistorted `(x/z, y/z)` of every pixel.
-    pub rays: Option<&'a [[f32; 2]]>,
     /// Pose of the camera's optical frame (x right, y down, z forward).
     pub world_from_sensor: Pose,
     /// Weight of each point.
@@ -122,23 +117,16 @@ pub struct DepthImage<'a> {
 impl DepthImage<'_> {
     /// The point of a pixel in the camera's frame for a depth of `z` metres.
     pub fn back_project(&self, index: usize, z: f32) -> Vec3 {
-        let [fx, fy, cx, cy] = self.intrinsics;
-        let [x, y] = match self.rays {
-            Some(rays) => rays[index].map(f64::from),
-            None => [((index % self.width) as f64 - cx) / fx, ((index / self.width) as f64 - cy) / fy],
-        };
+        let [x, y] = self.camera.pixel_ray(index % self.camera.width(), index / self.camera.width());
         f64::from(z) * Vec3::new(x, y, 1.0)
     }
 
     /// The depth that was measured where a place of the world is seen, 0 for none, and that of the place, metres; none outside the
-    /// image. A lens's distortion is left out.
+    /// image.
     pub fn measured(&self, place: Vec3) -> Option<[f64; 2]> {
         let point = self.world_from_sensor.inverse_transform_point(place);
-        let [fx, fy, cx, cy] = self.intrinsics;
-        let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
-        let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
-        let z = || f64::from(self.pixels.get(v as usize * self.width + u as usize)) * self.metres_per_unit;
-        inside.then(|| [z(), point.z])
+        let index = self.camera.index_of(point)?;
+        Some([f64::from(self.pixels.get(index)) * self.metres_per_unit, point.z])
     }
 }
 
@@ -352,20 +340,9 @@ fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
     let wrong = |part: &str, expected, found: String| {
         Err(TrackError::measurement(format!("depth[{index}].{part}"), expected, found))
     };
-    let count = image.width.saturating_mul(image.height);
-    if image.pixels.len() != count || count == 0 {
-        return wrong(
-            "image",
-            "width x height pixels",
-            format!("{} for {}x{}", image.pixels.len(), image.width, image.height),
-        );
-    }
-    if image.rays.is_some_and(|rays| rays.len() != count) {
-        return wrong("rays", "one ray a pixel", format!("{:?} for {count} pixels", image.rays.map(<[_]>::len)));
-    }
-    let [fx, fy, cx, cy] = image.intrinsics;
-    if !(fx > 0.0 && fy > 0.0 && fx.is_finite() && fy.is_finite() && cx.is_finite() && cy.is_finite()) {
-        return wrong("camera", "positive focal lengths and a finite centre", format!("{:?}", image.intrinsics));
+    if image.pixels.len() != image.camera.pixels() {
+        let found = format!("{} for {}x{}", image.pixels.len(), image.camera.width(), image.camera.height());
+        return wrong("image", "all pixels of the camera", found);
     }
     if !(image.metres_per_unit > 0.0 && image.metres_per_unit.is_finite()) {
         return wrong("metres_per_unit", "a finite length above zero", image.metres_per_unit.to_string());

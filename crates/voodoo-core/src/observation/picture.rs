@@ -1,5 +1,6 @@
 //! Colour and grey pictures.
 
+use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{Pose, is_rigid};
 
@@ -39,24 +40,22 @@ impl ColorPixels<'_> {
     }
 }
 
-/// A colour or grey picture: its regions tell where limbs end (R07 section 3), and clothes tell persons apart. Straight lines
-/// have to be straight in it.
+/// A colour or grey picture: its regions tell where limbs end (R07 section 3), and clothes tell persons apart.
+///
+/// The contours of limbs are straight lines and ellipses in the picture of a pinhole alone: whoever fits regions takes the lens's
+/// distortion out of the picture before, and gives the pinhole camera that is left. Clothes may be seen through any lens.
 #[derive(Clone, Copy, Debug)]
 pub struct ColorImage<'a> {
-    /// `width * height` pixels.
+    /// All pixels of the camera.
     pub pixels: ColorPixels<'a>,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// As of a [`DepthImage`].
-    pub intrinsics: [f64; 4],
+    /// Its calibration.
+    pub camera: &'a Camera,
     /// Pose of the camera's optical frame (x right, y down, z forward).
     pub world_from_sensor: Pose,
     /// When it was taken, seconds.
     pub stamp: f64,
     /// Number of the camera, the same in every frame.
-    pub camera: u16,
+    pub number: u16,
     /// Number of the source, for the report.
     pub source: u16,
 }
@@ -71,18 +70,14 @@ impl ColorImage<'_> {
         if !(aside <= LONGEST_ASIDE) {
             return wrong("stamp", "a time within 0.25 s of the frame's", self.stamp.to_string());
         }
-        if self.pixels.len() != self.width.saturating_mul(self.height) || self.pixels.is_empty() {
-            let found = format!("{} for {}x{}", self.pixels.len(), self.width, self.height);
-            return wrong("image", "width x height pixels", found);
-        }
-        let [fx, fy, cx, cy] = self.intrinsics;
-        if !(fx > 0.0 && fy > 0.0 && [fx, fy, cx, cy].iter().all(|value| value.is_finite())) {
-            return wrong("camera", "positive focal lengths and a finite centre", format!("{:?}", self.intrinsics));
+        if self.pixels.len() != self.camera.pixels() {
+            let found = format!("{} for {}x{}", self.pixels.len(), self.camera.width(), self.camera.height());
+            return wrong("image", "all pixels of the camera", found);
         }
         if !is_rigid(&self.world_from_sensor) {
             return wrong("world_from_sensor", "a rigid transform", format!("{:?}", self.world_from_sensor));
         }
-        if others.iter().any(|other| other.camera == self.camera) {
+        if others.iter().any(|other| other.number == self.number) {
             return wrong("source", "one picture of each camera", "a second one of this".into());
         }
         Ok(())

@@ -69,7 +69,7 @@ impl Stretch {
     #[inline(always)]
     pub fn load(image: &DepthImage, background: &[f32], row: usize, start: usize, end: usize, stride: usize) -> Self {
         let count = STRETCH.min((end - start).div_ceil(stride));
-        let first = row * image.width + start;
+        let first = row * image.camera.width() + start;
         let scale = image.metres_per_unit as f32;
         let mut z = [0.0; STRETCH];
         match image.pixels {
@@ -85,22 +85,7 @@ impl Stretch {
                 *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
             });
         }
-        let [fx, fy, cx, cy] = image.intrinsics.map(|value| value as f32);
-        let mut x = [0.0; STRETCH];
-        let mut y = [(row as f32 - cy) * (1.0 / fy); STRETCH];
-        match image.rays {
-            Some(rays) => {
-                for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(rays[first..].iter().step_by(stride)).take(count) {
-                    (*x, *y) = (ray[0], ray[1]);
-                }
-            }
-            None => {
-                let inverse = 1.0 / fx;
-                for (x, offset) in x.iter_mut().zip(0_i32..) {
-                    *x = ((start as i32 + offset * stride as i32) as f32 - cx) * inverse;
-                }
-            }
-        }
+        let [x, y] = image.camera.row_rays(row, start, stride, count);
         Self { x, y, z }
     }
 

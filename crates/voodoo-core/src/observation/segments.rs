@@ -73,7 +73,7 @@ impl Segments {
         if !frame.excluded.is_empty() {
             let inside = |sample: &Sample| {
                 let point = Vec3::from_array(sample.point.map(f64::from)) + origin;
-                frame.excluded.iter().any(|bounds| bounds.contains_local_point(point))
+                frame.excluded.iter().any(|bounds| bounds.contains(point))
             };
             self.samples.retain(|sample| !inside(sample));
         }
@@ -106,9 +106,10 @@ impl Segments {
         for image in frame.images {
             let background = backgrounds.of(image).map_or(&[][..], Background::depth);
             let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
-            let spread = (step * step) as f64 / (image.intrinsics[0] * image.intrinsics[1] * REFERENCE_PATCH);
-            for row in (0..image.height).step_by(step) {
-                for pixel in (row * image.width..(row + 1) * image.width).step_by(step) {
+            let [fx, fy] = image.camera.focal();
+            let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);
+            for row in (0..image.camera.height()).step_by(step) {
+                for pixel in (row * image.camera.width()..(row + 1) * image.camera.width()).step_by(step) {
                     let z = match image.pixels {
                         DepthPixels::U16(pixels) => f32::from(pixels[pixel]),
                         DepthPixels::F32(pixels) => pixels[pixel],
@@ -223,7 +224,7 @@ mod tests {
         for _ in 0..2 {
             let clouds = [Cloud {
                 points: PointSlice::F64(&points),
-                world_from_sensor: Pose::identity(),
+                world_from_sensor: Pose::IDENTITY,
                 weight: 1.0,
                 scope: Scope::Free,
                 source: 0,

@@ -1,63 +1,8 @@
-//! Named sites from frame to frame: where they will be, which measurements of them are believed, and rays on which they were seen.
+//! Named sites from frame to frame: which measurements of them are believed, and rays on which they were seen.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use crate::math::Vec3;
-
-/// Where sites will be: the last estimate moved on by a share of its velocity.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SiteMotion {
-    /// 0 predicts rest, 1 constant velocity.
-    pub share: f64,
-    /// A faster estimate is a jump and predicts rest, metres a second.
-    pub max_speed: f64,
-    /// Shared by all frames of a body.
-    names: Arc<[String]>,
-    stamp: f64,
-    positions: Vec<[f64; 3]>,
-    velocity: Vec<[f64; 3]>,
-}
-
-impl SiteMotion {
-    /// No estimate yet.
-    pub fn new(share: f64, max_speed: f64) -> Self {
-        let (positions, velocity) = Default::default();
-        Self { share, max_speed, names: Arc::new([]), stamp: f64::NAN, positions, velocity }
-    }
-
-    /// Names of the sites of the last estimate.
-    pub fn names(&self) -> &Arc<[String]> {
-        &self.names
-    }
-
-    /// Takes up an estimate's positions, metres; a stamp that is NaN forgets the velocity.
-    pub fn update(&mut self, stamp: f64, names: Arc<[String]>, positions: Vec<[f64; 3]>) {
-        let interval = stamp - self.stamp;
-        let before = |index: usize, name: &String| {
-            let same = self.names.get(index) == Some(name);
-            let known = if same { Some(index) } else { self.names.iter().position(|other| other == name) };
-            known.and_then(|known| self.positions.get(known))
-        };
-        let velocity = |(index, (name, place)): (usize, (&String, &[f64; 3]))| {
-            // A site that is new has none.
-            let before = before(index, name).filter(|_| interval > 0.0)?;
-            let velocity = Vec3::from_array([0, 1, 2].map(|axis| (place[axis] - before[axis]) / interval));
-            (velocity.length() <= self.max_speed).then_some(velocity.to_array())
-        };
-        let sites = names.iter().zip(&positions).enumerate();
-        self.velocity = sites.map(|site| velocity(site).unwrap_or_default()).collect();
-        (self.stamp, self.names, self.positions) = (stamp, names, positions);
-    }
-
-    /// All positions at a time, metres.
-    pub fn at(&self, stamp: f64) -> Vec<[f64; 3]> {
-        let elapsed = if self.stamp.is_finite() { self.share * (stamp - self.stamp) } else { 0.0 };
-        let moved =
-            |(place, velocity): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|axis| place[axis] + elapsed * velocity[axis]);
-        self.positions.iter().zip(&self.velocity).map(moved).collect()
-    }
-}
 
 /// Accepts measurements near predicted sites, and opens slowly while nothing is accepted.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,11 +53,6 @@ impl SiteGate {
             }
         }
     }
-
-    /// When something was accepted last of a site by a source, or first looked for: site, source, seconds.
-    pub fn accepted(&self) -> impl Iterator<Item = (&str, &str, f64)> {
-        self.last.iter().flat_map(|(source, sites)| sites.iter().map(move |(site, last)| (&**site, &**source, *last)))
-    }
 }
 
 /// A site was seen on a ray.
@@ -150,21 +90,8 @@ mod tests {
         assert!(!gate.accepts("l_wrist", f64::NAN, 0.1, "camera"));
         assert_eq!(gate.limit("l_wrist", "camera", 100.0), 0.25);
         assert_eq!(gate.limit("r_wrist", "camera", 0.1), 0.1, "each site has its own");
-        let known: Vec<_> = gate.accepted().collect();
-        assert_eq!(known, [("l_wrist", "camera", 0.1), ("r_wrist", "camera", 0.1)]);
-    }
-
-    #[test]
-    fn sites_move_on_by_name_and_jumps_are_forgotten() {
-        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Arc<[_]>>();
-        let mut motion = SiteMotion::new(0.5, 8.0);
-        motion.update(f64::NAN, names(&["hand"]), vec![[0.0; 3]]);
-        assert_eq!(motion.at(5.0), [[0.0; 3]]);
-        motion.update(0.0, names(&["hand"]), vec![[0.0; 3]]);
-        motion.update(0.1, names(&["foot", "hand"]), vec![[1.0; 3], [0.1, 0.0, 0.0]]);
-        let [foot, hand] = motion.at(0.2)[..] else { panic!("two sites") };
-        assert!(foot == [1.0; 3] && (hand[0] - 0.15).abs() < 1e-12);
-        motion.update(0.2, names(&["foot", "hand"]), vec![[1.0; 3], [2.0, 0.0, 0.0]]);
-        assert_eq!(motion.at(0.3), [[1.0; 3], [2.0, 0.0, 0.0]]);
+        let opened = |gate: &mut SiteGate, site| gate.limit(site, "camera", 0.2);
+        assert!((opened(&mut gate, "l_wrist") - 0.2).abs() < 1e-12, "from the last one accepted");
+        assert!((opened(&mut gate, "r_wrist") - 0.2).abs() < 1e-12, "from the first one looked for");
     }
 }

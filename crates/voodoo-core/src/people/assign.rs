@@ -1,35 +1,20 @@
 //! Who a believed stranger is, all of them at once: somebody who was lost or away, or somebody new.
 
-use pathfinding::kuhn_munkres::kuhn_munkres_min;
-use pathfinding::matrix::Matrix;
-
-/// The library counts in whole numbers: so many to one.
-const GRAIN: f64 = 1e4;
+use crate::math::{CostTable, linear_sum_assignment};
 
 /// For every row the column that it is given, so that the costs add up to the least; `None` where its own cost, `alone`, is less. No
 /// column is given twice.
 pub(super) fn assign(costs: &[Vec<f64>], alone: f64) -> Vec<Option<usize>> {
     let (rows, columns) = (costs.len(), costs.first().map_or(0, Vec::len));
-    if rows == 0 {
-        return Vec::new();
-    }
-    let whole = |cost: f64| (cost.min(10.0 * alone) * GRAIN).round() as i64;
-    // Everybody may stay alone: a column of their own.
-    let matrix = Matrix::from_fn(rows, columns + rows, |(row, column)| {
-        if column < columns {
-            whole(costs[row][column])
-        } else if column - columns == row {
-            whole(alone)
-        } else {
-            whole(10.0 * alone)
-        }
+    // Everybody may stay alone: a column of their own. What is impossible still has a finite cost.
+    let table = CostTable::from_fn(rows, columns + rows, |row, column| {
+        costs[row].get(column).map_or(alone, |cost| cost.min(10.0 * alone))
     });
-    let (_, given) = kuhn_munkres_min(&matrix);
+    let mut given = vec![None; rows];
+    for (row, column) in linear_sum_assignment(&table) {
+        given[row] = (column < columns && costs[row][column] < alone).then_some(column);
+    }
     given
-        .into_iter()
-        .enumerate()
-        .map(|(row, column)| (column < columns && costs[row][column] < alone).then_some(column))
-        .collect()
 }
 
 #[cfg(test)]

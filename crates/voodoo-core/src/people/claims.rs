@@ -33,8 +33,6 @@ pub(super) struct Claims {
     /// Of every pixel of an image its depth, metres, and whether something returned that is no scene.
     depth: Vec<f32>,
     open: Vec<bool>,
-    /// `x/z` of every column where the lens has no distortion.
-    across: Vec<f64>,
     queries: Points,
     /// The first pixel that each query stands for, and how many.
     pixels: Vec<(u32, u32)>,
@@ -132,7 +130,7 @@ impl Claims {
         self.pixels.clear();
         for index in 0..cloud.points.len() {
             let point = cloud.world_from_sensor * cloud.points.get(index);
-            if bounds.contains_local_point(point) {
+            if bounds.contains(point) {
                 self.queries.push((point - origin).to_array().map(|value| value as f32));
                 self.pixels.push((index as u32, 1));
             }
@@ -141,7 +139,7 @@ impl Claims {
 
     /// Of all pixels of an image the depth, metres, and of those that are no scene whether something returned; what all bodies ask.
     fn measure(&mut self, image: &DepthImage, background: &[f32]) {
-        let Self { depth, open, across, .. } = self;
+        let Self { depth, open, .. } = self;
         let scale = image.metres_per_unit as f32;
         depth.clear();
         match image.pixels {
@@ -153,23 +151,19 @@ impl Claims {
         for ((open, z), background) in open.iter_mut().zip(depth.iter()).zip(background) {
             *open &= !Background::holds(*background, *z);
         }
-        let [fx, _, cx, _] = image.intrinsics;
-        across.clear();
-        across.extend((0..image.width).map(|column| (column as f64 - cx) / fx));
     }
 
     /// The returns within a box of the world that are no scene, about `origin`: of neighbours on one surface the first stands for
     /// all.
     fn gather(&mut self, image: &DepthImage, origin: Vec3, bounds: &Aabb) {
-        let (columns, rows) = image_window(image, &image.world_from_sensor, bounds);
-        let together = (image.width / COLUMNS).max(1);
-        let [_, fy, _, cy] = image.intrinsics;
-        let Self { queries, pixels, depth, open, across, .. } = self;
+        let [columns, rows] = image_window(image, &image.world_from_sensor, bounds);
+        let together = (image.camera.width() / COLUMNS).max(1);
+        let Self { queries, pixels, depth, open, .. } = self;
         queries.clear();
         pixels.clear();
         for row in rows {
-            let (start, down) = (row * image.width, (row as f64 - cy) / fy);
-            let (depth, open) = (&depth[start..start + image.width], &open[start..start + image.width]);
+            let (start, end) = (row * image.camera.width(), (row + 1) * image.camera.width());
+            let (depth, open) = (&depth[start..end], &open[start..end]);
             let mut column = columns.start;
             while column < columns.end {
                 if !open[column] {
@@ -182,9 +176,9 @@ impl Claims {
                 while column + run < last && (depth[column + run] - z).abs() < LIKE_DEPTH {
                     run += 1;
                 }
-                let [x, y] = image.rays.map_or([across[column], down], |rays| rays[start + column].map(f64::from));
+                let [x, y] = image.camera.pixel_ray(column, row);
                 let point = image.world_from_sensor * (f64::from(z) * Vec3::new(x, y, 1.0));
-                if bounds.contains_local_point(point) {
+                if bounds.contains(point) {
                     queries.push((point - origin).to_array().map(|value| value as f32));
                     pixels.push(((start + column) as u32, run as u32));
                 }

@@ -4,7 +4,7 @@ use crate::body::{Body, LimbRole};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
-use crate::visibility::ALONG_LIMB;
+use crate::visibility::surface::surface_rows;
 
 /// Where across a limb colours are taken, in shares of its radius from the middle: the rim may show what is behind.
 const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
@@ -47,9 +47,8 @@ impl Clothes {
                 }
                 for (number, image) in frame.images.iter().enumerate() {
                     let camera_from_limb = image.world_from_sensor.inverse() * *pose;
-                    for t in ALONG_LIMB {
-                        let Some(facing) = limb.shape.section(t).facing(&camera_from_limb) else { continue };
-                        for place in ACROSS.map(|s| camera_from_limb * facing.point(s)) {
+                    for row in surface_rows(&limb.shape, &camera_from_limb) {
+                        for place in row.points(ACROSS) {
                             let Some(point) = surface(image, place, |pixel| own(number, pixel)) else { continue };
                             let world = image.world_from_sensor * point;
                             if let Some(color) = frame.colors.iter().find_map(|picture| color_at(picture, world)) {
@@ -101,7 +100,7 @@ impl Histogram {
 
 /// The point that a depth image shows where a limb's surface is expected, camera frame.
 fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Option<Vec3> {
-    let pixel = pixel_of(image.intrinsics, [image.width, image.height], place)?;
+    let pixel = image.camera.index_of(place)?;
     let z = f64::from(image.pixels.get(pixel)) * image.metres_per_unit;
     ((z - place.z).abs() < SHOWS && own(pixel)).then(|| place * (z / place.z))
 }
@@ -109,15 +108,7 @@ fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Opti
 /// The colour of a place of the world in a picture.
 fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
     let place = picture.world_from_sensor.inverse_transform_point(world);
-    let pixel = pixel_of(picture.intrinsics, [picture.width, picture.height], place)?;
-    Some(picture.pixels.get(pixel))
-}
-
-/// The pixel in which a point of the camera's frame is seen.
-fn pixel_of([fx, fy, cx, cy]: [f64; 4], [width, height]: [usize; 2], point: Vec3) -> Option<usize> {
-    let (u, v) = ((fx * point.x / point.z + cx).round(), (fy * point.y / point.z + cy).round());
-    let inside = point.z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
-    inside.then(|| v as usize * width + u as usize)
+    Some(picture.pixels.get(picture.camera.index_of(place)?))
 }
 
 /// Counts a colour in the bins about it, by how near it is to their middles.

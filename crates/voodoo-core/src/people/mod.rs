@@ -13,13 +13,13 @@ mod wanted;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::{Detection, Detector, Surroundings, Wanted};
+use crate::detect::{BoundDetector, Detect, DetectError, Detected, DetectionQuery, Surroundings, sized};
 use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
 use crate::observation::share::NOBODY;
-use crate::relocalize::{SAME_PERSON, sized};
+use crate::relocalize::SAME_PERSON;
 use crate::tracker::Tracker;
 use claims::{Claimant, Claims};
 use clothes::Clothes;
@@ -48,7 +48,7 @@ pub struct People {
     claims: Claims,
     scene: Scene,
     strangers: Strangers,
-    detector: Detector,
+    detector: BoundDetector,
     looked: Option<f64>,
     stamp: Option<f64>,
     threads: Option<ThreadPool>,
@@ -63,9 +63,6 @@ impl People {
                 TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
             })?),
         };
-        let detector = Detector::new().map_err(|error| {
-            TrackError::measurement("weights", "those that come with the library", error.to_string())
-        })?;
         Ok(Self {
             prototype,
             config: Config { threads: 1, ..config },
@@ -75,11 +72,23 @@ impl People {
             claims: Claims::default(),
             scene: Scene::default(),
             strangers: Strangers::default(),
-            detector,
+            detector: BoundDetector::default(),
             looked: None,
             stamp: None,
             threads,
         })
+    }
+
+    /// The same with a detector, of which every person's tracker gets one of its own. Without one, nobody is found: who is to be
+    /// followed is [`Self::add`]ed.
+    pub fn with_detector(mut self, detector: Box<dyn Detect>) -> Self {
+        self.detector.set(Some(detector), &self.prototype);
+        self
+    }
+
+    /// Why a detector could not look in the last step, if one could not: that of all, else that of a person.
+    pub fn detector_error(&self) -> Option<&DetectError> {
+        self.detector.error().or_else(|| self.persons.iter().find_map(|person| person.tracker.detector_error()))
     }
 
     /// What everybody's body starts from.
@@ -109,7 +118,7 @@ impl People {
     /// come there, or somebody new; their number. On error nobody came.
     pub fn add(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<usize, TrackError> {
         let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
-        let mut person = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), stamp)?;
+        let mut person = self.nobody_yet(stamp)?;
         person.tracker.reset(positions, fit_sizes)?;
         person.there = true;
         person.place = person.tracker.estimate().world_from_limb.first().map_or(Vec3::ZERO, |root| root.translation);
@@ -125,11 +134,18 @@ impl People {
         Ok(self.next_id - 1)
     }
 
+    /// Somebody who is not there yet, with the next number.
+    fn nobody_yet(&self, stamp: f64) -> Result<Person, TrackError> {
+        let (body, config) = (self.prototype.clone(), self.config.clone());
+        Person::new(self.next_id, body, config, self.detector.fresh(), stamp)
+    }
+
     /// The next instant; `own` has the frames of those of whom more was measured than of others. On error everything is as before.
     pub fn step(&mut self, frame: &Frame, own: &[(usize, Frame)]) -> Result<(), TrackError> {
         frame.check(&self.prototype, self.stamp)?;
         own.iter().try_for_each(|(_, frame)| frame.check(&self.prototype, self.stamp))?;
         self.stamp = Some(frame.stamp);
+        self.detector.clear_error();
         self.scene.meet(frame);
         self.share_out(frame);
         self.follow(frame, own);
@@ -192,19 +208,20 @@ impl People {
         let everybody_there = self.options.only.as_ref().is_some_and(|only| {
             only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.tracked()))
         });
-        if everybody_there || self.looked.is_some_and(|last| frame.stamp - last < LOOK_EVERY) {
+        if everybody_there || !self.detector.knows() || self.looked.is_some_and(|last| frame.stamp - last < LOOK_EVERY)
+        {
             return;
         }
         self.looked = Some(frame.stamp);
         self.strangers.fade(frame.stamp);
-        self.detect(frame, Wanted::News);
+        self.detect(frame, DetectionQuery::New);
         let believed = self.strangers.believed(frame.stamp);
         if !believed.is_empty() {
             self.welcome(frame, &believed);
         }
     }
 
-    fn detect(&mut self, frame: &Frame, wanted: Wanted) {
+    fn detect(&mut self, frame: &Frame, query: DetectionQuery) {
         for (number, image) in frame.images.iter().enumerate() {
             let scene = self.scene.known().of(image).map_or(&[][..], Background::depth);
             let around = Surroundings {
@@ -215,23 +232,19 @@ impl People {
                 background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
                 ..Surroundings::default()
             };
-            let found: Vec<Detection> = self.detector.detect(image, &around, wanted).to_vec();
-            for detection in found {
-                if !self.asked_for(frame, &detection) {
-                    self.detector.refuse(&detection);
+            for found in self.detector.look(&self.prototype, image, &around, query) {
+                if !self.asked_for(frame, found.root) {
+                    self.detector.reject(found.index);
                     continue;
                 }
-                let mut pixels = Vec::new();
-                self.detector.mask(&detection, &mut pixels);
-                let still = self.scene.shows(frame, number, &pixels);
-                self.strangers.note(frame.stamp, detection, number, pixels, still);
+                let still = self.scene.shows(frame, number, &found.detection.pixels);
+                self.strangers.note(frame.stamp, found, number, still);
             }
         }
     }
 
     /// Whether somebody where a person is seen is to be followed.
-    fn asked_for(&self, frame: &Frame, detection: &Detection) -> bool {
-        let Some(place) = detection.place() else { return false };
+    fn asked_for(&self, frame: &Frame, place: Vec3) -> bool {
         let others = self.others_than(None);
         self.options.allows(place) && self.options.room(frame, place, &others).is_some()
     }
@@ -247,12 +260,14 @@ impl People {
     fn welcome(&mut self, frame: &Frame, believed: &[Stranger]) {
         let absent: Vec<usize> = (0..self.persons.len()).filter(|number| self.may_be(*number, believed)).collect();
         if !absent.is_empty() {
-            self.detect(frame, Wanted::All);
+            self.detect(frame, DetectionQuery::All);
             self.strangers.leave_out(believed);
         }
         let cost = |stranger: &Stranger| {
             let clothes = self.clothes_of(frame, stranger);
-            let cost = |number: &usize| person_cost(&self.persons[*number], stranger, &clothes, frame.stamp);
+            let size = |number: usize| self.persons[number].unlike(self.detected(stranger));
+            let cost =
+                |number: &usize| person_cost(&self.persons[*number], size(*number), stranger, &clothes, frame.stamp);
             absent.iter().map(cost).collect()
         };
         let costs: Vec<Vec<f64>> = believed.iter().chain(self.strangers.seen_at(frame.stamp)).map(cost).collect();
@@ -279,14 +294,19 @@ impl People {
     fn may_be(&self, number: usize, strangers: &[Stranger]) -> bool {
         let person = &self.persons[number];
         let beside = |stranger: &&Stranger| stranger.place.distance(person.place) < SAME_PERSON;
-        let shown = strangers.iter().filter(beside).map(|stranger| stranger.pixels.len()).max();
+        let shown = strangers.iter().filter(beside).map(|stranger| stranger.detection.pixels.len()).max();
         !person.tracked() || shown.is_some_and(|shown| self.claims.explained(number) < shown)
+    }
+
+    /// What the detector reported of a stranger.
+    fn detected<'a>(&'a self, stranger: &'a Stranger) -> Detected<'a> {
+        Detected { detection: &stranger.detection, map: self.detector.map() }
     }
 
     /// What a stranger wears.
     fn clothes_of(&self, frame: &Frame, stranger: &Stranger) -> Clothes {
         let mut clothes = Clothes::default();
-        if let Some((body, poses)) = sized(&Model::new(self.prototype.clone()), &stranger.detection) {
+        if let Some((body, poses)) = sized(&Model::new(self.prototype.clone()), self.detected(stranger)) {
             let free = |image: usize, pixel: usize| self.claims.owners()[image].get(pixel) == Some(&NOBODY);
             clothes.look(frame, &body, &poses, free);
         }
@@ -299,8 +319,7 @@ impl People {
         if full || !self.options.wants(self.next_id) {
             return false;
         }
-        let person = Person::new(self.next_id, self.prototype.clone(), self.config.clone(), frame.stamp);
-        let Ok(person) = person else { return false };
+        let Ok(person) = self.nobody_yet(frame.stamp) else { return false };
         self.persons.push(person);
         let came = self.take_up(frame, stranger, self.persons.len() - 1);
         if came {
@@ -313,17 +332,18 @@ impl People {
 
     /// Starts a person's tracker where a stranger is seen; whether they are there.
     fn take_up(&mut self, frame: &Frame, stranger: &Stranger, number: usize) -> bool {
-        self.scene.release(frame, stranger.image, &stranger.pixels);
+        self.scene.release(frame, stranger.image, &stranger.detection.pixels);
         let person = &mut self.persons[number];
         if !self.options.wants(person.id) {
             return false;
         }
         let known = person.born < frame.stamp;
         let share = self.claims.share(number, self.scene.known());
-        let came = person.tracker.begin(frame, share, &stranger.detection, known);
+        let detected = Detected { detection: &stranger.detection, map: self.detector.map() };
+        let came = person.tracker.begin(frame, share, detected, known);
         if came {
             person.there = true;
-            person.measure(&stranger.detection);
+            person.measure(detected);
         }
         person.note(frame, share);
         // Who was lost may have been found by their own tracker in this very frame.
@@ -359,10 +379,9 @@ fn came_from(person: &Person, place: Vec3, stamp: f64) -> f64 {
     if far > 2.0 { f64::INFINITY } else { 0.5 * far * far }
 }
 
-/// What speaks against a stranger's being this person.
-fn person_cost(person: &Person, stranger: &Stranger, clothes: &Clothes, stamp: f64) -> f64 {
+/// What speaks against a stranger's being this person; `size`: of which their sizes do.
+fn person_cost(person: &Person, size: f64, stranger: &Stranger, clothes: &Clothes, stamp: f64) -> f64 {
     let far = came_from(person, stranger.place, stamp);
-    let size = person.unlike(&stranger.detection);
     let unlike = person.clothes.unlike(clothes);
     let color = unlike.map_or(0.0, |unlike| 0.5 * ((unlike - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
     far + size + color

@@ -2,7 +2,7 @@
 
 use super::clothes::Clothes;
 use crate::config::Config;
-use crate::detect::{Detection, LENGTHS};
+use crate::detect::{Detect, Detected};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
@@ -16,8 +16,6 @@ const LEAVES: f64 = 0.3;
 const OUTSIDE: f64 = 0.1;
 /// Who is hidden is waited for so long, seconds.
 const HIDDEN: f64 = 2.0;
-/// Number of the stature among a detection's sizes.
-const STATURE: usize = LENGTHS.len() - 1;
 /// Clothes are looked at this often at most, seconds.
 const CLOTHES_EVERY: f64 = 0.3;
 /// What is measured so much nearer than a place hides it, and so much farther shows that it is free, metres.
@@ -44,10 +42,18 @@ pub(super) struct Person {
 }
 
 impl Person {
-    pub(super) fn new(id: usize, body: Body, config: Config, stamp: f64) -> Result<Self, TrackError> {
+    pub(super) fn new(
+        id: usize,
+        body: Body,
+        config: Config,
+        detector: Option<Box<dyn Detect>>,
+        stamp: f64,
+    ) -> Result<Self, TrackError> {
+        let mut tracker = Tracker::new(body, config)?;
+        tracker.set_detector(detector);
         Ok(Self {
             id,
-            tracker: Tracker::new(body, config)?,
+            tracker,
             there: false,
             born: stamp,
             seen: stamp,
@@ -70,8 +76,8 @@ impl Person {
     }
 
     /// Takes the stature of a look in. What one look has wrong the next one has, too: the best says how sure all are.
-    pub(super) fn measure(&mut self, detection: &Detection) {
-        let Some([seen, variance]) = stature(detection) else { return };
+    pub(super) fn measure(&mut self, detected: Detected) {
+        let Some([seen, variance]) = stature(detected) else { return };
         self.stature = Some(self.stature.map_or([seen, variance], |[known, before]| {
             let share = before / (before + variance);
             [known + share * (seen - known), before.min(variance)]
@@ -79,8 +85,8 @@ impl Person {
     }
 
     /// What a detected person's stature speaks against being this one, nats.
-    pub(super) fn unlike(&self, detection: &Detection) -> f64 {
-        let both = self.stature.zip(stature(detection));
+    pub(super) fn unlike(&self, detected: Detected) -> f64 {
+        let both = self.stature.zip(stature(detected));
         both.map_or(0.0, |([own, a], [other, b])| 0.5 * (other - own).powi(2) / (a + b))
     }
 
@@ -130,8 +136,9 @@ impl Person {
 }
 
 /// Natural logarithm of a detected person's stature, and its variance; all sizes follow it.
-fn stature(detection: &Detection) -> Option<[f64; 2]> {
-    detection.lengths.get(STATURE).map(|[length, sigma]| [length.ln(), sigma * sigma])
+fn stature(detected: Detected) -> Option<[f64; 2]> {
+    let [length, sigma] = detected.length(detected.map.stature()?)?;
+    Some([length.ln(), sigma * sigma])
 }
 
 /// Where somebody is who is not seen.

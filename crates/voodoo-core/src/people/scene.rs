@@ -78,8 +78,8 @@ impl Scene {
                     *known = metres(image, index).unwrap_or(0.0);
                 }
             }
-            for row in (self.row..image.height).step_by(LEARNT_ROWS) {
-                for index in row * image.width..(row + 1) * image.width {
+            for row in (self.row..image.camera.height()).step_by(LEARNT_ROWS) {
+                for index in row * image.camera.width()..(row + 1) * image.camera.width() {
                     let Some(z) = metres(image, index).filter(|_| owners[index] == NOBODY) else { continue };
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.looks[index], z);
                 }

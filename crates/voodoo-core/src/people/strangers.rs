@@ -1,6 +1,6 @@
 //! Who was seen by a detector and is not tracked yet.
 
-use crate::detect::Detection;
+use crate::detect::{Detection, PlacedDetection};
 use crate::math::Vec3;
 use crate::relocalize::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 
@@ -14,9 +14,8 @@ const FORGOTTEN: f64 = 0.5;
 pub(super) struct Stranger {
     pub(super) place: Vec3,
     pub(super) detection: Detection,
-    /// The image that shows it, and the pixels there.
+    /// The image that shows it.
     pub(super) image: usize,
-    pub(super) pixels: Vec<usize>,
     sum: f64,
     stamp: f64,
 }
@@ -34,14 +33,14 @@ impl Strangers {
     }
 
     /// Takes a look in; `still`: what is seen has stood there all the time.
-    pub(super) fn note(&mut self, stamp: f64, detection: Detection, image: usize, pixels: Vec<usize>, still: bool) {
-        let Some(place) = detection.place() else { return };
+    pub(super) fn note(&mut self, stamp: f64, placed: PlacedDetection, image: usize, still: bool) {
+        let PlacedDetection { root: place, detection, .. } = placed;
         let gain = detection.person - if still { STILL_COSTS } else { LOOK_COSTS };
         let near = |stranger: &&mut Stranger| stranger.place.distance(place) < SAME_PERSON;
         let before = self.seen.iter_mut().find(near).map(|stranger| stranger.sum);
         self.seen.retain(|stranger| stranger.place.distance(place) >= SAME_PERSON);
         let sum = (before.unwrap_or(0.0) + gain).max(0.0);
-        self.seen.push(Stranger { place, detection, image, pixels, sum, stamp });
+        self.seen.push(Stranger { place, detection, image, sum, stamp });
     }
 
     /// Those seen in the frame of this time.

@@ -31,7 +31,7 @@ impl Default for Options {
 impl Options {
     /// Whether persons are followed at a place.
     pub(super) fn allows(&self, place: Vec3) -> bool {
-        self.region.is_none_or(|region| region.contains_local_point(place))
+        self.region.is_none_or(|region| region.contains(place))
     }
 
     /// Whether somebody of this number is followed.

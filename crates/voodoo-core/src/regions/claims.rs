@@ -4,11 +4,11 @@
 
 use super::histogram::bin_of;
 use super::labels::{Labels, NOTHING};
-use super::lens::Lens;
 use super::lines::NEARER_BY;
 use super::{Posed, Regions, scan};
 use crate::association::correspondence::RegionSupport;
 use crate::body::two_bone::TwoBone;
+use crate::camera::Camera;
 use crate::math::{Pose, Vec3, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
@@ -49,7 +49,7 @@ impl Backdrop {
     pub fn make_room(&mut self, frame: &Frame, limbs: usize) {
         self.planes.resize_with(frame.colors.len(), Labels::default);
         for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
-            labels.make_room(BACKDROP_BITS, picture.width, picture.height);
+            labels.make_room(BACKDROP_BITS, picture.camera.width(), picture.camera.height());
         }
         self.camera_from_limb.clear();
         self.camera_from_limb.reserve(limbs);
@@ -65,7 +65,7 @@ impl Regions {
             let view = self.viewpoint(frame, picture, posed);
             camera_from_limb.clear();
             camera_from_limb.extend((0..posed.poses.len()).map(|limb| view.of(limb)));
-            labels.draw(posed.body, camera_from_limb, &Lens::of(picture), BACKDROP_BITS, &shown);
+            labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &shown);
         }
     }
 
@@ -114,21 +114,21 @@ impl Regions {
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
         for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
-            let known = self.cameras.iter().find(|camera| camera.number == picture.camera && camera.known);
+            let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
             let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
             let (model, scene) = (&camera.model, camera.scene.as_ref());
-            let unit = super::unit_of(&camera.lens);
+            let unit = camera.unit;
             let view = scan::View { picture, model, labels, scene, groups: &self.groups, unit };
-            let lens = Lens::of(picture);
-            places(shape, &self.viewpoint(frame, picture, posed).of(limb), &lens, |[u, v], depth, area| {
+            places(shape, &self.viewpoint(frame, picture, posed).of(limb), picture.camera, |[u, v], depth, area| {
                 claim.area += area;
-                if !(u >= 0.0 && v >= 0.0 && u < lens.width as f64 && v < lens.height as f64) {
+                let [width, height] = [picture.camera.width(), picture.camera.height()];
+                if !(u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64) {
                     return;
                 }
                 let (column, row) = (u as usize, v as usize);
                 let (label, before) = labels.at(column, row);
                 if let Some(other) = behind((label, f64::from(before)), depth) {
-                    let pixel = row * picture.width + column;
+                    let pixel = row * picture.camera.width() + column;
                     let bin = bin_of(&picture.pixels, pixel);
                     claim.gained += area * f64::from(view.certainty(group, other, pixel, bin));
                 }
@@ -143,24 +143,26 @@ impl Regions {
 fn places(
     shape: &TaperedEllipticCylinder,
     camera_from_limb: &Pose,
-    lens: &Lens,
+    camera: &Camera,
     mut each: impl FnMut([f64; 2], f64, f64),
 ) {
     let ends = [0.0, shape.length()].map(|along| *camera_from_limb * (Vec3::Z * along));
     if ends.iter().any(|end| end.z < super::labels::NEAREST_END) {
         return;
     }
-    let [start, end] = ends.map(|end| lens.project(end));
+    let [Some(start), Some(end)] = ends.map(|end| camera.project(end)) else { return };
     let axis = [end[0] - start[0], end[1] - start[1]];
     let length = (axis[0] * axis[0] + axis[1] * axis[1]).sqrt().max(1e-6);
     let aside = [-axis[1] / length, axis[0] / length];
     let radii = [0.5 * (shape.a0() + shape.b0()), 0.5 * (shape.a1() + shape.b1())];
-    let focal = 0.5 * (lens.intrinsics[0] + lens.intrinsics[1]);
+    let [fx, fy] = camera.focal();
+    let focal = 0.5 * (fx + fy);
     for along in ALONG {
         let centre = ends[0] + (ends[1] - ends[0]) * along;
         let radius = radii[0] + (radii[1] - radii[0]) * along;
         let metre = focal / centre.z;
-        let [u, v] = lens.project(centre).map(|value| value + 0.5);
+        let Some(seen) = camera.project(centre) else { continue };
+        let [u, v] = seen.map(|value| value + 0.5);
         let patch = length / metre * 2.0 * radius / (ALONG.len() * OVER.len()) as f64 / REFERENCE_PATCH;
         for across in OVER {
             let off = across * radius * metre;

@@ -5,8 +5,8 @@
 
 use std::ops::Range;
 
-use super::lens::Lens;
 use crate::body::Body;
+use crate::camera::Camera;
 use crate::math::{Pose, Vec3};
 
 /// Corners of an end's outline: cosines and sines.
@@ -51,11 +51,11 @@ impl Labels {
         &mut self,
         body: &Body,
         camera_from_limb: &[Pose],
-        lens: &Lens,
+        camera: &Camera,
         bits: u32,
         shown: impl Fn(usize) -> bool,
     ) {
-        self.clear(bits, [lens.width, lens.height].map(|size| size.div_ceil(1 << bits)));
+        self.clear(bits, [camera.width(), camera.height()].map(|size| size.div_ceil(1 << bits)));
         let scale = 1.0 / f64::from(1_u32 << bits);
         let cells = |place: [f64; 2]| place.map(|value| (scale * value) as f32);
         let limbs = body.limbs().iter().zip(camera_from_limb).enumerate();
@@ -70,9 +70,10 @@ impl Labels {
             self.corners.clear();
             for ((a, b, _), centre) in ends.into_iter().zip(centres) {
                 let (x, y) = (x * a, y * b);
-                self.corners.extend(CORNERS.map(|[c, s]| cells(lens.project(centre + x * c + y * s))));
+                self.corners
+                    .extend(CORNERS.iter().filter_map(|[c, s]| camera.project(centre + x * *c + y * *s)).map(cells));
             }
-            let [start, end] = centres.map(|centre| cells(lens.project(centre)));
+            let [Some(start), Some(end)] = centres.map(|centre| camera.project(centre).map(cells)) else { continue };
             let front = |end: usize| (centres[end].z - 0.5 * (ends[end].0 + ends[end].1)) as f32;
             let along = [end[0] - start[0], end[1] - start[1]];
             let square = (along[0] * along[0] + along[1] * along[1]).max(1.0);

@@ -1,8 +1,8 @@
 //! Lines across the contour of limbs: where they stand in a picture and what borders the limb there.
 
 use super::labels::{Labels, NOTHING};
-use super::lens::Lens;
 use crate::body::{Body, Limb};
+use crate::camera::Camera;
 use crate::math::{Pose, Vec3};
 use crate::observation::depth_view::{DepthView, Pixel};
 use crate::observation::frame::Frame;
@@ -75,7 +75,7 @@ impl<'a> Beside<'a> {
 /// Where lines of a limb are looked for.
 pub(super) struct Viewer<'a> {
     pub body: &'a Body,
-    pub lens: &'a Lens,
+    pub camera: &'a Camera,
     pub labels: &'a Labels,
     /// Pixels a unit.
     pub unit: f32,
@@ -99,7 +99,7 @@ impl Viewer<'_> {
             let Some(points) = limb.shape.contour(t, camera) else { continue };
             let sides = points.map(|found| {
                 let normal = camera_from_limb.rotation * found.normal;
-                let [fx, fy, ..] = self.lens.intrinsics;
+                let [fx, fy] = self.camera.focal();
                 self.line(index, camera_from_limb, found.point, [normal.x / fx, normal.y / fy])
             });
             let [Some(mut first), Some(mut second)] = sides else { continue };
@@ -127,15 +127,16 @@ impl Viewer<'_> {
         lines: &mut Vec<Line>,
     ) {
         let middle = *camera_from_limb * (0.5 * limb.shape.length() * Vec3::Z);
-        let middle = self.lens.project(middle);
+        let Some(middle) = self.camera.project(middle) else { return };
         for corner in 0..RIM {
             let (s, c) = f64::sin_cos(std::f64::consts::TAU * corner as f64 / RIM as f64);
             let Some([point, along]) = limb.shape.rim_contour(distal, [c, s], camera) else { continue };
             let place = *camera_from_limb * point;
             let along = camera_from_limb.rotation * along;
             // The picture of the rim's direction; the normal is at right angles to it, away from the limb.
-            let [x, y] = [[1.0, 0.0], [0.0, 1.0]].map(|axis| self.lens.motion(place, axis).dot(along));
-            let seen = self.lens.project(place);
+            let motion = [[1.0, 0.0], [0.0, 1.0]].map(|axis| self.camera.gradient(place, axis));
+            let ([Some(x), Some(y)], Some(seen)) = (motion, self.camera.project(place)) else { continue };
+            let [x, y] = [x.dot(along), y.dot(along)];
             let out = (seen[0] - middle[0]) * y - (seen[1] - middle[1]) * x;
             let normal = if out > 0.0 { [y, -x] } else { [-y, x] };
             lines.extend(self.line(index, camera_from_limb, point, normal));
@@ -149,8 +150,8 @@ impl Viewer<'_> {
             return None;
         }
         let n = normal.map(|value| value / norm);
-        let place = self.lens.project(point).map(|value| value as f32);
-        let (normal, motion) = (n.map(|value| value as f32), self.lens.motion(point, n));
+        let place = self.camera.project(point)?.map(|value| value as f32);
+        let (normal, motion) = (n.map(|value| value as f32), self.camera.gradient(point, n)?);
         let border = self.border(limb, place, normal)?;
         let Border { outside, depth, clear } = border;
         let hidden = self.beside.is_some_and(|beside| beside.hides(point));
@@ -173,7 +174,8 @@ impl Viewer<'_> {
     /// What borders a limb at a place; `None` outside of the picture.
     fn border(&self, limb: usize, place: [f32; 2], normal: [f32; 2]) -> Option<Border> {
         let inside = |u: f32, v: f32| {
-            (u >= 0.0 && v >= 0.0 && u < self.lens.width as f32 && v < self.lens.height as f32).then_some((u, v))
+            (u >= 0.0 && v >= 0.0 && u < self.camera.width() as f32 && v < self.camera.height() as f32)
+                .then_some((u, v))
         };
         let beside = BESIDE * self.unit;
         let (u, v) = inside(place[0] - beside * normal[0], place[1] - beside * normal[1])?;

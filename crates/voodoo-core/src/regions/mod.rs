@@ -9,7 +9,6 @@ mod claims;
 mod evidence;
 mod histogram;
 mod labels;
-mod lens;
 mod lines;
 mod models;
 mod posterior;
@@ -19,6 +18,7 @@ mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
+use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 use crate::observation::frame::Frame;
@@ -27,7 +27,6 @@ pub use claims::{Backdrop, Claim};
 use evidence::Evidence;
 use histogram::Kind;
 use labels::Labels;
-use lens::Lens;
 use lines::{Beside, Line, Viewer};
 use models::ColorModel;
 use scan::{Scanner, Search};
@@ -61,9 +60,10 @@ const MODEL_ERROR: f32 = 2.0;
 
 /// What the pictures of one camera have taught, and working memory.
 #[derive(Debug, Default)]
-struct Camera {
+struct Learned {
     number: u16,
-    lens: Lens,
+    /// Pixels a unit in the last picture.
+    unit: f32,
     model: ColorModel,
     scene: Option<Scene>,
     labels: Labels,
@@ -82,7 +82,7 @@ pub fn steps(unknown_motion: bool) -> usize {
 /// Colours of the body and its surroundings, camera by camera, and the lines of the last look.
 #[derive(Debug, Default)]
 pub struct Regions {
-    cameras: Vec<Camera>,
+    cameras: Vec<Learned>,
     /// Group of every limb: those of one group have the same colours.
     groups: Vec<u16>,
     /// Time of the last frame, seconds.
@@ -136,10 +136,15 @@ impl Regions {
         Ok(())
     }
 
-    /// Refuses pictures that cannot be compared with those of the empty scene.
+    /// Refuses pictures with distortion, and those that cannot be compared with those of the empty scene.
     pub fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         for (index, picture) in frame.colors.iter().enumerate() {
-            let known = self.cameras.iter().find(|camera| camera.number == picture.camera);
+            if picture.camera.distorts() {
+                let found = format!("{:?}", picture.camera.lens());
+                let expected = "a pinhole camera: take the distortion out of the picture";
+                return Err(TrackError::measurement(format!("color[{index}].camera"), expected, found));
+            }
+            let known = self.cameras.iter().find(|camera| camera.number == picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }
         Ok(())
@@ -154,7 +159,7 @@ impl Regions {
         for picture in frame.colors {
             let kind = Kind::of(&picture.pixels);
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
-            let camera = self.camera(picture.camera);
+            let camera = self.camera(picture.number);
             if camera.known && camera.model.kind == kind {
                 continue;
             }
@@ -202,11 +207,11 @@ impl Regions {
         for picture in frame.colors {
             self.look(frame, picture, posed);
             let Self { cameras, groups, scanner, evidence, .. } = self;
-            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera && camera.known) else {
+            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
                 continue;
             };
-            let unit = unit_of(&camera.lens);
-            let Camera { model, labels, scene, lines, edges, .. } = camera;
+            let Learned { unit, model, labels, scene, lines, edges, .. } = camera;
+            let unit = *unit;
             let view = scan::View { picture, model, labels, scene: scene.as_ref(), groups, unit };
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
@@ -241,7 +246,7 @@ impl Regions {
     pub fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         let camera = self.cameras.iter().find(|known| known.number == camera);
         camera.into_iter().flat_map(|camera| {
-            let unit = unit_of(&camera.lens);
+            let unit = camera.unit;
             camera.lines.iter().zip(&camera.edges).map(move |(line, found)| {
                 let edge = found.map(|found| found.edge).unwrap_or_default();
                 RegionLine {
@@ -263,9 +268,9 @@ impl Regions {
         self.stamp = Some(frame.stamp);
     }
 
-    fn camera(&mut self, number: u16) -> &mut Camera {
+    fn camera(&mut self, number: u16) -> &mut Learned {
         let index = self.cameras.iter().position(|camera| camera.number == number).unwrap_or_else(|| {
-            self.cameras.push(Camera { number, ..Camera::default() });
+            self.cameras.push(Learned { number, ..Learned::default() });
             self.cameras.len() - 1
         });
         &mut self.cameras[index]
@@ -274,16 +279,17 @@ impl Regions {
     /// Places the lines of one picture.
     fn look(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
         let viewpoint = self.viewpoint(frame, picture, posed);
-        let camera = self.camera(picture.camera);
+        let camera = self.camera(picture.number);
         camera.camera_from_limb.clear();
         camera.camera_from_limb.extend((0..posed.poses.len()).map(|limb| viewpoint.of(limb)));
-        camera.lens = Lens::of(picture);
-        let (body, Camera { lens, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
-        labels.draw(body, camera_from_limb, lens, CELL_BITS, |_| true);
+        camera.unit = unit_of(picture.camera);
+        let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
+        labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
         // Room at once: how many there are differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
-        let viewer = Viewer { body, lens, labels, unit: unit_of(lens), beside: Beside::of(frame, picture) };
+        let beside = Beside::of(frame, picture);
+        let viewer = Viewer { body, camera: picture.camera, labels, unit: *unit, beside };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
@@ -293,8 +299,8 @@ impl Regions {
     /// Learns the colours along the lines of one picture, of limbs that are not in doubt.
     fn teach(&mut self, picture: &ColorImage) {
         let Self { cameras, groups, evidence, .. } = self;
-        let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.camera) else { return };
-        let unit = unit_of(&camera.lens);
+        let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number) else { return };
+        let unit = camera.unit;
         // Where many limbs are in doubt at once, it is the light that has changed.
         let light = evidence.iter().filter(|evidence| evidence.doubts()).count() > MANY;
         for line in &camera.lines {
@@ -308,8 +314,9 @@ impl Regions {
 }
 
 /// Pixels a unit.
-fn unit_of(lens: &Lens) -> f32 {
-    (0.5 * (lens.intrinsics[0] + lens.intrinsics[1]) / FOCAL) as f32
+fn unit_of(camera: &Camera) -> f32 {
+    let [fx, fy] = camera.focal();
+    (0.5 * (fx + fy) / FOCAL) as f32
 }
 
 /// Where a limb is a share of the last motion later.

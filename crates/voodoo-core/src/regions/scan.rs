@@ -160,7 +160,7 @@ fn compare_locally(view: &View, line: &Line, [start, every]: [f32; 2], ratios: &
 }
 
 fn brightness(picture: &ColorImage, column: usize, row: usize) -> f32 {
-    f32::from(picture.pixels.get(row * picture.width + column)[0])
+    f32::from(picture.pixels.get(row * picture.camera.width() + column)[0])
 }
 
 impl View<'_> {
@@ -185,7 +185,7 @@ impl View<'_> {
             if let Some((column, row)) = walk.pixel(self.picture)
                 && let Some(other) = self.other(line, r, column, row)
             {
-                let pixel = row * self.picture.width + column;
+                let pixel = row * self.picture.camera.width() + column;
                 let bin = bin(pixel);
                 *ratio = if other == NOTHING && self.scene.is_none() {
                     known[bin]
@@ -263,7 +263,7 @@ impl Walk {
     fn pixel(&self, picture: &ColorImage) -> Option<(usize, usize)> {
         // What lies left of the picture, or above it, is beyond any size as a number without sign.
         let [column, row] = self.place.map(|place| (place >> PART_BITS) as usize);
-        (column < picture.width && row < picture.height).then_some((column, row))
+        (column < picture.camera.width() && row < picture.camera.height()).then_some((column, row))
     }
 
     #[inline(always)]
@@ -293,7 +293,7 @@ pub(super) fn count(
             if let Some((column, row)) = walk.pixel(picture)
                 && labels.at(column, row).0 == shown
             {
-                histogram.count(bin_of(&picture.pixels, row * picture.width + column));
+                histogram.count(bin_of(&picture.pixels, row * picture.camera.width() + column));
             }
             walk.go_on();
         }

@@ -66,11 +66,12 @@ impl Scene {
 
     /// Refuses a picture that cannot be compared.
     pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
-        if self.size == [picture.height, picture.width] && self.kind == Kind::of(&picture.pixels) {
+        if self.size == [picture.camera.height(), picture.camera.width()] && self.kind == Kind::of(&picture.pixels) {
             return Ok(());
         }
         let what = format!("color[{index}].image");
-        let found = format!("{}x{} beside {}x{}", picture.width, picture.height, self.size[1], self.size[0]);
+        let found =
+            format!("{}x{} beside {}x{}", picture.camera.width(), picture.camera.height(), self.size[1], self.size[0]);
         Err(TrackError::measurement(what, "a picture like those of the empty scene", found))
     }
 

@@ -5,7 +5,7 @@
 
 use super::histogram::bin_of;
 use super::labels::NOTHING;
-use super::{Posed, Regions, scan, unit_of};
+use super::{Posed, Regions, scan};
 use crate::association::correspondence::Correspondences;
 use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
@@ -43,17 +43,17 @@ impl Regions {
 
     fn segment_picture(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) -> Vec<f32> {
         self.look(frame, picture, posed);
-        let mut likely = vec![0.0; picture.width * picture.height];
-        let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.camera) else { return likely };
+        let mut likely = vec![0.0; picture.camera.width() * picture.camera.height()];
+        let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
         let (model, labels, scene) = (&camera.model, &camera.labels, camera.scene.as_ref());
-        let unit = unit_of(&camera.lens);
+        let unit = camera.unit;
         let view = scan::View { picture, model, labels, scene, groups: &self.groups, unit };
         let cell = 1_usize << super::CELL_BITS;
-        let near = distances(labels, [picture.width, picture.height], cell as f32 / unit);
+        let near = distances(labels, [picture.camera.width(), picture.camera.height()], cell as f32 / unit);
         // Log ratios, and then sums of them along rows.
         let mut ratios = vec![0.0_f32; likely.len()];
         for (index, ratio) in ratios.iter_mut().enumerate() {
-            let (column, row) = (index % picture.width, index / picture.width);
+            let (column, row) = (index % picture.camera.width(), index / picture.camera.width());
             let limb = near.limb[row / cell * near.columns + column / cell];
             if limb == NOTHING {
                 continue;
@@ -63,10 +63,10 @@ impl Regions {
                 *ratio = view.ratio(group, NOTHING, index, bin_of(&picture.pixels, index));
             }
         }
-        let across = means(&ratios, picture.width, 1);
-        let around = means(&across, picture.width, picture.width);
+        let across = means(&ratios, picture.camera.width(), 1);
+        let around = means(&across, picture.camera.width(), picture.camera.width());
         for (index, likely) in likely.iter_mut().enumerate() {
-            let (column, row) = (index % picture.width, index / picture.width);
+            let (column, row) = (index % picture.camera.width(), index / picture.camera.width());
             let place = row / cell * near.columns + column / cell;
             if near.limb[place] != NOTHING && near.outside[place] < FARTHEST {
                 let odds = ratios[index] + around[index] - near.outside[place] / FALL;

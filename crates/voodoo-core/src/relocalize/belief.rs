@@ -1,6 +1,5 @@
 //! Whether what a detector sees is a person: looks at one place, one after the other, add up until they are enough.
 
-use crate::detect::Detection;
 use crate::math::Vec3;
 
 /// From this sum of log odds on it is a person, or one is elsewhere; no detection of a tracked one counts for more.
@@ -18,10 +17,9 @@ pub(super) struct Belief {
 }
 
 impl Belief {
-    /// Takes a frame's look in; whether it is a person now.
-    pub(super) fn observe(&mut self, seen: Option<&Detection>) -> bool {
-        let root = seen.and_then(|seen| Some((seen.place()?, seen.person)));
-        let Some((place, person)) = root else {
+    /// Takes a frame's look in: where a person's root is, and the log odds that it is one. Whether it is a person now.
+    pub(super) fn observe(&mut self, seen: Option<(Vec3, f64)>) -> bool {
+        let Some((place, person)) = seen else {
             // What flickers is forgotten.
             self.sum *= 0.5;
             return false;
@@ -37,17 +35,11 @@ impl Belief {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::{DetectedJoint, JOINTS};
-
-    fn seen(person: f64, x: f64) -> Detection {
-        let joint = DetectedJoint { position: Vec3::new(x, 0.0, 1.0), sigma: 0.05, visible: 1.0 };
-        Detection { person, joints: vec![joint; JOINTS.len()], ..Detection::default() }
-    }
 
     /// At which of these looks, log odds and place, a person is believed.
     fn believed(looks: &[Option<(f64, f64)>]) -> Option<usize> {
         let mut belief = Belief::default();
-        looks.iter().position(|look| belief.observe(look.map(|(person, x)| seen(person, x)).as_ref()))
+        looks.iter().position(|look| belief.observe(look.map(|(person, x)| (Vec3::new(x, 0.0, 1.0), person))))
     }
 
     #[test]

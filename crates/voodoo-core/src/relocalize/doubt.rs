@@ -1,8 +1,8 @@
 //! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
 
 use super::belief::ENOUGH_ODDS;
-use crate::body::{Body, JointRole, Side};
-use crate::detect::Detection;
+use crate::body::Body;
+use crate::detect::Detected;
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
@@ -30,20 +30,11 @@ pub enum Seen {
     Elsewhere,
 }
 
-/// Joints that tell where the trunk is and which way round.
-const TRUNK: [Joint; 2] = [JointRole::Shoulder, JointRole::Hip];
-const LEGS: [Joint; 2] = [JointRole::Knee, JointRole::Ankle];
-const ARMS: [Joint; 2] = [JointRole::Elbow, JointRole::Wrist];
-
-/// A joint of both sides.
-type Joint = fn(Side) -> JointRole;
-
 /// Mean distance of detected joints from the tracked ones, and mean of their standard deviations, metres.
-fn apart(detection: &Detection, body: &Body, world_from_limb: &[Pose], joints: &[Joint]) -> [f64; 2] {
+fn apart(detected: Detected, body: &Body, world_from_limb: &[Pose], joints: &[usize]) -> [f64; 2] {
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
-    for role in joints.iter().flat_map(|joint| Side::BOTH.map(joint)) {
-        let site = body.roles().site_at(role);
-        if let Some((seen, site)) = site.and_then(|site| Some((detection.at_site(body, site)?, site))) {
+    for joint in joints {
+        if let (Some(seen), Some(site)) = (detected.joint(*joint), detected.map.site(*joint)) {
             let tracked: Vec3 = body.site_position(world_from_limb, site);
             apart += seen.position.distance(tracked);
             spread += seen.sigma;
@@ -125,21 +116,22 @@ impl Doubt {
     /// `among` several; what it says.
     pub(super) fn weigh(
         &mut self,
-        detection: &Detection,
+        detected: Detected,
         body: &Body,
         world_from_limb: &[Pose],
         young: bool,
         among: bool,
     ) -> Seen {
         let sigmas = if among { 0.0 } else { SIGMAS };
-        let elsewhere = |joints: &[Joint], least: f64| {
-            let [apart, spread] = apart(detection, body, world_from_limb, joints);
+        let elsewhere = |joints: &[usize], least: f64| {
+            let [apart, spread] = apart(detected, body, world_from_limb, joints);
             apart > least && apart > sigmas * spread
         };
         let limbs = young || among;
-        let limbs_are = limbs && (elsewhere(&LEGS, ELSEWHERE) || elsewhere(&ARMS, APART));
-        if elsewhere(&TRUNK, ELSEWHERE) || limbs_are {
-            self.elsewhere += detection.person.min(detection.facing.abs()).min(ENOUGH_ODDS);
+        let Detected { detection, map } = detected;
+        let limbs_are = limbs && (elsewhere(map.legs(), ELSEWHERE) || elsewhere(map.arms(), APART));
+        if elsewhere(map.trunk(), ELSEWHERE) || limbs_are {
+            self.elsewhere += detection.person.min(detection.facing.map_or(f64::INFINITY, f64::abs)).min(ENOUGH_ODDS);
             self.agreed = false;
             return if self.elsewhere >= ENOUGH_ODDS { Seen::Elsewhere } else { Seen::NotThere };
         }
@@ -167,8 +159,8 @@ impl Doubt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::HumanModel;
-    use crate::detect::{DetectedJoint, JOINTS};
+    use crate::body::{Body, HumanModel};
+    use crate::detect::{DetectedJoint, Detection, JointMap};
     use crate::math::Quat;
 
     #[test]
@@ -186,11 +178,13 @@ mod tests {
     #[test]
     fn a_given_start_that_proves_right_is_looked_at_half_as_often_and_one_that_was_found_as_often_as_ever() {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
-        let poses = body.rest_pose(Pose::identity());
+        let poses = body.rest_pose(Pose::IDENTITY);
         let looks = |itself| {
             let mut doubt = Doubt::default();
             doubt.found_itself(itself);
-            let agree = |doubt: &mut Doubt| doubt.weigh(&Detection::default(), &body, &poses, true, false);
+            let (detection, map) = (Detection::default(), JointMap::default());
+            let nothing = Detected { detection: &detection, map: &map };
+            let agree = |doubt: &mut Doubt| doubt.weigh(nothing, &body, &poses, true, false);
             let due = |doubt: &mut Doubt, frame: i32| doubt.due(f64::from(frame) / 30.0, false, false, false);
             (0..30).filter(|frame| due(&mut doubt, *frame) && agree(&mut doubt) == Seen::There).count()
         };
@@ -200,20 +194,23 @@ mod tests {
     #[test]
     fn what_is_turned_about_or_elsewhere_is_tried_and_what_is_where_it_is_seen_is_not() {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
-        let seen_at = |root: Pose| {
+        let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
+        let map = JointMap::new(&body, &names, &[]);
+        let seen_at = |root: Pose, sigma: f64| {
             let poses = body.rest_pose(root);
-            let place = |name: &&str| body.site_index(name).map_or(Vec3::ZERO, |site| body.site_position(&poses, site));
-            let joint = |name| DetectedJoint { position: place(name), sigma: 0.05, visible: 1.0 };
-            Detection { person: 5.0, facing: 6.0, joints: JOINTS.iter().map(joint).collect(), ..Detection::default() }
+            let place = |site| body.site_position(&poses, site);
+            let joint = |site| Some(DetectedJoint { position: place(site), sigma, visible: 1.0 });
+            let joints = (0..names.len()).map(joint).collect();
+            Detection { person: 5.0, facing: Some(6.0), joints, ..Detection::default() }
         };
-        let tracked = body.rest_pose(Pose::identity());
+        let tracked = body.rest_pose(Pose::IDENTITY);
         let about = Pose::from_parts(Vec3::ZERO, Quat::from_rotation_z(std::f64::consts::PI));
         let aside = Pose::from_parts(0.4 * Vec3::X, Quat::IDENTITY);
         let near = Pose::from_parts(0.09 * Vec3::X, Quat::IDENTITY);
         let tried = |root, sigma| {
-            let mut seen = seen_at(root);
-            seen.joints.iter_mut().for_each(|joint| joint.sigma = sigma);
-            [false, true].map(|among| Doubt::default().weigh(&seen, &body, &tracked, false, among) == Seen::Elsewhere)
+            let seen = seen_at(root, sigma);
+            let seen = Detected { detection: &seen, map: &map };
+            [false, true].map(|among| Doubt::default().weigh(seen, &body, &tracked, false, among) == Seen::Elsewhere)
         };
         assert_eq!([about, aside, near].map(|root| tried(root, 0.05)), [[true; 2], [true; 2], [false; 2]]);
         assert_eq!(tried(aside, 0.2), [false, true], "unsure of it");

@@ -30,7 +30,7 @@ impl Hidden {
         for joint in joints {
             hidden += i32::from(views.iter().any(|view| {
                 let place = view.working_from_camera.inverse_transform_point(joint - views.origin);
-                matches!(view.about(place), Pixel::Foreground(z) if z < place.z - IN_FRONT)
+                matches!(view.at(place), Pixel::Foreground(z) if z < place.z - IN_FRONT)
             }));
             all += 1;
             root = root.or(Some(joint));

@@ -14,7 +14,7 @@ mod watch;
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Model};
-use crate::detect::{Detection, Wanted};
+use crate::detect::{Detect, DetectError, Detected, DetectionQuery, JointMap, is_sized_like, posed, sized};
 use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
@@ -27,7 +27,6 @@ pub(crate) use belief::{ENOUGH_ODDS, LOOK_COSTS, SAME_PERSON};
 pub use doubt::Seen;
 use doubt::{Doubt, SIGMAS};
 use people::People;
-pub(crate) use people::sized;
 use search::Search;
 use trials::Trials;
 pub use watch::Sighting;
@@ -44,41 +43,63 @@ pub struct Relocalizer {
     people: People,
     doubt: Doubt,
     belief: Belief,
-    /// A detector knows bodies like this one.
-    known: bool,
 }
 
 impl Relocalizer {
+    /// Takes the detector that finds this body.
+    pub fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
+        self.people.set_detector(detector, body);
+    }
+
+    /// The body's limbs or sites have changed.
+    pub fn bind(&mut self, body: &Body) {
+        self.people.bind(body);
+    }
+
+    /// What the detector's joints are on the body.
+    pub fn map(&self) -> &JointMap {
+        self.people.map()
+    }
+
+    /// Why the detector could not look, since [`Self::clear_error`].
+    pub fn error(&self) -> Option<&DetectError> {
+        self.people.error()
+    }
+
+    /// Forgets the detector's last error.
+    pub fn clear_error(&mut self) {
+        self.people.clear_error();
+    }
+
     /// Forgets everything that was remembered of an earlier track.
     pub fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.watch.restart();
         self.doubt.restart();
         self.belief = Belief::default();
-        self.known = People::know(&model.body);
+        self.people.bind(&model.body);
         self.people.keep_floor(false);
         self.search.remember(poses);
     }
 
-    /// Whether a body can be found without a pose.
-    pub fn finds(&self, body: &Body) -> bool {
-        People::know(body)
+    /// Whether the body can be found without a pose.
+    pub fn finds(&self) -> bool {
+        self.people.know()
     }
 
     /// A body of a detected person's sizes, or with `known` ones that the model has, and its poses, world frame.
-    pub fn placed(&self, model: &Model, detection: &Detection, known: bool) -> Option<(Body, Vec<Pose>)> {
-        if known {
-            Some((model.body.clone(), people::posed(&model.body, detection)?))
-        } else {
-            people::sized(model, detection)
-        }
+    pub fn placed(&self, model: &Model, detected: Detected, known: bool) -> Option<(Body, Vec<Pose>)> {
+        if known { Some((model.body.clone(), posed(&model.body, detected)?)) } else { sized(model, detected) }
     }
 
     /// Body and poses of the surest person in a frame.
     pub fn first(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.look(frame, None, Wanted::Anybody);
-        let detection = detection.filter(|_| self.belief.observe(detection))?;
+        self.people.look(&model.body, frame, None, DetectionQuery::Any);
+        let place = self.people.place()?;
+        if !self.belief.observe(Some(place)) {
+            return None;
+        }
         self.belief = Belief::default();
-        people::sized(model, detection)
+        sized(model, self.people.seen()?)
     }
 
     /// The track was started: `itself` where a detector saw somebody, and nobody had said where.
@@ -105,25 +126,26 @@ impl Relocalizer {
     /// The pose of a body that fits best what a detector saw in this frame, world frame; the body is that of a start, or has the
     /// sizes that the detector saw where they are surely others.
     pub fn posed(&self, model: &Model, set: &Body) -> Option<(Body, Vec<Pose>)> {
-        let detection = self.people.seen()?;
-        if people::is_sized_like(set, detection, SIGMAS) {
-            return Some((set.clone(), people::posed(set, detection)?));
+        let detected = self.people.seen()?;
+        if is_sized_like(set, detected, SIGMAS) {
+            return Some((set.clone(), posed(set, detected)?));
         }
-        people::sized(model, detection)
+        sized(model, detected)
     }
 
     /// The pose in which a detector saw this body in this frame, world frame.
     pub fn shown(&self, body: &Body) -> Option<Vec<Pose>> {
-        people::posed(body, self.people.seen()?)
+        posed(body, self.people.seen()?)
     }
 
     /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `doubtful`: a limb
     /// was not where it should be in the frame before, or it is `unsure` whether one was, or the body `lost`.
-    pub fn look(&mut self, frame: &Frame, root: Vec3, doubtful: bool, unsure: bool, lost: bool) {
+    pub fn look(&mut self, body: &Body, frame: &Frame, root: Vec3, doubtful: bool, unsure: bool, lost: bool) {
         // A body that was found a moment ago may face the other way.
         let often = lost || self.watch.open();
-        if self.doubt.due(frame.stamp, doubtful, unsure, often) && self.known {
-            self.people.look(frame, None, if lost { Wanted::Anybody } else { Wanted::Near(root) });
+        if self.doubt.due(frame.stamp, doubtful, unsure, often) && self.people.know() {
+            let query = if lost { DetectionQuery::Any } else { DetectionQuery::Near(root) };
+            self.people.look(body, frame, None, query);
             // What stands before a hidden body is somebody else.
             self.people.leave_out(|place| self.watch.hidden.by(frame, place));
         } else {
@@ -132,9 +154,9 @@ impl Relocalizer {
     }
 
     /// The same for one of several persons: good tracks are looked at, too, and who is lost is not looked for here.
-    pub fn look_at_share(&mut self, frame: &Frame, share: Share, root: Vec3, lost: bool) {
-        if self.doubt.due(frame.stamp, true, false, false) && !lost && self.known {
-            self.people.look(frame, Some(share), Wanted::Near(root));
+    pub fn look_at_share(&mut self, body: &Body, frame: &Frame, share: Share, root: Vec3, lost: bool) {
+        if self.doubt.due(frame.stamp, true, false, false) && !lost && self.people.know() {
+            self.people.look(body, frame, Some(share), DetectionQuery::Near(root));
             self.people.leave_out(|place| place.distance(root) > SAME_PERSON);
         } else {
             self.people.forget();
@@ -147,7 +169,7 @@ impl Relocalizer {
     }
 
     /// What a detector saw in this frame, if it looked.
-    pub fn detection(&self) -> Option<&Detection> {
+    pub fn detected(&self) -> Option<Detected<'_>> {
         self.people.seen()
     }
 
@@ -171,12 +193,12 @@ impl Relocalizer {
         young: bool,
         among: bool,
     ) -> Option<Seen> {
-        let detection = self.people.seen().filter(|_| lost || self.doubt.weighs())?;
+        let detected = self.people.seen().filter(|_| lost || self.doubt.weighs())?;
         // A lost body is where a person is seen for sure.
         Some(match lost {
-            true if self.belief.observe(Some(detection)) => Seen::Elsewhere,
+            true if self.belief.observe(self.people.place()) => Seen::Elsewhere,
             true => Seen::NotThere,
-            false => self.doubt.weigh(detection, body, world_from_limb, young, among),
+            false => self.doubt.weigh(detected, body, world_from_limb, young, among),
         })
     }
 
@@ -187,12 +209,12 @@ impl Relocalizer {
 
     /// The poses that a detector saw in this frame, refined, where they are no worse than the present ones; working frame. What
     /// `fit` has matched is as before when it returns.
-    pub fn detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> Option<&[Pose]> {
-        let detection = self.people.seen()?;
+    pub fn try_detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> Option<&[Pose]> {
+        let detected = self.people.seen()?;
         let origin = context.seen.origin();
-        let mut place = people::posed(&context.model.body, detection)?;
+        let mut place = posed(&context.model.body, detected)?;
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
-        let (low, high) = (detection.low - origin, detection.high - origin);
+        let (low, high) = (detected.detection.low - origin, detected.detection.high - origin);
         let margin = context.config.body_box_margin;
         let there = Aabb::new(low - Vec3::splat(margin), high + Vec3::splat(margin));
         // What the present pose explains must not be left behind, unless it is `lost` there.
@@ -227,7 +249,7 @@ impl Relocalizer {
     /// matched is as before when it returns.
     pub fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
         let (frame, origin) = (context.seen.frame(), context.seen.origin());
-        if self.searched().is_none() || self.known && !frame.images.is_empty() {
+        if self.searched().is_none() || self.people.know() && !frame.images.is_empty() {
             return None;
         }
         let backgrounds = context.seen.views.backgrounds;
@@ -268,7 +290,6 @@ mod tests {
         let config = without_background();
         let mut relocalizer = Relocalizer::default();
         relocalizer.restart(&model, &present);
-        relocalizer.known = false;
         let sighting = |stamp, lost| Sighting { stamp, lost, tracked: !lost, silent: false };
         with_context(pixels, &config, &model, &present, |context| {
             let mut fit = Fit::new(&config).unwrap();

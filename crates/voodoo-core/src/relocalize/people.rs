@@ -1,22 +1,23 @@
-//! What a detector says of the person who is tracked, or of anybody where nobody is: where to start, where a lost body is, and
+//! What a detector reports of the person who is tracked, or of anybody where nobody is: where to start, where a lost body is, and
 //! whether a track is what it is taken for.
 
 use super::doubt::ELSEWHERE;
-use crate::body::{Body, Model};
-use crate::detect::{Detection, Detector, JOINTS, Surroundings, Wanted, lengths, take_lengths};
-use crate::math::{Pose, Vec3};
+use crate::body::Body;
+use crate::detect::{
+    BoundDetector, Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings,
+};
+use crate::math::Vec3;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::share::Share;
 
-/// Looks for people, from the first time on that it is asked to; keeps what it last saw.
+/// Asks the detector, and keeps what it last saw.
 #[derive(Debug, Default)]
 pub(super) struct People {
-    detector: Option<Detector>,
-    seen: Option<Detection>,
-    /// The image that shows it, and the pixels there.
+    detector: BoundDetector,
+    seen: Option<PlacedDetection>,
+    /// The image that shows it.
     image: usize,
-    pixels: Vec<usize>,
     /// Log odds that what stands at the place that was looked at is a person; the surest of all images.
     verdict: Option<f64>,
     /// The floor on which it stood when it was found, world frame.
@@ -24,35 +25,54 @@ pub(super) struct People {
 }
 
 impl People {
-    /// Whether a body has the joints that a detector tells.
-    pub(super) fn know(body: &Body) -> bool {
-        JOINTS.iter().all(|joint| body.sites().iter().any(|site| site.name == *joint))
+    /// Takes a detector for this body.
+    pub(super) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
+        self.detector.set(detector, body);
+    }
+
+    /// The body has changed.
+    pub(super) fn bind(&mut self, body: &Body) {
+        self.detector.bind(body);
+    }
+
+    /// Whether there is a detector that can find the body.
+    pub(super) fn know(&self) -> bool {
+        self.detector.knows()
+    }
+
+    /// What the detector's joints are on the body.
+    pub(super) fn map(&self) -> &JointMap {
+        self.detector.map()
+    }
+
+    /// Why the detector could not look, since [`Self::clear_error`].
+    pub(super) fn error(&self) -> Option<&DetectError> {
+        self.detector.error()
+    }
+
+    /// Forgets the detector's last error.
+    pub(super) fn clear_error(&mut self) {
+        self.detector.clear_error();
     }
 
     /// What was seen in this frame.
-    pub(super) fn seen(&self) -> Option<&Detection> {
-        self.seen.as_ref()
+    pub(super) fn seen(&self) -> Option<Detected<'_>> {
+        self.seen.as_ref().map(|seen| Detected { detection: &seen.detection, map: self.detector.map() })
+    }
+
+    /// The root of the body and the log odds that it is a person, as seen in this frame.
+    pub(super) fn place(&self) -> Option<(Vec3, f64)> {
+        self.seen.as_ref().map(|seen| (seen.root, seen.detection.person))
     }
 
     /// Keeps the floor on which what was seen stands, if it was `found` there; else forgets it.
     pub(super) fn keep_floor(&mut self, found: bool) {
-        self.floor = if found { self.under_feet() } else { None };
-    }
-
-    /// The floor on which it stands; a table below which its feet are is none.
-    fn under_feet(&self) -> Option<Ground> {
-        let seen = self.seen()?;
-        let above = |floor: &Ground, name| Some(floor.normal.dot(seen.joint(name)?.position) - floor.offset);
-        seen.floor.filter(|floor| {
-            let ankles = [above(floor, "l_ankle"), above(floor, "r_ankle")].into_iter().flatten();
-            let lowest = ankles.fold(f64::INFINITY, f64::min);
-            lowest.abs() < ELSEWHERE
-        })
+        self.floor = self.seen().filter(|_| found).and_then(floor_under);
     }
 
     /// The pixels that show it.
     pub(super) fn own(&self) -> Own<'_> {
-        let pixels = if self.seen.is_some() { self.pixels.as_slice() } else { &[] };
+        let pixels = self.seen.as_ref().map_or(&[][..], |seen| &seen.detection.pixels);
         Own { image: self.image, pixels }
     }
 
@@ -68,103 +88,57 @@ impl People {
 
     /// Forgets who was seen where it is not the person: the place of its root, world frame.
     pub(super) fn leave_out(&mut self, not_there: impl Fn(Vec3) -> bool) {
-        let there = |seen: &Detection| seen.joint("humanoid_root").is_some_and(|root| !not_there(root.position));
-        self.seen = self.seen.take().filter(there);
+        self.seen = self.seen.take().filter(|seen| !not_there(seen.root));
     }
 
-    /// Looks at all depth images of a frame, or at its share of them; keeps and returns the surest person.
-    pub(super) fn look(&mut self, frame: &Frame, share: Option<Share>, wanted: Wanted) -> Option<&Detection> {
+    /// Looks for a body in all depth images of a frame, or in its share of them; keeps the surest person.
+    pub(super) fn look(&mut self, body: &Body, frame: &Frame, share: Option<Share>, query: DetectionQuery) {
         self.forget();
-        if self.detector.is_none() {
-            self.detector = Detector::new().ok();
-        }
-        let detector = self.detector.as_mut()?;
         for (number, image) in frame.images.iter().enumerate() {
             let (owners, own) = share.map_or((&[][..], None), |share| (share.owners(number), Some(share.own)));
             let around =
                 Surroundings { ground: frame.ground, excluded: frame.excluded, owners, own, ..Surroundings::default() };
-            let found = detector.detect(image, &around, wanted).first();
-            let surer = |found: &&Detection| self.seen.as_ref().is_none_or(|best| found.person > best.person);
-            if let Some(found) = found.filter(surer).cloned() {
-                detector.mask(&found, &mut self.pixels);
-                (self.image, self.seen) = (number, Some(found));
+            for found in self.detector.look(body, image, &around, query) {
+                if self.seen.as_ref().is_none_or(|best| found.detection.person > best.detection.person) {
+                    (self.image, self.seen) = (number, Some(found));
+                }
             }
-            if let (Wanted::Near(place), Some((person, bounds))) = (wanted, detector.first_look())
-                && bounds.contains_local_point(place)
+            if let (DetectionQuery::Near(place), Some((person, bounds))) = (query, self.detector.nearest())
+                && bounds.contains(place)
             {
                 self.verdict = Some(self.verdict.map_or(person, |before| before.max(person)));
             }
         }
-        self.seen.as_ref()
     }
 }
 
-/// A body of a detected person's sizes, like on both sides, and the pose that fits the joints best, world frame.
-pub(crate) fn sized(model: &Model, detection: &Detection) -> Option<(Body, Vec<Pose>)> {
-    let body = with_sizes(&model.reference_body, &detection.sizes())?;
-    let poses = posed(&body, detection)?;
-    Some((body, poses))
-}
-
-/// A body with the lengths of `LENGTHS`, like on both sides.
-fn with_sizes(reference: &Body, lengths: &[f64]) -> Option<Body> {
-    let rest = reference.rest_pose(Pose::identity());
-    let mut joints = Vec::with_capacity(JOINTS.len());
-    for name in JOINTS {
-        joints.push(reference.site_position(&rest, reference.site_index(name).ok()?));
-    }
-    take_lengths(&mut joints, lengths);
-    reference.fit(&positions(reference, &joints), true).ok().map(|(body, _)| body)
-}
-
-/// The pose of a body that fits a detected person's joints best, world frame.
-pub(super) fn posed(body: &Body, detection: &Detection) -> Option<Vec<Pose>> {
-    let mut joints: Vec<Vec3> = detection.joints.iter().map(|joint| joint.position).collect();
-    let rest = body.rest_pose(Pose::identity());
-    let own: Option<Vec<Vec3>> =
-        JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
-    take_lengths(&mut joints, &lengths(&own?));
-    body.fit(&positions(body, &joints), false).ok().map(|(_, poses)| poses)
-}
-
-/// Whether a body has the sizes of a detected person, each within so many of its standard deviations.
-pub(super) fn is_sized_like(body: &Body, detection: &Detection, sigmas: f64) -> bool {
-    let rest = body.rest_pose(Pose::identity());
-    let joints: Option<Vec<Vec3>> =
-        JOINTS.iter().map(|joint| Some(body.site_position(&rest, body.site_index(joint).ok()?))).collect();
-    let own = joints.map_or_else(Vec::new, |joints| lengths(&joints));
-    let like = |(own, [length, sigma]): (&f64, &[f64; 2])| (own / length).ln().abs() <= sigmas * sigma;
-    own.iter().zip(&detection.lengths).all(like)
-}
-
-/// Positions of a body's sites.
-fn positions(body: &Body, joints: &[Vec3]) -> Vec<(usize, Vec3)> {
-    JOINTS.iter().zip(joints).filter_map(|(name, position)| Some((body.site_index(name).ok()?, *position))).collect()
+/// The floor on which a detected person stands; a table below which their feet are is none.
+fn floor_under(seen: Detected) -> Option<Ground> {
+    seen.detection.floor.filter(|floor| {
+        let above = seen.ankles().map(|ankle| floor.normal.dot(ankle.position) - floor.offset);
+        above.fold(f64::INFINITY, f64::min).abs() < ELSEWHERE
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::DetectedJoint;
+    use crate::body::HumanModel;
+    use crate::detect::{DetectedJoint, Detection};
 
     #[test]
     fn a_plane_under_the_feet_is_the_floor_and_a_table_above_them_is_none() {
-        let floor_at = |offset: f64, ankle: f64| {
-            let joint = |name: &&str| {
-                let z = if name.ends_with("ankle") { ankle } else { 1.0 };
-                DetectedJoint { position: Vec3::new(2.0, 0.0, z), sigma: 0.05, visible: 1.0 }
-            };
-            let ground = Ground { normal: Vec3::Z, offset };
-            let joints = JOINTS.iter().map(joint).collect();
-            let seen = Some(Detection { joints, floor: Some(ground), ..Detection::default() });
-            let mut people = People { seen, ..People::default() };
-            people.keep_floor(true);
-            let kept = people.floor.is_some();
-            people.keep_floor(false);
-            assert_eq!(people.floor, None);
-            kept
+        let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
+        let names = ["l_ankle", "r_ankle", "l_shoulder"].map(String::from);
+        let map = JointMap::new(&body, &names, &[]);
+        let is_kept = |offset: f64, ankle: f64| {
+            let joint = |z| Some(DetectedJoint { position: Vec3::new(2.0, 0.0, z), sigma: 0.05, visible: 1.0 });
+            let floor = Some(Ground { normal: Vec3::Z, offset });
+            let detection =
+                Detection { joints: [ankle, ankle, 1.0].map(joint).to_vec(), floor, ..Detection::default() };
+            floor_under(Detected { detection: &detection, map: &map }).is_some()
         };
-        assert!(floor_at(0.0, 0.08) && floor_at(-0.3, -0.25));
-        assert!(!floor_at(0.7, 0.08) && !floor_at(0.0, 0.6));
+        assert!(is_kept(0.0, 0.08) && is_kept(-0.3, -0.25));
+        assert!(!is_kept(0.7, 0.08) && !is_kept(0.0, 0.6));
     }
 }

@@ -2,19 +2,19 @@
 
 pub mod girth;
 mod outline;
-mod told;
+mod reported;
 mod unlike;
 
 use crate::association::contour::edges;
 use crate::body::{Body, Model, Pair};
 use crate::config::Config;
-use crate::detect::Detection;
+use crate::detect::{Detected, JointMap};
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::solver::LENGTH_INFORMATION;
 use girth::{GIRTH_STEPS, Girth, GirthFit, TIP_FACTORS, girth_step};
 use outline::Outlines;
-use told::Told;
+use reported::ReportedLengths;
 use unlike::{START_GATE, equalise_limb_lengths};
 
 /// A limb becomes longer or shorter by at most this share in one frame.
@@ -50,8 +50,8 @@ pub struct Sizes {
     stretched: Vec<f64>,
     change: Vec<f64>,
     pull: Vec<f64>,
-    /// What detections said of the lengths of a body that was found.
-    told: Told,
+    /// What detections reported of the lengths of a body that was found.
+    reported: ReportedLengths,
 }
 
 impl Sizes {
@@ -63,22 +63,22 @@ impl Sizes {
         self.girths.clear();
         self.outlines.clear();
         self.pairs.clear();
-        self.told.clear();
+        self.reported.clear();
         if fit && config.fit_lengths {
             self.follow_lengths(model);
         }
     }
 
-    /// Takes in what a detector says of the sizes of a body that it found: the lengths are drawn to the mean of all it said.
-    pub fn hear(&mut self, detection: &Detection) {
+    /// Takes in what a detector reports of the sizes of a body that it found: the lengths are drawn to the mean of all reports.
+    pub fn update(&mut self, detected: Detected) {
         if self.found() {
-            self.told.hear(&detection.lengths);
+            self.reported.update(detected);
         }
     }
 
-    /// Whether what a detector said of a body that it found does not tell its sizes yet.
+    /// Whether what a detector reported of a body that it found does not fix its sizes yet.
     pub fn unsure(&self) -> bool {
-        self.told.unsure()
+        self.reported.is_uncertain()
     }
 
     /// The sizes are to be fitted, but the pose has to be first.
@@ -112,7 +112,8 @@ impl Sizes {
     }
 
     /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
-    pub fn edited(&mut self, model: &Model) {
+    pub fn edited(&mut self, model: &Model, map: &JointMap) {
+        self.reported.bind(map);
         self.girths.clear();
         self.outlines.clear();
         self.set = self.set.is_some().then(|| model.body.clone());
@@ -211,11 +212,11 @@ impl Sizes {
         predicted: &[Pose],
         fit: &mut Fit,
     ) {
-        let Self { pairs, stretched, change, pull, told, .. } = self;
+        let Self { pairs, stretched, change, pull, reported, .. } = self;
         change.clear();
         pull.clear();
         for (pair, stretched) in pairs.iter().zip(stretched.iter()) {
-            let (factor, information) = told.of(&model.body, pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
+            let (factor, information) = reported.of(pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
             change.push(factor - stretched);
             pull.push(information);
         }

@@ -62,6 +62,7 @@ impl Tracker {
         // The motion starts anew: the poses before belong to another body.
         motion.forget();
         hypotheses.restart(model);
+        relocalizer.bind(&model.body);
         if motion.poses.is_empty() {
             return;
         }
@@ -73,7 +74,7 @@ impl Tracker {
             }
         }
         fit.clear();
-        sizes.edited(model);
+        sizes.edited(model, relocalizer.map());
         relocalizer.restart(model, &motion.poses);
         assessor.edited(estimate.status);
         self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);

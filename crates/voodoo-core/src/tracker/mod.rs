@@ -3,12 +3,13 @@
 mod assess;
 mod edits;
 pub mod estimate;
+mod expected;
 mod queries;
 mod report;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::Detection;
+use crate::detect::{Detect, DetectError, Detected};
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
@@ -22,6 +23,9 @@ use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::Found;
 use assess::Assessor;
 use estimate::{Estimate, Status};
+use expected::Before;
+
+pub use expected::LimbMotion;
 
 /// Follows one body through frames.
 #[derive(Debug)]
@@ -36,6 +40,7 @@ pub struct Tracker {
     sizes: Sizes,
     assessor: Assessor,
     estimate: Estimate,
+    before: Before,
 }
 
 impl Tracker {
@@ -51,8 +56,31 @@ impl Tracker {
             sizes: Sizes::default(),
             assessor: Assessor::default(),
             estimate: Estimate::default(),
+            before: Before::default(),
             config,
         })
+    }
+
+    /// The same tracker with a detector: it finds the body without a pose, finds it again when it is lost, and notices when it is
+    /// elsewhere than it is tracked. Without one, a lost body is looked for in everything of its size that is no background.
+    pub fn with_detector(mut self, detector: Box<dyn Detect>) -> Self {
+        self.set_detector(Some(detector));
+        self
+    }
+
+    /// Takes another detector, or none.
+    pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>) {
+        self.relocalizer.set_detector(detector, &self.model.body);
+    }
+
+    /// Whether it looks for the body while it has no pose: it has a detector that knows the body.
+    pub fn can_search(&self) -> bool {
+        self.relocalizer.finds()
+    }
+
+    /// Why the detector could not look in the last step, if it could not. The step went on without detections.
+    pub fn detector_error(&self) -> Option<&DetectError> {
+        self.relocalizer.error()
     }
 
     /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position);
@@ -94,6 +122,8 @@ impl Tracker {
     /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
+        self.before.keep(&self.estimate);
+        self.relocalizer.clear_error();
         // Where nobody tells the floor, it is where a detector saw it when it found the body.
         let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
         if self.is_started() {
@@ -112,12 +142,12 @@ impl Tracker {
         if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
             return;
         }
-        relocalizer.look(frame, motion.poses[0].translation, false, false, false);
+        relocalizer.look(&model.body, frame, motion.poses[0].translation, false, false, false);
         if relocalizer.weigh(&model.body, &motion.poses, false, false, false) == Some(Seen::Elsewhere) {
             observer.face(frame);
             let seen = observer.seen(frame, motion.origin);
             let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-            let better = relocalizer.detected(setting.of(model), fit, &motion.poses, false).is_some();
+            let better = relocalizer.try_detected(setting.of(model), fit, &motion.poses, false).is_some();
             if better {
                 self.restart_at_detection();
                 return;
@@ -136,15 +166,15 @@ impl Tracker {
         self.relocalizer.take_note_of_start(itself);
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.hear_sizes();
+            self.update_sizes();
         }
         true
     }
 
-    /// Takes in what the detector that looked at this frame says of the sizes.
-    fn hear_sizes(&mut self) {
-        if let Some(seen) = self.relocalizer.detection() {
-            self.sizes.hear(seen);
+    /// Takes in what the detector that looked at this frame reports of the sizes.
+    fn update_sizes(&mut self) {
+        if let Some(detected) = self.relocalizer.detected() {
+            self.sizes.update(detected);
         }
     }
 
@@ -155,7 +185,7 @@ impl Tracker {
             self.assessor.doubt_pose();
             self.relocalizer.take_note_of_start(true);
             self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.hear_sizes();
+            self.update_sizes();
             self.follow(frame, None);
             if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
                 return;
@@ -165,11 +195,12 @@ impl Tracker {
     }
 
     /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
-    pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detection: &Detection, known: bool) -> bool {
+    pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detected: Detected, known: bool) -> bool {
         // Colours tell persons apart; they are none's alone.
         let frame = &Frame { colors: &[], ..*frame };
-        let Some((body, poses)) = self.relocalizer.placed(&self.model, detection, known) else { return false };
+        let Some((body, poses)) = self.relocalizer.placed(&self.model, detected, known) else { return false };
         self.restart(body, poses, !known);
+        self.before.keep(&self.estimate);
         self.assessor.doubt_pose();
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
@@ -217,20 +248,20 @@ impl Tracker {
             let lost = assessor.status() == Status::Lost;
             let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts() || sizes.unsure());
             match share {
-                None => relocalizer.look(frame, root, doubtful, assessor.is_unsure(), lost),
-                Some(share) => relocalizer.look_at_share(frame, share, root, lost),
+                None => relocalizer.look(&model.body, frame, root, doubtful, assessor.is_unsure(), lost),
+                Some(share) => relocalizer.look_at_share(&model.body, frame, share, root, lost),
             }
         }
         if config.hypotheses && schedule.whole_body && known {
             let detected = relocalizer.shown(&model.body).unwrap_or_default();
-            steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detection(), &detected);
+            steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detected(), &detected);
         }
         // Sizes that follow what this frame shows.
         let lost = assessor.status() == Status::Lost;
         let reliance = Reliance { lost, girths: schedule.whole_body, limb: |limb| assessor.relied_on(limb) };
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // What all that is worth.
-        assessor.assess(setting.of(model), fit.matched(poses), relocalizer.detection());
+        assessor.assess(setting.of(model), fit.matched(poses), relocalizer.detected());
         fit.learn_regions(setting.of(model));
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
@@ -247,7 +278,9 @@ impl Tracker {
 
     /// The pose at the next instant by its share of a frame, which was checked.
     pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
+        self.relocalizer.clear_error();
         if self.is_started() {
+            self.before.keep(&self.estimate);
             self.follow(&Frame { colors: &[], ..*frame }, Some(share));
         }
         &self.estimate
@@ -255,7 +288,7 @@ impl Tracker {
 
     /// Refuses what cannot be used, before anything changes.
     fn check(&self, frame: &Frame) -> Result<(), TrackError> {
-        if !self.is_started() && !self.relocalizer.finds(&self.model.body) {
+        if !self.is_started() && !self.can_search() {
             return Err(TrackError::NotInitialised);
         }
         frame.check(&self.model.body, self.motion.stamp)?;
@@ -271,7 +304,7 @@ impl Tracker {
             let views = self.observer.seen(frame, self.motion.origin).views;
             self.relocalizer.look_out(views, joints, self.assessor.status() == Status::Tracking, lost);
         }
-        if known && self.relocalizer.detection().is_some() {
+        if known && self.relocalizer.detected().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             let young = self.relocalizer.young(frame.stamp);
             match self.relocalizer.weigh(&self.model.body, &world_from_limb, lost, young, among) {
@@ -279,7 +312,7 @@ impl Tracker {
                     // What was learnt of sizes and scene was learnt in the wrong place.
                     return !among && young && self.restart_at_detection();
                 }
-                Some(Seen::There) if !among => self.hear_sizes(),
+                Some(Seen::There) if !among => self.update_sizes(),
                 _ => {}
             }
         }
@@ -308,7 +341,7 @@ impl Tracker {
         let seen = observer.seen(frame, motion.origin);
         let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
         let lost = assessor.status() == Status::Lost;
-        let place = relocalizer.detected(setting.of(model), fit, &motion.poses, lost);
+        let place = relocalizer.try_detected(setting.of(model), fit, &motion.poses, lost);
         let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
         let moved = better && self.move_to_predicted(frame);
         if !moved {

@@ -5,9 +5,10 @@
 
 use crate::association::correspondence::Correspondences;
 use crate::body::Limb;
-use crate::math::{Pose, Vec3};
+use crate::math::Pose;
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
+use crate::observation::depth_view::DepthViews;
+use crate::visibility::surface::{Sight, surface_rows};
 use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 
 /// A point this far from the model's surface is not explained by it, metres; and a camera sees past the surface where the background
@@ -15,17 +16,6 @@ use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 pub const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
 const OCCLUDED_COST: f64 = 0.3;
-
-/// What a camera says about a place on the model's surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sight {
-    /// Behind what is seen.
-    Occluded,
-    /// Seen where it is.
-    Consistent,
-    /// The camera sees past it.
-    FreeSpaceViolation,
-}
 
 /// Patches of a limb that face a camera inside its image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,22 +65,23 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
     let mut found = Visibility::default();
     for view in views.iter() {
         let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-        for t in ALONG_LIMB {
-            let section = shape.section(t);
-            let Some(facing) = section.facing(&camera_from_limb) else { continue };
+        for row in surface_rows(shape, &camera_from_limb) {
+            let section = row.facing.section;
             let (a, b) = (section.a, section.b);
             // A limb seen aslant covers so much less of the image, as the points seen on it do.
-            let aslant = facing.across.length() / (camera_from_limb * section.centre()).length();
-            for s in across {
-                let point = camera_from_limb * facing.point(s);
-                let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
-                    / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
-                let Some(sight) = sight(&view, point) else { continue };
+            let aslant = row.facing.across.length() / (camera_from_limb * section.centre()).length();
+            let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
+                / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
+            for place in row.places(&view, across) {
+                let sight = place.sight();
+                if sight == Sight::Unknown {
+                    continue;
+                }
                 for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
                     match sight {
-                        Sight::FreeSpaceViolation => counts.free_space += patches,
+                        Sight::FreeSpace => counts.free_space += patches,
                         Sight::Occluded => counts.occluded += patches,
-                        Sight::Consistent => {}
+                        Sight::Consistent | Sight::Unknown => {}
                     }
                     counts.front_facing += patches;
                 }
@@ -98,26 +89,6 @@ pub fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose)
         }
     }
     found
-}
-
-fn sight(view: &DepthView, point: Vec3) -> Option<Sight> {
-    Some(match view.at(point) {
-        Pixel::Unknown => return None,
-        pixel if sees_past(pixel, point.z) => Sight::FreeSpaceViolation,
-        Pixel::Background(z) | Pixel::Foreground(z) | Pixel::Other(z) if z > point.z - 2.0 * EXPLAINED => {
-            Sight::Consistent
-        }
-        _ => Sight::Occluded,
-    })
-}
-
-/// Whether a pixel shows what lies behind a surface at this depth, metres.
-pub(super) fn sees_past(pixel: Pixel, surface: f64) -> bool {
-    match pixel {
-        Pixel::Background(z) => z > surface + EXPLAINED,
-        Pixel::Foreground(z) | Pixel::Other(z) => z > surface + 2.0 * EXPLAINED,
-        Pixel::Unknown => false,
-    }
 }
 
 /// Cost of the points that the pose leaves unexplained: `w min(d^2 / c^2, 1)` of every candidate.
@@ -137,9 +108,10 @@ mod tests {
     use super::*;
     use crate::association::correspondence::LimbMatches;
     use crate::body::{Body, HumanModel};
-    use crate::math::Quat;
+    use crate::math::{Quat, Vec3};
     use crate::observation::background::Backgrounds;
     use crate::observation::frame::{DepthImage, DepthPixels, Frame};
+    use crate::testing::pinhole;
     use crate::visibility::render::{Rendering, Viewpoint};
 
     const WIDTH: usize = 160;
@@ -148,8 +120,8 @@ mod tests {
 
     /// What a camera at the origin sees of a body, and `behind` where it sees none of it, millimetres.
     fn shoot(body: &Body, poses: &[Pose], behind: u16) -> Vec<u16> {
-        let world_from_sensor = Pose::identity();
-        let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
+        let world_from_sensor = Pose::IDENTITY;
+        let view = Viewpoint { camera: pinhole(WIDTH, HEIGHT, INTRINSICS), world_from_sensor };
         let mut image = Rendering::default();
         image.render(body, poses, &view, None).unwrap();
         let millimetres = |depth: &f32| if *depth > 0.0 { (depth * 1000.0).round() as u16 } else { behind };
@@ -160,12 +132,9 @@ mod tests {
     fn seen(pixels: &[u16], body: &Body, poses: &[Pose]) -> Visibility {
         let images = [DepthImage {
             pixels: DepthPixels::U16(pixels),
-            width: WIDTH,
-            height: HEIGHT,
+            camera: pinhole(WIDTH, HEIGHT, INTRINSICS),
             metres_per_unit: 0.001,
-            intrinsics: INTRINSICS,
-            rays: None,
-            world_from_sensor: Pose::identity(),
+            world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,
         }];
@@ -235,12 +204,9 @@ mod tests {
         let pixels = vec![4000_u16; 160 * 120];
         let images = [DepthImage {
             pixels: DepthPixels::U16(&pixels),
-            width: 160,
-            height: 120,
+            camera: pinhole(WIDTH, HEIGHT, INTRINSICS),
             metres_per_unit: 0.001,
-            intrinsics: [140.0, 140.0, 79.5, 59.5],
-            rays: None,
-            world_from_sensor: Pose::identity(),
+            world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,
         }];

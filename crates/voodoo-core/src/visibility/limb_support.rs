@@ -8,10 +8,11 @@
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::math::Pose;
-use crate::observation::depth_view::{DepthView, DepthViews, Pixel};
+use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::shape::TaperedEllipticCylinder;
-use crate::visibility::evidence::{EXPLAINED, sees_past};
+use crate::visibility::evidence::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
+use crate::visibility::surface::{Sight, surface_rows};
 use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};
 
 /// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
@@ -79,16 +80,15 @@ fn support_seen_by(
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
     let outer_sections = ALONG_LIMB.iter().filter(|t| **t > 0.5).count();
-    for t in ALONG_LIMB {
-        let Some(facing) = shape.section(t).facing(&camera_from_limb) else { continue };
+    for row in surface_rows(shape, &camera_from_limb) {
+        let t = row.t;
         // The weights of all places add up to one, in the whole and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);
         let outer = if t > 0.5 { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
         let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
-        for s in ACROSS_LIMB {
-            let point = camera_from_limb * facing.point(s);
-            let pixel = view.at(point);
-            if pixel == Pixel::Unknown {
+        for place in row.places(view, ACROSS_LIMB) {
+            let (sight, point) = (place.sight(), place.point);
+            if sight == Sight::Unknown {
                 continue;
             }
             support.known = true;
@@ -97,15 +97,13 @@ fn support_seen_by(
             if others().any(|(_, other)| depth(other) < point.z - OVERLAP) {
                 continue;
             }
-            match pixel {
-                _ if sees_past(pixel, point.z) => count(&mut support.free_space),
-                Pixel::Foreground(z) if (z - point.z).abs() < EXPLAINED => {
-                    let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
-                    if !strangers.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {
-                        count(&mut support.own);
-                    }
+            if sight == Sight::FreeSpace {
+                count(&mut support.free_space);
+            } else if let Some(z) = place.seen_within(EXPLAINED) {
+                let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
+                if !strangers.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {
+                    count(&mut support.own);
                 }
-                _ => {}
             }
         }
     }

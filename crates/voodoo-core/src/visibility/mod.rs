@@ -1,12 +1,13 @@
 //! What cameras should see of a posed body, and what they do see of it.
 //!
 //! `render` predicts a depth image, `evidence` says how well a pose explains the frame, `limb_support` what only one arm or leg
-//! explains, and `roundness` whether what is seen is round as limbs are.
+//! explains, and `roundness` whether what is seen is round as limbs are; all of them look at the places of `surface`.
 
 pub mod evidence;
 pub mod limb_support;
 pub mod render;
 pub mod roundness;
+pub(crate) mod surface;
 
 /// At so many places along and across a limb its surface is compared with images.
 const SECTIONS: usize = 5;

@@ -9,14 +9,13 @@
 use rayon::prelude::*;
 
 use crate::body::Body;
+use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{LANES, Pose, Vec3, is_rigid, widest};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Mark of a pixel that shows no limb.
 pub const NO_LIMB: u16 = u16::MAX;
-/// Most pixels of a predicted image: those of an 8K picture. More would be a mistyped size, and memory by the gigabyte.
-pub const MOST_RENDERED: usize = 1 << 25;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
 const ROWS_TOGETHER: usize = LANES;
 /// The precision of predicted depths, of one metre. Bounds in the image are widened by as much, in units of `x / z`, against rounding,
@@ -31,35 +30,17 @@ const GRAZING: f64 = 0.02;
 /// Where a depth camera stands and how its pixels look out.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewpoint<'a> {
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Focal lengths and principal point `(fx, fy, cx, cy)`, pixels; integer coordinates are pixel centres.
-    pub intrinsics: [f64; 4],
-    /// For a lens with distortion: undistorted `(x/z, y/z)` of every pixel; NaN sees nothing.
-    pub rays: Option<&'a [[f32; 2]]>,
+    /// Its calibration; a pixel to which the lens puts nothing sees nothing.
+    pub camera: &'a Camera,
     /// Pose of the camera's optical frame (x right, y down, z forward).
     pub world_from_sensor: Pose,
 }
 
 impl Viewpoint<'_> {
     fn check(&self) -> Result<(), TrackError> {
-        let wrong = |what: &str, expected, found: String| Err(TrackError::measurement(what, expected, found));
-        let [fx, fy, cx, cy] = self.intrinsics;
-        if !(fx > 0.0 && fy > 0.0 && [fx, fy, cx, cy].iter().all(|value| value.is_finite())) {
-            return wrong("camera", "positive focal lengths and a finite centre", format!("{:?}", self.intrinsics));
-        }
-        let count = self.width.checked_mul(self.height).filter(|count| (1..=MOST_RENDERED).contains(count));
-        let Some(count) = count else {
-            return wrong("camera", "1 to 33554432 pixels", format!("{}x{}", self.width, self.height));
-        };
-        if self.rays.is_some_and(|rays| rays.len() != count) {
-            return wrong("rays", "one ray a pixel", format!("{:?} for {count} pixels", self.rays.map(<[_]>::len)));
-        }
         let pose = &self.world_from_sensor;
         if !is_rigid(pose) {
-            return wrong("world_from_sensor", "a rigid transform", format!("{pose:?}"));
+            return Err(TrackError::measurement("world_from_sensor", "a rigid transform", format!("{pose:?}")));
         }
         Ok(())
     }
@@ -68,19 +49,11 @@ impl Viewpoint<'_> {
     #[inline(always)]
     fn lanes(&self, row: usize, start: usize) -> ([f64; LANES], [f64; LANES]) {
         let (mut x, mut y) = ([f64::NAN; LANES], [f64::NAN; LANES]);
-        let count = LANES.min(self.width - start);
-        if let Some(rays) = self.rays {
-            let first = row * self.width + start;
-            for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(&rays[first..first + count]) {
-                (*x, *y) = (f64::from(ray[0]), f64::from(ray[1]));
-            }
-            return (x, y);
+        let count = LANES.min(self.camera.width() - start);
+        for (lane, (x, y)) in x.iter_mut().zip(&mut y).enumerate().take(count) {
+            [*x, *y] = self.camera.pixel_ray(start + lane, row);
         }
-        let [fx, fy, cx, cy] = self.intrinsics;
-        for (lane, x) in x[..count].iter_mut().enumerate() {
-            *x = ((start + lane) as f64 - cx) / fx;
-        }
-        (x, [(row as f64 - cy) / fy; LANES])
+        (x, y)
     }
 }
 
@@ -130,11 +103,11 @@ impl Rendering {
             return Err(TrackError::measurement("world_from_limb", "one rigid pose a limb", found));
         }
         let Self { width, depth, limb, raycasters } = self;
-        *width = view.width;
+        *width = view.camera.width();
         depth.clear();
-        depth.resize(view.width * view.height, 0.0);
+        depth.resize(view.camera.pixels(), 0.0);
         limb.clear();
-        limb.resize(view.width * view.height, NO_LIMB);
+        limb.resize(view.camera.pixels(), NO_LIMB);
         raycasters.clear();
         raycasters.extend(
             limbs
@@ -143,7 +116,7 @@ impl Rendering {
                 .map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.world_from_sensor))),
         );
         let raycasters = &*raycasters;
-        let size = view.width * ROWS_TOGETHER;
+        let size = view.camera.width() * ROWS_TOGETHER;
         let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
             widest(
                 #[inline(always)]
@@ -238,11 +211,10 @@ impl LimbRaycaster {
         hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
     }
 
-    /// Columns of a row of a camera without distortion that the limb can cover.
-    fn span(&self, view: &Viewpoint, row: usize) -> (usize, usize) {
-        let [fx, fy, cx, cy] = view.intrinsics;
-        let Some(corners) = &self.corners else { return (0, view.width) };
-        let y = (row as f64 - cy) / fy;
+    /// Columns of a row that the limb can cover; all where straight lines may be seen bent.
+    fn span(&self, camera: &Camera, row: usize) -> (usize, usize) {
+        let Some(corners) = self.corners.as_ref().filter(|_| !camera.distorts()) else { return (0, camera.width()) };
+        let [_, y] = camera.pixel_ray(0, row);
         if y < self.low[1] || y > self.high[1] {
             return (0, 0);
         }
@@ -266,18 +238,19 @@ impl LimbRaycaster {
                 }
             }
         }
-        let column = |x: f64| (fx * x + cx).clamp(-1.0, view.width as f64);
+        let column = |x: f64| camera.pixel([x, y]).map_or(0.0, |pixel| pixel[0]).clamp(-1.0, camera.width() as f64);
         let start = column(first - 2.0 * PRECISION).ceil().max(0.0) as usize;
-        let end = (column(last + 2.0 * PRECISION).floor() + 1.0).clamp(0.0, view.width as f64) as usize;
+        let end = (column(last + 2.0 * PRECISION).floor() + 1.0).clamp(0.0, camera.width() as f64) as usize;
         (start, end.max(start))
     }
 
     /// Draws nearer what the limb hides in a band of rows that starts at row `top`.
     #[inline(always)]
     fn fill(&self, view: &Viewpoint, top: usize, index: u16, depth: &mut [f32], limb: &mut [u16]) {
-        for (offset, (depth, limb)) in depth.chunks_mut(view.width).zip(limb.chunks_mut(view.width)).enumerate() {
+        let width = view.camera.width();
+        for (offset, (depth, limb)) in depth.chunks_mut(width).zip(limb.chunks_mut(width)).enumerate() {
             let row = top + offset;
-            let (first, end) = if view.rays.is_some() { (0, view.width) } else { self.span(view, row) };
+            let (first, end) = self.span(view.camera, row);
             for start in (first..end).step_by(LANES) {
                 let (x, y) = view.lanes(row, start);
                 let mut near = false;

@@ -5,9 +5,10 @@
 
 use crate::body::Body;
 use crate::math::Pose;
-use crate::observation::depth_view::{DepthViews, Pixel};
+use crate::observation::depth_view::DepthViews;
+use crate::visibility::ACROSS_LIMB;
 use crate::visibility::evidence::EXPLAINED;
-use crate::visibility::{ACROSS_LIMB, ALONG_LIMB};
+use crate::visibility::surface::surface_rows;
 
 /// By how much the seen surface falls away from the cameras between the middle of limbs and their rims, in units of what the
 /// model's does: about one on a body, zero on a plane; `None` when the images show too little of it.
@@ -20,18 +21,12 @@ pub fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> 
         let camera_from_working = view.working_from_camera.inverse();
         for (limb, pose) in body.limbs().iter().zip(poses) {
             let camera_from_limb = camera_from_working * *pose;
-            for t in ALONG_LIMB {
-                let Some(facing) = limb.shape.section(t).facing(&camera_from_limb) else { continue };
-                let depths = |across: f64| {
-                    let point = camera_from_limb * facing.point(across);
-                    match view.at(point) {
-                        Pixel::Foreground(z) if (z - point.z).abs() < 2.0 * EXPLAINED => Some([point.z, z]),
-                        _ => None,
-                    }
-                };
-                if let (Some(middle), Some(left), Some(right)) =
-                    (depths(0.0), depths(ACROSS_LIMB[0]), depths(ACROSS_LIMB[4]))
-                {
+            for row in surface_rows(&limb.shape, &camera_from_limb) {
+                let depths = row.places(&view, [0.0, ACROSS_LIMB[0], ACROSS_LIMB[4]]).map(|place| {
+                    let z = place.seen_within(2.0 * EXPLAINED)?;
+                    Some([place.point.z, z])
+                });
+                if let [Some(middle), Some(left), Some(right)] = depths {
                     let [expected, seen] = [0, 1].map(|kind| 0.5 * (left[kind] + right[kind]) - middle[kind]);
                     product += expected * seen;
                     square += expected * expected;

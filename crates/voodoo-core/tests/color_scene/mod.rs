@@ -2,16 +2,19 @@
 //! own, the room is patterned, and pixels are noisy.
 #![allow(dead_code, missing_docs, clippy::unwrap_used, reason = "shared by tests, none of which uses all of it")]
 
-use voodoo_core::Body;
+use std::sync::LazyLock;
+
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{DepthImage, DepthPixels};
 use voodoo_core::observation::picture::{ColorImage, ColorPixels};
 use voodoo_core::visibility::render::{NO_LIMB, Rendering, Viewpoint};
+use voodoo_core::{Body, Camera};
 
 pub const CAMERAS: usize = 4;
 pub const WIDTH: usize = 240;
-const HEIGHT: usize = 200;
-const INTRINSICS: [f64; 4] = [200.0, 200.0, 119.5, 99.5];
+pub const HEIGHT: usize = 200;
+static CAMERA: LazyLock<Camera> =
+    LazyLock::new(|| Camera::pinhole(WIDTH, HEIGHT, [200.0, 200.0, 119.5, 99.5]).unwrap());
 
 /// Where a camera stands: 3 m from the body, 1.2 m high.
 pub fn world_from_camera(camera: usize) -> Pose {
@@ -30,7 +33,7 @@ pub fn standing(body: &Body) -> Vec<Pose> {
 
 fn rendered(body: Option<(&Body, &[Pose])>, camera: usize) -> Rendering {
     let world_from_sensor = world_from_camera(camera);
-    let view = Viewpoint { width: WIDTH, height: HEIGHT, intrinsics: INTRINSICS, rays: None, world_from_sensor };
+    let view = Viewpoint { camera: &CAMERA, world_from_sensor };
     let mut rendering = Rendering::default();
     if let Some((body, poses)) = body {
         rendering.render(body, poses, &view, None).unwrap();
@@ -46,11 +49,8 @@ pub fn depth_of(body: &Body, poses: &[Pose], camera: usize) -> Vec<f32> {
 pub fn depth_picture(depth: &[f32], camera: usize) -> DepthImage<'_> {
     DepthImage {
         pixels: DepthPixels::F32(depth),
-        width: WIDTH,
-        height: HEIGHT,
+        camera: &CAMERA,
         metres_per_unit: 1.0,
-        intrinsics: INTRINSICS,
-        rays: None,
         world_from_sensor: world_from_camera(camera),
         weight: 1.0,
         source: CAMERAS as u16,
@@ -92,12 +92,10 @@ pub fn shoot(body: Option<(&Body, &[Pose])>, camera: usize) -> Vec<[u8; 3]> {
 pub fn picture(pixels: &[[u8; 3]], camera: usize, stamp: f64) -> ColorImage<'_> {
     ColorImage {
         pixels: ColorPixels::Color(pixels),
-        width: WIDTH,
-        height: HEIGHT,
-        intrinsics: INTRINSICS,
+        camera: &CAMERA,
         world_from_sensor: world_from_camera(camera),
         stamp,
-        camera: camera as u16,
+        number: camera as u16,
         source: camera as u16,
     }
 }

@@ -8,6 +8,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use voodoo_core::camera::Camera;
 use voodoo_core::config::RawValue;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
@@ -95,11 +96,16 @@ pub fn with_cloud<'a>(stamp: f64, clouds: &'a [Cloud<'a>]) -> Frame<'a> {
 pub fn cloud(points: &[[f64; 3]]) -> Cloud<'_> {
     Cloud {
         points: PointSlice::F64(points),
-        world_from_sensor: Pose::identity(),
+        world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         scope: Scope::Free,
         source: 0,
     }
+}
+
+/// A camera that lives as long as the tests.
+pub fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> &'static Camera {
+    Box::leak(Box::new(Camera::pinhole(width, height, intrinsics).unwrap()))
 }
 
 /// A depth camera 1 m above the floor that looks along the world's x axis.
@@ -115,20 +121,15 @@ impl DepthCamera {
         Pose::from_parts(Vec3::Z, rotation)
     }
 
-    fn intrinsics(&self) -> [f64; 4] {
-        [self.focal, self.focal, (self.width as f64 - 1.0) / 2.0, (self.height as f64 - 1.0) / 2.0]
+    fn camera(&self) -> &'static Camera {
+        let center = [self.width, self.height].map(|size| (size as f64 - 1.0) / 2.0);
+        pinhole(self.width, self.height, [self.focal, self.focal, center[0], center[1]])
     }
 
     /// Millimetres along the optical axis to the body before a wall at 3.6 m, with noise of `sigma` metres; returns the
     /// number of pixels on the body, too.
     pub fn shoot(&self, body: &Body, poses: &[Pose], sigma: f64, noise: &mut Noise) -> (Vec<u16>, usize) {
-        let view = Viewpoint {
-            width: self.width,
-            height: self.height,
-            intrinsics: self.intrinsics(),
-            rays: None,
-            world_from_sensor: Self::world_from_sensor(),
-        };
+        let view = Viewpoint { camera: self.camera(), world_from_sensor: Self::world_from_sensor() };
         let mut image = Rendering::default();
         image.render(body, poses, &view, None).unwrap();
         let seen = image.limb().iter().filter(|limb| **limb != NO_LIMB).count();
@@ -143,11 +144,8 @@ impl DepthCamera {
     pub fn image<'a>(&self, pixels: &'a [u16]) -> DepthImage<'a> {
         DepthImage {
             pixels: DepthPixels::U16(pixels),
-            width: self.width,
-            height: self.height,
+            camera: self.camera(),
             metres_per_unit: 0.001,
-            intrinsics: self.intrinsics(),
-            rays: None,
             world_from_sensor: Self::world_from_sensor(),
             weight: 1.0,
             source: 0,

@@ -4,8 +4,8 @@
 //! it moves on continuously, even when the body model has fallen behind, and the model names regions where they appear. A name
 //! changes hands only when another region agrees with the model better for some time.
 
-use crate::skin::assignment::{Costs, assign};
-use voodoo_core::math::Vec3;
+use crate::skin::assignment::assign;
+use voodoo_core::math::{CostTable, Vec3};
 
 /// A region is at most this far from where its motion would have it, from one picture to the next, metres.
 const BLOB_JUMP: f64 = 0.12;
@@ -124,12 +124,8 @@ impl Blobs {
 
     /// Takes up the sights of a picture, each of which is then the blob of its number; those that were not seen for long are dropped.
     pub fn follow(&mut self, sights: &[Sight], stamp: f64) {
-        let mut cost = Costs::filled(self.items.len(), sights.len(), 0.0);
-        for (row, blob) in self.items.iter().enumerate() {
-            for (column, sight) in sights.iter().enumerate() {
-                cost.set(row, column, blob.apart(sight, stamp));
-            }
-        }
+        let apart = |row: usize, column: usize| self.items[row].apart(&sights[column], stamp);
+        let cost = CostTable::from_fn(self.items.len(), sights.len(), apart);
         let pairs = assign(&cost, 1.0, None);
         let near = |&(row, column): &(usize, usize)| cost.at(row, column) < AS_EXPECTED;
         let kept: Vec<i32> = pairs

@@ -103,4 +103,21 @@ mod tests {
         let [row, column] = [45 - labels.first[0], 50 - labels.first[1]];
         assert_eq!(labels.values[row * labels.size[1] + column], found[1].region);
     }
+
+    #[test]
+    fn a_region_is_a_hand_by_its_length_however_it_lies() {
+        let (width, palm) = (320, 10.0);
+        for angle in [0.0_f64, 45.0, 90.0].map(f64::to_radians) {
+            for (length, hand) in [(3.6, true), (5.4, false)] {
+                let along = |index: usize| {
+                    let (u, v) = ((index % width) as f64 - 160.0, (index / width) as f64 - 120.0);
+                    let (sine, cosine) = angle.sin_cos();
+                    u8::from((u * cosine + v * sine).abs() <= 5.0 * length && (v * cosine - u * sine).abs() <= 8.0)
+                };
+                let mask: Vec<u8> = (0..width * 240).map(along).collect();
+                let (found, _) = candidates(&mask, width, palm);
+                assert_eq!((found[0].hand, found.len() > 1), (hand, !hand), "{angle} {length}");
+            }
+        }
+    }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::body_view::BodyView;
 use crate::chroma::find_bins;
+use crate::eye::Eye;
 use crate::mask_regions::SkinPicture;
 use crate::registration::Labels;
 use crate::skin::blobs::{Blobs, Sight};
@@ -13,8 +14,10 @@ use crate::skin::naming::{Choice, Rules};
 use crate::skin::picture::Picture;
 use crate::skin::rules::{Expected, LimbDistances, Seen, of_pieces};
 use crate::skin::teacher::Teacher;
+use voodoo_core::Tracker;
 use voodoo_core::error::TrackError;
 use voodoo_core::math::Vec3;
+use voodoo_core::observation::frame::PointSlice;
 
 /// Regions no longer than this, in radii of a palm, may be parts of one hand: a shadow between the fingers and the palm does not make
 /// two of it. Arms that lie near each other stay apart.
@@ -27,6 +30,8 @@ const FACE_BEHIND: f64 = 0.075;
 const HAND_BEHIND: f64 = 0.04;
 /// Depth is looked for within so many radii of a palm around a candidate.
 const LOOKED_AT: f64 = 1.5;
+/// Nearer to the camera no site is looked for, metres.
+const NEAREST_SITE: f64 = 0.1;
 
 /// How skin regions become rays.
 #[derive(Clone, Debug)]
@@ -60,25 +65,70 @@ impl SkinSettings {
     }
 }
 
-/// A picture, and where the sites are expected in it.
-#[derive(Clone, Copy, Debug)]
-pub struct Look<'a> {
+/// A picture, and what is known of the body at its time.
+#[derive(Clone, Copy)]
+pub struct SkinInput<'a> {
     /// Blue, green, red, row by row.
     pub image: &'a [[u8; 3]],
     /// Rows and columns.
     pub size: [usize; 2],
     /// Time, seconds.
     pub stamp: f64,
-    /// Focal length, pixels.
-    pub focal: f64,
-    /// What a depth camera saw of the body in it.
+    /// The camera.
+    pub eye: Eye<'a>,
+    /// What a depth camera saw of the body in the picture.
     pub body: Option<&'a Arc<BodyView>>,
     /// What was learnt.
     pub teacher: &'a Teacher,
-    /// Sites before the camera.
-    pub expected: &'a [Expected],
     /// Whether enough was learnt to tell skin.
     pub settled: bool,
+    /// The sites that are looked for.
+    pub expected: &'a [Expected],
+    /// The body that they belong to, in its last pose; none: not known.
+    pub tracker: Option<&'a Tracker>,
+    /// Other persons; what is nearer to them than to the body is theirs.
+    pub others: &'a [&'a Tracker],
+}
+
+impl SkinInput<'_> {
+    /// A site's depth along the optical axis, metres.
+    fn depth(&self, site: &Expected) -> f64 {
+        self.eye.in_sensor(site.place).z
+    }
+
+    /// The sites in front of the camera.
+    fn in_front(&self) -> Vec<Expected> {
+        let in_front = |site: &&Expected| {
+            let place = self.eye.in_sensor(site.place);
+            place.is_finite() && place.z > NEAREST_SITE
+        };
+        self.expected.iter().filter(in_front).copied().collect()
+    }
+
+    /// Unit vectors in the world through the candidates' pixels.
+    fn directions(&self, candidates: &[Candidate]) -> Vec<Vec3> {
+        candidates.iter().map(|item| self.eye.direction(self.eye.undistorted(item.pixel))).collect()
+    }
+
+    /// Distances of places from the surfaces of the body's limbs.
+    fn limb_distances(&self, places: &[[f64; 3]]) -> Result<LimbDistances, TrackError> {
+        let Some(tracker) = self.tracker else { return Ok(LimbDistances::default()) };
+        let names = tracker.body().limbs().iter().map(|limb| limb.name.clone()).collect();
+        Ok(LimbDistances { names, away: tracker.limb_distances(PointSlice::F64(places))?.concat() })
+    }
+
+    /// Distances of places from the nearest of the other persons; none without others.
+    fn others_distance(&self, places: &[[f64; 3]]) -> Result<Option<Vec<f32>>, TrackError> {
+        let mut nearest: Option<Vec<f32>> = None;
+        for other in self.others {
+            let away = other.distance(PointSlice::F64(places))?;
+            nearest = Some(match nearest {
+                Some(nearest) => nearest.iter().zip(&away).map(|(nearest, away)| nearest.min(*away)).collect(),
+                None => away,
+            });
+        }
+        Ok(nearest)
+    }
 }
 
 /// A site that was found in a picture.
@@ -96,20 +146,6 @@ pub struct FoundSite {
     pub depth: f64,
 }
 
-/// What was found in a picture, before names are given.
-#[derive(Clone, Debug, Default)]
-struct Looked {
-    candidates: Vec<Candidate>,
-    labels: Arc<Labels>,
-    expected: Vec<Expected>,
-    sights: Vec<Sight>,
-    /// Of the sights along the optical axis, metres.
-    depths: Vec<f64>,
-    origin: Vec3,
-    stamp: f64,
-    focal: f64,
-}
-
 /// The skin cue of one camera: what changes from picture to picture.
 #[derive(Clone, Debug)]
 pub struct SkinCue {
@@ -121,7 +157,8 @@ pub struct SkinCue {
     pub picture: Arc<Picture>,
     /// Pairs of a site's and a candidate's number.
     pub assigned: Vec<(usize, usize)>,
-    looked: Looked,
+    /// Where in the last picture a head or a hand may be.
+    pub candidates: Vec<Candidate>,
     spare: Option<Arc<Picture>>,
 }
 
@@ -133,14 +170,9 @@ impl SkinCue {
             settings,
             picture: Arc::default(),
             assigned: Vec::new(),
-            looked: Looked::default(),
+            candidates: Vec::new(),
             spare: None,
         }
-    }
-
-    /// Where in the last picture a head or a hand may be.
-    pub fn candidates(&self) -> &[Candidate] {
-        &self.looked.candidates
     }
 
     /// The same, without memory that it would reuse.
@@ -150,149 +182,130 @@ impl SkinCue {
         twin
     }
 
-    /// Looks for regions of skin; their candidates are then known.
+    /// Finds regions of skin in a picture, follows them, and tells which of them each site is and on which ray it was seen.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when sizes do not fit together.
-    pub fn look(&mut self, look: &Look) -> Result<(), TrackError> {
-        let palm = PALM * look.focal / nearest(look.expected);
+    /// [`TrackError`] when sizes do not fit together, or a tracker has no pose.
+    pub fn observe(&mut self, input: &SkinInput) -> Result<Vec<FoundSite>, TrackError> {
+        let expected = input.in_front();
+        let depths = expected.iter().map(|site| input.depth(site));
+        let nearest = Some(depths.fold(f64::INFINITY, f64::min)).filter(|nearest| nearest.is_finite()).unwrap_or(1.0);
+        // Of a palm at the nearest site.
+        let radius = PALM * input.eye.focal() / nearest;
+        self.assigned.clear();
+        self.find_skin(input, radius)?;
+        let labels = if input.settled && !expected.is_empty() {
+            let (found, labels) = candidates(&self.picture.skin, input.size[1], radius);
+            self.candidates = found;
+            labels
+        } else {
+            self.candidates.clear();
+            Labels::default()
+        };
+        if self.candidates.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (sights, depths) = self.sights(input, &labels, nearest)?;
+        self.blobs.follow(&sights, input.stamp);
+        let places: Vec<[f64; 3]> = sights.iter().map(|sight| sight.place.to_array()).collect();
+        let (limbs, others) = (input.limb_distances(&places)?, input.others_distance(&places)?);
+        let count = sights.len();
+        let specks: Vec<bool> = self
+            .candidates
+            .iter()
+            .zip(&depths)
+            .map(|(item, z)| (item.area as f64) < SPECK * PI * (PALM * input.eye.focal() / z).powi(2))
+            .collect();
+        let seen = Seen {
+            sights: &sights,
+            blobs: &self.blobs.items[..count],
+            specks: &specks,
+            limbs: &limbs,
+            unexplained: self.settings.unexplained as f32,
+        };
+        let theirs = |index: usize| {
+            let known = others.as_ref().filter(|_| !limbs.names.is_empty());
+            known.is_some_and(|others| sights[index].deep && others[index] < limbs.nearest(index))
+        };
+        let theirs: Vec<bool> = (0..count).map(theirs).collect();
+        let origin = input.eye.origin();
+        let mut choices: Vec<Choice> = expected.iter().map(|site| self.choice(site, &seen, &theirs, origin)).collect();
+        // Names are given below; what could be a piece of a hand is known before.
+        let pieces: Vec<Vec<bool>> = choices.iter().map(|choice| pieces(choice, &sights)).collect();
+        let rules =
+            Rules { gate: self.settings.gate, growth: self.settings.growth, ambiguity: self.settings.ambiguity };
+        let named = self.blobs.name(&mut choices, &rules, input.stamp);
+        let taken: Vec<usize> = named.iter().map(|(_, column)| *column).collect();
+        let free = |row: usize, column: &usize| pieces[row][*column] && !taken.contains(column);
+        self.assigned = named.iter().map(|(row, column)| (expected[*row].site, *column)).collect();
+        let found = |&(row, column): &(usize, usize)| {
+            let pieces = (0..count).filter(|column| free(row, column)).map(|piece| &sights[piece]);
+            found(&expected[row], &sights[column], pieces, input)
+        };
+        Ok(named.iter().map(found).collect())
+    }
+
+    /// Which pixels of a picture show skin, of a palm of so many pixels' radius.
+    fn find_skin(&mut self, input: &SkinInput, radius: f64) -> Result<(), TrackError> {
         // The last picture but one is needed no more.
         let mut picture = self.spare.take().and_then(|spare| Arc::try_unwrap(spare).ok()).unwrap_or_default();
-        find_bins(look.image, &mut picture.bins);
-        let body = look.body.filter(|body| body.size == look.size);
-        if look.body.is_some() && body.is_none() {
-            return Err(TrackError::measurement("body", "a view of the picture's size", format!("{:?}", look.size)));
+        find_bins(input.image, &mut picture.bins);
+        let body = input.body.filter(|body| body.size == input.size);
+        if input.body.is_some() && body.is_none() {
+            return Err(TrackError::measurement("body", "a view of the picture's size", format!("{:?}", input.size)));
         }
         let Picture { bins, seen, skin, .. } = &mut picture;
         let looked = SkinPicture {
             bins,
-            width: look.size[1],
-            table: &look.teacher.colors.table[..],
+            width: input.size[1],
+            table: &input.teacher.colors.table[..],
             body: body.map(|body| &body.mask[..]),
-            always: look.teacher.always(look.size),
+            always: input.teacher.always(input.size),
             before: body.and_then(|body| body.before.as_deref()),
         };
-        looked.find(LONGEST_JOINED * palm, seen, skin)?;
-        (self.looked.candidates, self.looked.labels) = if look.settled && !look.expected.is_empty() {
-            let (found, labels) = candidates(skin, look.size[1], palm);
-            (found, Arc::new(labels))
-        } else {
-            Default::default()
-        };
-        (picture.size, picture.body) = (look.size, body.cloned());
+        looked.find(LONGEST_JOINED * radius, seen, skin)?;
+        (picture.size, picture.body) = (input.size, body.cloned());
         self.spare = Some(std::mem::replace(&mut self.picture, Arc::new(picture)));
-        self.looked.expected = look.expected.to_vec();
-        self.assigned.clear();
-        (self.looked.stamp, self.looked.focal) = (look.stamp, look.focal);
         Ok(())
     }
 
-    /// Puts the candidates into space and follows them: as deep as the depth camera has them, else where the nearest site is.
-    ///
-    /// `directions` are unit vectors from the camera's `origin` through the candidates' pixels, `axis` its optical axis; world.
-    ///
-    /// # Errors
-    /// [`TrackError::Measurement`] when there are not as many directions as candidates.
-    pub fn place(&mut self, directions: &[Vec3], origin: Vec3, axis: Vec3) -> Result<&[Sight], TrackError> {
-        if directions.len() != self.looked.candidates.len() {
-            let found = format!("{} for {}", directions.len(), self.looked.candidates.len());
-            return Err(TrackError::measurement("directions", "one for each candidate", found));
-        }
-        let nearest = nearest(&self.looked.expected);
-        let looked = match &self.picture.body {
+    /// The candidates in space, and their depths along the optical axis: as the depth camera has them, else that of the nearest site.
+    fn sights(&self, input: &SkinInput, labels: &Labels, nearest: f64) -> Result<(Vec<Sight>, Vec<f64>), TrackError> {
+        let directions = input.directions(&self.candidates);
+        let measured = match &self.picture.body {
             Some(body) => {
-                let places: Vec<_> = self.looked.candidates.iter().map(|item| (item.pixel, item.region)).collect();
-                let radius = LOOKED_AT * PALM * self.looked.focal / nearest;
-                body.measured().nearest_surfaces(&self.looked.labels, &places, radius)?
+                let places: Vec<_> = self.candidates.iter().map(|item| (item.pixel, item.region)).collect();
+                let radius = LOOKED_AT * PALM * input.eye.focal() / nearest;
+                body.measured().nearest_surfaces(labels, &places, radius)?
             }
             None => vec![None; directions.len()],
         };
-        self.looked.origin = origin;
-        (self.looked.sights, self.looked.depths) = (Vec::new(), Vec::new());
-        for ((direction, item), found) in directions.iter().zip(&self.looked.candidates).zip(looked) {
+        let (origin, axis) = (input.eye.origin(), input.eye.axis());
+        let sight = |((direction, item), found): ((&Vec3, &Candidate), Option<(f64, bool)>)| {
             let z = found.map_or(nearest, |(z, _)| z);
-            self.looked.depths.push(z);
-            self.looked.sights.push(Sight {
+            let sight = Sight {
                 direction: *direction,
                 place: origin + *direction * (z / direction.dot(axis)),
                 deep: found.is_some(),
                 hand: item.hand,
                 region: item.region,
                 still: found.is_some_and(|(_, still)| still),
-            });
-        }
-        self.blobs.follow(&self.looked.sights, self.looked.stamp);
-        Ok(&self.looked.sights)
+            };
+            (sight, z)
+        };
+        Ok(directions.iter().zip(&self.candidates).zip(measured).map(sight).unzip())
     }
 
-    /// Which of the candidates each site is, and on which ray it was seen.
-    ///
-    /// `limbs` are the candidates' distances from the body's limbs, `strangers` those from other persons, metres: what is nearer to
-    /// them is theirs.
-    ///
-    /// # Errors
-    /// [`TrackError::Measurement`] when there are not as many distances as candidates.
-    pub fn name(&mut self, limbs: &LimbDistances, strangers: Option<&[f32]>) -> Result<Vec<FoundSite>, TrackError> {
-        let count = self.looked.sights.len();
-        if limbs.away.len() != limbs.names.len() * count || strangers.is_some_and(|others| others.len() != count) {
-            let found = format!("{} of {} limbs for {count}", limbs.away.len(), limbs.names.len());
-            return Err(TrackError::measurement("distances", "one for each limb and candidate", found));
-        }
-        let specks: Vec<bool> = self
-            .candidates()
-            .iter()
-            .zip(&self.looked.depths)
-            .map(|(item, z)| (item.area as f64) < SPECK * PI * (PALM * self.looked.focal / z).powi(2))
-            .collect();
-        let seen = Seen {
-            sights: &self.looked.sights,
-            blobs: &self.blobs.items[..count],
-            specks: &specks,
-            limbs,
-            unexplained: self.settings.unexplained as f32,
+    fn choice(&self, site: &Expected, seen: &Seen, theirs: &[bool], origin: Vec3) -> Choice {
+        let inside: Vec<Vec3> = seen.sights.iter().map(|sight| inside(site, sight)).collect();
+        let away = |(sight, inside): (&Sight, &Vec3)| {
+            if sight.deep {
+                return inside.distance(site.place);
+            }
+            let offset = site.place - origin;
+            (offset - offset.dot(sight.direction).max(0.0) * sight.direction).length()
         };
-        let theirs = |index: usize| {
-            let known = strangers.filter(|_| !limbs.names.is_empty());
-            known.is_some_and(|others| self.looked.sights[index].deep && others[index] < limbs.nearest(index))
-        };
-        let theirs: Vec<bool> = (0..count).map(theirs).collect();
-        let mut choices: Vec<Choice> =
-            self.looked.expected.iter().map(|site| self.choice(site, &seen, &theirs)).collect();
-        // Names are given below; what could be a piece of a hand is known before.
-        let pieces: Vec<Vec<bool>> = choices.iter().map(|choice| self.pieces(choice)).collect();
-        let rules =
-            Rules { gate: self.settings.gate, growth: self.settings.growth, ambiguity: self.settings.ambiguity };
-        let named = self.blobs.name(&mut choices, &rules, self.looked.stamp);
-        let taken: Vec<usize> = named.iter().map(|(_, column)| *column).collect();
-        let free = |row: usize, column: &usize| pieces[row][*column] && !taken.contains(column);
-        self.assigned = named.iter().map(|(row, column)| (self.looked.expected[*row].site, *column)).collect();
-        let found = |&(row, column): &(usize, usize)| {
-            let pieces: Vec<usize> = (0..count).filter(|column| free(row, column)).collect();
-            self.found(&self.looked.expected[row], column, &pieces)
-        };
-        Ok(named.iter().map(found).collect())
-    }
-
-    /// Where a site is when a sight is its surface.
-    fn inside(&self, site: &Expected, sight: &Sight) -> Vec3 {
-        sight.place + sight.direction * if site.head { FACE_BEHIND } else { HAND_BEHIND }
-    }
-
-    fn choice(&self, site: &Expected, seen: &Seen, theirs: &[bool]) -> Choice {
-        let inside: Vec<Vec3> = self.looked.sights.iter().map(|sight| self.inside(site, sight)).collect();
-        let distance: Vec<f64> = self
-            .looked
-            .sights
-            .iter()
-            .zip(&inside)
-            .map(|(sight, inside)| {
-                if sight.deep {
-                    return inside.distance(site.place);
-                }
-                let offset = site.place - self.looked.origin;
-                (offset - offset.dot(sight.direction).max(0.0) * sight.direction).length()
-            })
-            .collect();
+        let distance: Vec<f64> = seen.sights.iter().zip(&inside).map(away).collect();
         let mut allowed = seen.allowed(site, &inside);
         for (index, allowed) in allowed.iter_mut().enumerate() {
             // A speck far from where the hand is expected is what is left of another region.
@@ -305,30 +318,29 @@ impl SkinCue {
         let elsewhere = seen.elsewhere(site, self.settings.side(site.site));
         Choice { site: site.site, widest, distance, allowed, elsewhere }
     }
-
-    fn pieces(&self, choice: &Choice) -> Vec<bool> {
-        let marks = choice.allowed.iter().zip(&choice.elsewhere).zip(&self.looked.sights);
-        marks.map(|((allowed, elsewhere), sight)| *allowed > 0 && !elsewhere && sight.deep).collect()
-    }
-
-    fn found(&self, site: &Expected, column: usize, pieces: &[usize]) -> FoundSite {
-        let sight = &self.looked.sights[column];
-        let mut direction = sight.direction;
-        let mut place = sight.deep.then(|| self.inside(site, sight));
-        if let (Some(whole), false) = (place, site.head) {
-            let pieces = pieces.iter().map(|piece| self.inside(site, &self.looked.sights[*piece]));
-            let middle = of_pieces(whole, pieces, site.place);
-            direction = (middle - self.looked.origin).normalize();
-            place = Some(middle);
-        }
-        let shift = site.to_palm();
-        let place = place.map(|place| place + shift);
-        FoundSite { site: site.site, origin: self.looked.origin + shift, direction, place, depth: site.depth }
-    }
 }
 
-/// How far the nearest site is along the optical axis, metres.
-fn nearest(expected: &[Expected]) -> f64 {
-    let nearest = expected.iter().fold(f64::INFINITY, |least, site| least.min(site.depth));
-    if nearest.is_finite() { nearest } else { 1.0 }
+/// Where a site is when a sight is its surface.
+fn inside(site: &Expected, sight: &Sight) -> Vec3 {
+    sight.place + sight.direction * if site.head { FACE_BEHIND } else { HAND_BEHIND }
+}
+
+/// Of every sight whether it may be a piece of a site.
+fn pieces(choice: &Choice, sights: &[Sight]) -> Vec<bool> {
+    let marks = choice.allowed.iter().zip(&choice.elsewhere).zip(sights);
+    marks.map(|((allowed, elsewhere), sight)| *allowed > 0 && !elsewhere && sight.deep).collect()
+}
+
+fn found<'a>(site: &Expected, sight: &Sight, pieces: impl Iterator<Item = &'a Sight>, input: &SkinInput) -> FoundSite {
+    let origin = input.eye.origin();
+    let mut direction = sight.direction;
+    let mut place = sight.deep.then(|| inside(site, sight));
+    if let (Some(whole), false) = (place, site.head) {
+        let middle = of_pieces(whole, pieces.map(|piece| inside(site, piece)), site.place);
+        direction = (middle - origin).normalize();
+        place = Some(middle);
+    }
+    let shift = site.to_palm();
+    let place = place.map(|place| place + shift);
+    FoundSite { site: site.site, origin: origin + shift, direction, place, depth: input.depth(site) }
 }

@@ -1,7 +1,8 @@
 //! Which of the skin regions that are followed is the head and which a hand.
 
-use crate::skin::assignment::{Costs, assign};
+use crate::skin::assignment::assign;
 use crate::skin::blobs::{Blob, Blobs, ONE_HAND};
+use voodoo_core::math::CostTable;
 
 /// Time over which agreement with the model is averaged, seconds.
 const AGREEMENT: f64 = 0.15;
@@ -74,7 +75,7 @@ impl Blobs {
             blobs.any(|(blob, allowed)| blob.label == Some(choice.site) && *allowed > 0)
         };
         let owners: Vec<usize> = choices.iter().filter(|choice| owner(choice)).map(|choice| choice.site).collect();
-        let mut cost = Costs::filled(choices.len(), count, f64::INFINITY);
+        let mut costs = vec![f64::INFINITY; choices.len() * count];
         for (row, choice) in choices.iter().enumerate() {
             let missed = &mut self.missed[choice.site];
             *missed = if missed.is_nan() { stamp } else { *missed };
@@ -82,10 +83,11 @@ impl Blobs {
             for column in 0..count {
                 self.items[column].agree(choice.site, choice.distance[column], rules.gate);
                 if let Some(value) = price(&self.items[..count], choice, column, &owners, (rules, reach)) {
-                    cost.set(row, column, value.sqrt());
+                    costs[row * count + column] = value.sqrt();
                 }
             }
         }
+        let cost = CostTable::from_fn(choices.len(), count, |row, column| costs[row * count + column]);
         let named = assign(&cost, 1.0, Some(NONE));
         for blob in &mut self.items {
             let renamed = blob.label.is_some_and(|label| named.iter().any(|(row, _)| choices[*row].site == label));

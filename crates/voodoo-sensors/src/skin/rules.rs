@@ -37,8 +37,6 @@ pub struct Expected {
     pub head: bool,
     /// Where it is expected, metres.
     pub place: Vec3,
-    /// Along the camera's optical axis, metres.
-    pub depth: f64,
     /// Shoulder, elbow and hand of its side.
     pub arm: [Option<Vec3>; 3],
     /// Other sensors do not show its limb where the body has it.
@@ -237,7 +235,6 @@ mod tests {
             site: 1,
             head: false,
             place,
-            depth: 2.0,
             arm: [None, elbow, Some(place)],
             arm_lost: false,
             upper_arm_visible: false,
@@ -257,7 +254,6 @@ mod tests {
             site: 0,
             head: false,
             place: Vec3::X,
-            depth: 1.0,
             arm: [None; 3],
             arm_lost: false,
             upper_arm_visible: false,

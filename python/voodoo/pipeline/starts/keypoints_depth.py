@@ -82,12 +82,12 @@ def _placed(
     focal = math.sqrt(item.camera.fx * item.camera.fy)
     placed: _Person = {}
     for site, direction in zip(sites, directions, strict=True):
-        found = _core.nearest_surface(pixels, z, None, pixel=site.pixel, radius=_AROUND * max(coarse, 1.0))
-        if found is None or not np.isfinite(direction).all():
+        depth = _core.nearest_surface(pixels, z, pixel=site.pixel, radius=_AROUND * max(coarse, 1.0))
+        if depth is None or not np.isfinite(direction).all():
             continue
-        surface = found[0] / float(direction @ item.root_from_sensor[:3, 2])
+        surface = depth / float(direction @ item.root_from_sensor[:3, 2])
         noise = seen.settings.keypoint_noise
-        sigma = noise.sigma(found[0], focal, confidence=site.confidence, spread=site.spread)
+        sigma = noise.sigma(depth, focal, confidence=site.confidence, spread=site.spread)
         place = origin + direction * (surface + behind_surface(site.site))
         placed[site.site] = np.asarray(place), math.hypot(sigma, POINT_SIGMA_M)
     return placed

@@ -12,13 +12,13 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.measurements import DepthImage
 from voodoo.people import Followed
 from voodoo.sensors.adapters.drawing import Canvas, Log
-from voodoo.sensors.gating import SiteGate, SitePredictor
+from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import RangeNoise
-from voodoo.sensors.motion import LimbMotion
 from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.settings import FrontEndSettings
@@ -75,8 +75,6 @@ class Context:
         predicted: site name -> (3,) expected at the frame's time [m], root frame; empty while nobody is tracked.
         settings: what is used, and how much it is believed.
         tracker: not yet stepped; its estimate is the last one.
-        predictor: where sites are at other times.
-        motion: how limbs move.
         gate: around the predicted sites.
         memory: of this front end.
         others: those who are followed beside the one whose frame is made.
@@ -88,8 +86,6 @@ class Context:
     predicted: Mapping[str, FloatArray]
     settings: FrontEndSettings
     tracker: Tracker | Followed
-    predictor: SitePredictor
-    motion: LimbMotion
     gate: SiteGate
     memory: Memory
     others: Sequence[Followed] = ()
@@ -123,12 +119,10 @@ class Context:
         self, points: npt.NDArray[Any], root_from_sensor: FloatArray, stamp: float
     ) -> npt.NDArray[Any]:
         """Points of a sensor (N, 3) [m] measured at `stamp`, those on the body where they are at the frame's time."""
-        elapsed = self.stamp - stamp
-        if not self.motion.moves(elapsed):
-            return points
-        return self.motion.motion_compensated(
-            points, elapsed, self.tracker.limb_distances, world_from_sensor=root_from_sensor
+        moved = _core.carried(
+            points, self.tracker._core, elapsed=self.stamp - stamp, world_from_sensor=root_from_sensor
         )
+        return points if moved is None else moved
 
 
 class Adapter(ABC, Generic[M]):

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
 from voodoo.measurements import ColorImage
-from voodoo.people import Followed
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.body_view import BodyView, StillDepth, body_view
 from voodoo.sensors.pixels import FloatArray
-from voodoo.sensors.skin.tracker import LimbDistances, SkinTracker
+from voodoo.sensors.skin.tracker import SkinTracker
 
 SKIN = (80, 255, 255)
 """Colour in overlays, BGR."""
@@ -40,10 +37,10 @@ class SkinAdapter(Adapter[ColorImage]):
         """As rays, moved from the picture's time to the frame's."""
         skin = context.memory.get(self.kind, item.sensor, lambda: SkinTracker(context.settings.skin))
         # The picture is older or newer than the frame: the ray is moved along with its site.
-        then = context.predictor.predict(item.stamp)
-        view = _body_view(item, context)
+        then = context.tracker.predict(item.stamp)
+        view = _body_view(item, context, then)
         sites = skin.settings.sites if view is not None else ()
-        tracker, status = context.tracker, context.estimate.limb_status
+        status = context.estimate.limb_status
         rays = skin.observe(
             item.image,
             item.camera,
@@ -51,8 +48,8 @@ class SkinAdapter(Adapter[ColorImage]):
             then,
             stamp=item.stamp,
             body=view,
-            surface=lambda places: LimbDistances(status, tracker.limb_distances(places)),
-            strangers=partial(_distance, context.others) if context.others else None,
+            tracker=context.tracker,
+            others=context.others,
             arm_lost=_hands(status, sites, "forearm", measured=False),
             upper_arm_visible=_hands(status, sites, "upperarm", measured=True),
             head_visible=_heads(status, sites),
@@ -99,7 +96,7 @@ class SkinAdapter(Adapter[ColorImage]):
             log.send(f"{path}/picture/skin", rr.Points2D(places, radii=3.0, colors=(0, 255, 255)))
 
 
-def _body_view(item: ColorImage, context: Context) -> BodyView | None:
+def _body_view(item: ColorImage, context: Context, predicted: Mapping[str, FloatArray]) -> BodyView | None:
     """What the frame's first depth camera sees of the body, in this picture; None without one."""
     depth = next(iter(context.depth_images), None)
     if depth is None:
@@ -111,7 +108,7 @@ def _body_view(item: ColorImage, context: Context) -> BodyView | None:
         metres_per_unit=depth.metres_per_unit,
         color_camera=item.camera,
         world_from_color=item.root_from_sensor,
-        joints=context.predictor.positions(item.stamp),
+        joints=list(predicted.values()),
         step=max(depth.camera.width // 200, 1),
         scene=context.memory.get(SCENE, depth.sensor, StillDepth),
     )
@@ -127,8 +124,3 @@ def _heads(status: Mapping[str, str], sites: Iterable[str]) -> set[str]:
     """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
     measured = status.get("head") == "measured"
     return {site for site in sites if measured and site.startswith("head")}
-
-
-def _distance(others: Sequence[Followed], places: FloatArray) -> npt.NDArray[np.float32]:
-    """Of places from the nearest of several bodies."""
-    return np.asarray(np.min([other.distance(places) for other in others], axis=0))

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
 
+import voodoo._core as _core
 from voodoo.measurements import KeypointImage
 from voodoo.sensors.keypoints.sites import site_pixels
 from voodoo.sensors.pixels import FloatArray, ray_distance, world_rays
@@ -44,10 +44,10 @@ def shared_out(item: KeypointImage, predicted: Mapping[int, Mapping[str, npt.NDA
     taken: set[int] = set()
     if costs.size:
         # What is not theirs costs more than any that may be.
-        for row, column in zip(*linear_sum_assignment(np.where(costs < WRONG_M, costs, 1e3)), strict=True):
+        for row, column in _core.linear_sum_assignment(np.where(costs < WRONG_M, costs, 1e3)):
             if costs[row, column] < WRONG_M:
                 of[numbers[row]] = replace(item, people=(item.people[column],))
-                taken.add(int(column))
+                taken.add(column)
     rest = tuple(rows for index, rows in enumerate(item.people) if index not in taken)
     return Shared(of, replace(item, people=rest))
 

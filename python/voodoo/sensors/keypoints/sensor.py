@@ -24,7 +24,7 @@ from voodoo.sensors.keypoints.sites import (
 )
 from voodoo.sensors.keypoints.surface import DepthArray, window_depth
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import checked_camera, normalized
+from voodoo.sensors.pixels import checked_camera
 from voodoo.sensors.rays import SiteRay, add_rays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -163,8 +163,7 @@ class KeypointSensor:
             stamp=stamp,
             source=self.source,
             world_from_sensor=pose,
-            intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-            lens=(lambda pixels: normalized(camera, pixels)) if camera.distorted else None,
+            camera=camera,
             noise=self.noise.pixels,
             place_sigma=POINT_SIGMA_M,
             least=self.min_confidence,

@@ -112,8 +112,7 @@ def nearest_person(
         [checked_rows(person, layout) for person in people],
         predicted,
         world_from_sensor=pose,
-        intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-        project=camera.project if camera.distorted else None,
+        camera=camera,
         least=MIN_CONFIDENCE,
     )
     return None if nearest is None else people[nearest]

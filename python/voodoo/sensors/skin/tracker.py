@@ -7,9 +7,9 @@ space, not only a ray.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,29 +19,22 @@ from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
+from voodoo.people import Followed
 from voodoo.sensors.body_view import BodyView
-from voodoo.sensors.pixels import FloatArray, checked_camera, normalized
+from voodoo.sensors.pixels import FloatArray, checked_camera
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin.regions import Candidate
 from voodoo.sensors.skin.settings import SkinSettings
+from voodoo.tracker import Tracker
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
 
 
-class LimbDistances(NamedTuple):
-    """Distances (L, N) of places from the surfaces of limbs [m], and the limbs' names."""
-
-    limbs: Collection[str]
-    away: npt.NDArray[np.floating[Any]]
-
-
-Surface: TypeAlias = Callable[[FloatArray], LimbDistances]
-"""Distances of places (N, 3) from each limb."""
 _NOWHERE = np.full(3, np.nan)
 
 
-class Followed(NamedTuple):
+class FollowedRegion(NamedTuple):
     """A region that is followed.
 
     Args:
@@ -115,10 +108,10 @@ class SkinTracker:
         return {self._sites[site]: found[number] for site, number in self._cue.assigned}
 
     @property
-    def followed(self) -> list[Followed]:
+    def followed(self) -> list[FollowedRegion]:
         """All regions that are followed."""
         return [
-            Followed(None if site is None else self._sites[site], count, stamp, *map(tuple, rest))
+            FollowedRegion(None if site is None else self._sites[site], count, stamp, *map(tuple, rest))
             for site, count, stamp, *rest in self._cue.followed
         ]
 
@@ -131,8 +124,8 @@ class SkinTracker:
         *,
         stamp: float | None = None,
         body: BodyView | None = None,
-        surface: Surface | None = None,
-        strangers: Callable[[FloatArray], npt.NDArray[np.floating[Any]]] | None = None,
+        tracker: Tracker | Followed | None = None,
+        others: Sequence[Followed] = (),
         arm_lost: Collection[str] = (),
         upper_arm_visible: Collection[str] = (),
         head_visible: Collection[str] = (),
@@ -149,8 +142,8 @@ class SkinTracker:
             stamp: of the picture [s]; None: 1/30 s after the last.
             body: what a depth camera saw near the body; None: not known. A candidate must then lie at about the depth
                 of its site, so that a hand hidden behind the body does not jump to what is in front.
-            surface: distances of places (N, 3) from each limb's surface [m]; see `Tracker.limb_distances`.
-            strangers: distances (N,) of places (N, 3) from other persons; what is nearer to them than to the body is theirs.
+            tracker: who follows the body, with its last pose; None: where the body's surface is, is not known.
+            others: other persons; what is nearer to them than to the body is theirs.
             arm_lost: sites whose limb the other sensors do not show where the body has it.
             upper_arm_visible: sites whose upper arm they do show there: its hand is a forearm away from that elbow.
             head_visible: sites whose own limb they show there, see `SkinSettings.shown_bias`.
@@ -158,34 +151,29 @@ class SkinTracker:
             moved: site name -> (3,) where it is at the time of the rays; None: that of the picture.
 
         Raises:
-            MeasurementError: the image is not of the camera's size.
+            MeasurementError: the image is not of the camera's size, or `tracker` has no pose yet.
         """
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
         self._stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
         self._image = image
-        places = self._cue.look(
+        found = self._cue.observe(
             self._teacher,
             np.ascontiguousarray(image),
             predicted,
             stamp=self._stamp,
             world_from_sensor=pose,
-            intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-            lens=(lambda pixels: normalized(camera, pixels)) if camera.distorted else None,
+            camera=camera,
             body=body,
             settled=self.settled,
             arm_lost=[site in arm_lost for site in self._sites],
             upper_arm_visible=[site in upper_arm_visible for site in self._sites],
+            tracker=None if tracker is None else tracker._core,
+            others=[other._core for other in others],
         )
-        if places is None:
-            return []
-        limbs, away = surface(places) if surface is not None else ((), np.zeros((0, len(places))))
-        others = None if strangers is None else np.asarray(strangers(places), dtype=np.float32)
         noise, focal = self.settings.noise, (camera.fx * camera.fy) ** 0.5
         rays = []
-        for number, origin, direction, place, z in self._cue.name(
-            tuple(limbs), np.asarray(away, dtype=np.float32), others
-        ):
+        for number, origin, direction, place, z in found:
             site = self._sites[number]
             bias = self.settings.sites[site]
             if site in head_visible:
@@ -228,8 +216,7 @@ class SkinTracker:
             None if image is self._image else np.ascontiguousarray(image),
             np.array([positions[names.index(site)] if site in names else _NOWHERE for site in self._sites]),
             world_from_sensor=pose,
-            intrinsics=(camera.fx, camera.fy, camera.cx, camera.cy),
-            project=camera.project if camera.distorted else None,
+            camera=camera,
             half_life=self.settings.static_seconds * rate_hz,
             every=self.settings.learn_every,
             settled=self.settings.settled_frames,

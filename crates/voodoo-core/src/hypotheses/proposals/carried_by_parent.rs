@@ -45,13 +45,13 @@ mod tests {
     #[test]
     fn an_arm_moves_with_its_parent_and_nothing_else_does() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let then = body.rest_pose(Pose::identity());
+        let then = body.rest_pose(Pose::IDENTITY);
         let motion = Pose::from_parts(Vec3::new(0.3, -0.2, 0.1), Quat::from_rotation_z(0.4));
         for chain in TwoBone::of(&body) {
             let mut now: Vec<Pose> = then.iter().map(|pose| motion * *pose).collect();
             let wanted = now.clone();
             // The arm itself went elsewhere.
-            chain.limbs().for_each(|limb| now[limb] = Pose::identity());
+            chain.limbs().for_each(|limb| now[limb] = Pose::IDENTITY);
             move_with_parent(&chain, &body, &then, &mut now);
             for (found, wanted) in now.iter().zip(&wanted) {
                 assert!((found.translation - wanted.translation).length() < 1e-12);

@@ -1,30 +1,27 @@
 //! The arm or leg ends where a detector sees its wrist or ankle.
 
 use super::{Pool, Propose, SWIVELS};
-use crate::detect::Detection;
+use crate::detect::Detected;
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Vec3;
 
 /// What a detector says of this frame, if it looked.
 #[derive(Debug)]
-pub(in crate::hypotheses) struct DetectedEnd<'a>(pub(in crate::hypotheses) Option<&'a Detection>);
+pub(in crate::hypotheses) struct DetectedEnd<'a>(pub(in crate::hypotheses) Option<Detected<'a>>);
 
 impl DetectedEnd<'_> {
     /// Where the end is seen, world frame: the hand's middle, or as far from the ankle as it is now.
     fn end(&self, at: Extremity) -> Option<Vec3> {
         let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
-        let detection = self.0?;
+        let detected = self.0?;
         let last = chain.ends.first()?;
-        let (_, joint) = body.limbs()[*last].parent.as_ref()?;
-        let center = body.roles().joint_site(*last);
-        let mut on_end =
-            (0..body.sites().len()).filter(|site| body.sites()[*site].limb == *last && Some(*site) != center);
-        if let Some(seen) = on_end.find_map(|site| detection.at_site(body, site)) {
+        let joint = body.limbs()[*last].parent.as_ref().map(|(_, joint)| joint)?;
+        if let Some(seen) = detected.on_limb(*last) {
             return Some(seen.position);
         }
         let beyond = chain.end(poses) - poses[*last] * joint.limb_from_joint.translation;
-        Some(detection.at_site(body, center?)?.position + beyond)
+        Some(detected.hangs_by(*last)?.position + beyond)
     }
 }
 

@@ -1,14 +1,14 @@
 //! What a detector that looked at a frame says of a limb.
 
 use crate::body::Body;
-use crate::detect::Detection;
+use crate::detect::Detected;
 use crate::math::{Pose, Vec3};
 use crate::visibility::evidence::EXPLAINED;
 
 /// Log odds that a limb is right, by where a detector sees its near end and that of the `next` one: where it sees all of a limb
 /// aside, the limb is wrong however sure one joint may be. Poses are in a frame with this `origin` in the world.
 pub(super) fn said_by_detection(
-    detection: &Detection,
+    detected: Detected,
     body: &Body,
     poses: &[Pose],
     origin: Vec3,
@@ -16,7 +16,7 @@ pub(super) fn said_by_detection(
 ) -> f64 {
     let apart = |limb: usize| {
         let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
-        let seen = detection.at_site(body, body.roles().joint_site(limb)?)?;
+        let seen = detected.hangs_by(limb)?;
         let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
         Some(said_by_joint(tracked - seen.position, seen.sigma))
     };
@@ -33,19 +33,21 @@ fn said_by_joint(apart: Vec3, sigma: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::{DetectedJoint, JOINTS};
+    use crate::detect::{DetectedJoint, Detection, JointMap};
     use crate::testing::standing;
 
     /// What a detector with this standard deviation says of the first arm's limbs that sees everything so far aside.
     fn said(aside: Vec3, sigma: f64) -> [f64; 2] {
         let (model, poses) = standing();
         let body = &model.body;
-        let place = |name: &&str| body.site_index(name).map_or(Vec3::ZERO, |site| body.site_position(&poses, site));
-        let joint = |name| DetectedJoint { position: place(name) + aside + Vec3::X, sigma, visible: 1.0 };
-        let seen = Detection { joints: JOINTS.iter().map(joint).collect(), ..Detection::default() };
+        let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
+        let place = |site| body.site_position(&poses, site) + aside + Vec3::X;
+        let joint = |site| Some(DetectedJoint { position: place(site), sigma, visible: 1.0 });
+        let detection = Detection { joints: (0..names.len()).map(joint).collect(), ..Detection::default() };
+        let seen = Detected { detection: &detection, map: &JointMap::new(body, &names, &[]) };
         let arm = &model.extremities[0];
         [(arm.upper, Some(arm.lower)), (arm.lower, arm.ends.first().copied())]
-            .map(|(limb, next)| said_by_detection(&seen, body, &poses, Vec3::X, [Some(limb), next]))
+            .map(|(limb, next)| said_by_detection(seen, body, &poses, Vec3::X, [Some(limb), next]))
     }
 
     #[test]

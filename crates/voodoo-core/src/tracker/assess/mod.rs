@@ -22,7 +22,7 @@ use super::estimate::{Estimate, LimbStatus, Status};
 use crate::association::correspondence::SitePair;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
-use crate::detect::Detection;
+use crate::detect::Detected;
 use crate::fit::{Context, Matched};
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
@@ -113,14 +113,14 @@ impl Assessor {
         self.internal.get(limb) == Some(&LimbStatus::Measured)
     }
 
-    /// The status that the tracker goes by, of the body and its limbs; `detection` is what a detector says of this frame, if it looked
+    /// The status that the tracker goes by, of the body and its limbs; `detected` is what a detector says of this frame, if it looked
     /// and the pose is not taken from it.
-    pub(super) fn assess(&mut self, context: Context, matched: Matched, detection: Option<&Detection>) {
+    pub(super) fn assess(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
         if context.seen.candidates.is_empty() && matched.correspondences.sites.is_empty() {
             // Nothing was measured: what was known before does not speak for this frame.
             self.limbs.clear();
         }
-        self.update_limbs(context, matched, detection);
+        self.update_limbs(context, matched, detected);
         let extremities = &context.model.extremities;
         let Self { limbs, internal, .. } = self;
         internal.clear();
@@ -178,7 +178,7 @@ impl Assessor {
     }
 
     /// What this frame says about every limb.
-    fn update_limbs(&mut self, context: Context, matched: Matched, detection: Option<&Detection>) {
+    fn update_limbs(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
         let (body, views, poses) = (&context.model.body, context.seen.views, matched.poses);
         self.limbs.resize(poses.len(), LimbHistory::default());
         self.exclusive.count(body, poses, context.seen.candidates);
@@ -215,11 +215,11 @@ impl Assessor {
             history
                 .moved(far_end(poses).zip(far_end(context.previous)).map_or(Vec3::ZERO, |(now, before)| now - before));
         }
-        self.weigh_images(context, poses, detection);
+        self.weigh_images(context, poses, detected);
     }
 
     /// What this frame's images, and a detector that looked at them, say about arms and legs.
-    fn weigh_images(&mut self, context: Context, poses: &[Pose], detection: Option<&Detection>) {
+    fn weigh_images(&mut self, context: Context, poses: &[Pose], detected: Option<Detected>) {
         let Self { limbs, supports, .. } = self;
         let (model, origin) = (context.model, context.seen.origin());
         for chain in &model.extremities {
@@ -240,9 +240,9 @@ impl Assessor {
                     limbs[limb].hide();
                     continue;
                 }
-                let detected =
-                    detection.map(|seen| said_by_detection(seen, &model.body, poses, origin, [Some(limb), next]));
-                limbs[limb].show(evidence, detected.unwrap_or_default(), unexpected);
+                let log_odds =
+                    detected.map(|seen| said_by_detection(seen, &model.body, poses, origin, [Some(limb), next]));
+                limbs[limb].show(evidence, log_odds.unwrap_or_default(), unexpected);
             }
         }
     }

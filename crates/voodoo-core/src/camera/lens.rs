@@ -1,0 +1,397 @@
+//! Lens models: where a lens puts a direction, and back.
+//!
+//! All work on normalized coordinates, those of a camera with focal length one: `(x/z, y/z)` of a point, and where the lens puts it.
+//! The formulas and the order of coefficients are OpenCV's (documentation of `calib3d` and of `fisheye`).
+
+use crate::error::CameraError;
+
+/// How a lens distorts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Lens {
+    /// Not at all.
+    #[default]
+    Pinhole,
+    /// Brown-Conrady: `k1 k2 p1 p2 k3`.
+    PlumbBob([f64; 5]),
+    /// The same with a denominator, thin prism and tilted sensor: `k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty`.
+    Rational([f64; 14]),
+    /// Kannala-Brandt on the angle to the optical axis: `k1 k2 k3 k4`. All zero is the equidistant lens, no pinhole.
+    Fisheye([f64; 4]),
+    /// Brown-Conrady from distorted to undistorted coordinates, as RealSense calibrates its color cameras: `k1 k2 p1 p2 k3`.
+    InversePlumbBob([f64; 5]),
+}
+
+/// Iterations of Newton's method at most; some ten are needed near the border of a lens's domain, three elsewhere.
+const MOST_STEPS: usize = 60;
+/// A step is halved at most to this share.
+const LEAST_SHARE: f64 = 1e-4;
+/// Error up to which an inverse counts as found: a millionth of a pixel at a focal length of 1e6 pixels, of coordinates up to one.
+const ACCEPTED: f64 = 1e-12;
+/// A ray lies so far within the border of the domain, of its squared radius, that it still does when it is rounded to single precision.
+const INSIDE: f64 = 1.0 - 1e-6;
+
+impl Lens {
+    /// The lens of a `sensor_msgs/CameraInfo`: its `distortion_model` and `d`; coefficients that are left out at the end are zero.
+    ///
+    /// Known are `plumb_bob` (0, 4 or 5 coefficients), `rational_polynomial` (0, 8, 12 or 14), `equidistant` (0 or 4), and
+    /// `inverse_plumb_bob` (0, 4 or 5). Polynomials whose coefficients are all zero make a pinhole.
+    ///
+    /// # Errors
+    /// [`CameraError`] when the model is not known or the number of coefficients does not fit it.
+    pub fn from_model(model: &str, coefficients: &[f64]) -> Result<Self, CameraError> {
+        let counts: (&[usize], &'static str) = match model {
+            "plumb_bob" | "inverse_plumb_bob" => (&[0, 4, 5], "0, 4 or 5 coefficients"),
+            "rational_polynomial" => (&[0, 8, 12, 14], "0, 8, 12 or 14 coefficients"),
+            "equidistant" => (&[0, 4], "0 or 4 coefficients"),
+            _ => {
+                let expected = "plumb_bob, rational_polynomial, equidistant or inverse_plumb_bob";
+                return Err(CameraError::new("model", expected, format!("{model:?}")));
+            }
+        };
+        if !counts.0.contains(&coefficients.len()) {
+            let found = format!("{} for {model}: {coefficients:?}", coefficients.len());
+            return Err(CameraError::new("distortion", counts.1, found));
+        }
+        let straight = coefficients.iter().all(|value| *value == 0.0);
+        Ok(match model {
+            "equidistant" => Self::Fisheye(padded(coefficients)),
+            _ if straight => Self::Pinhole,
+            "plumb_bob" => Self::PlumbBob(padded(coefficients)),
+            "rational_polynomial" => Self::Rational(padded(coefficients)),
+            _ => Self::InversePlumbBob(padded(coefficients)),
+        })
+    }
+
+    /// The `distortion_model` of [`Lens::from_model`] that makes it.
+    pub fn model(&self) -> &'static str {
+        match self {
+            Self::Pinhole | Self::PlumbBob(_) => "plumb_bob",
+            Self::Rational(_) => "rational_polynomial",
+            Self::Fisheye(_) => "equidistant",
+            Self::InversePlumbBob(_) => "inverse_plumb_bob",
+        }
+    }
+
+    /// The coefficients.
+    pub fn coefficients(&self) -> &[f64] {
+        match self {
+            Self::Pinhole => &[],
+            Self::PlumbBob(k) | Self::InversePlumbBob(k) => k,
+            Self::Rational(k) => k,
+            Self::Fisheye(k) => k,
+        }
+    }
+
+    /// Square of the radius up to which the radial part grows with the radius: beyond, two directions fall on one place. Of
+    /// undistorted coordinates, of distorted ones for [`Lens::InversePlumbBob`].
+    pub(super) fn domain(&self) -> f64 {
+        match self {
+            Self::Pinhole => f64::INFINITY,
+            Self::PlumbBob(k) | Self::InversePlumbBob(k) => polynomial_domain(k),
+            Self::Rational(k) => polynomial_domain(k),
+            Self::Fisheye([k1, k2, k3, k4]) => {
+                let squared_angle = first_root(&[1.0, 3.0 * k1, 5.0 * k2, 7.0 * k3, 9.0 * k4]);
+                let angle = squared_angle.sqrt();
+                if angle < std::f64::consts::FRAC_PI_2 { angle.tan() * angle.tan() } else { f64::INFINITY }
+            }
+        }
+    }
+
+    /// Where the lens puts `(x/z, y/z)`; none outside of its domain.
+    #[inline(never)]
+    pub(super) fn distorted(&self, at: [f64; 2], domain: f64) -> Option<[f64; 2]> {
+        let within = at[0] * at[0] + at[1] * at[1] <= domain;
+        match self {
+            Self::Pinhole => Some(at),
+            Self::PlumbBob(k) => within.then(|| bend(k, at)),
+            Self::Rational(k) => within.then(|| bend(k, at)),
+            Self::Fisheye(k) => within.then(|| fisheye(k, at)),
+            Self::InversePlumbBob(k) => unbend(k, at, domain),
+        }
+    }
+
+    /// The `(x/z, y/z)` that the lens puts there; none where it puts nothing.
+    pub(super) fn undistorted(&self, at: [f64; 2], domain: f64) -> Option<[f64; 2]> {
+        match self {
+            Self::Pinhole => Some(at),
+            Self::PlumbBob(k) => unbend(k, at, INSIDE * domain),
+            Self::Rational(k) => unbend(k, at, INSIDE * domain),
+            Self::Fisheye(k) => fisheye_inverse(k, at, INSIDE * domain),
+            Self::InversePlumbBob(k) => {
+                (at[0] * at[0] + at[1] * at[1] <= INSIDE * domain).then(|| bend(k, at)).filter(|_| grows(k, at))
+            }
+        }
+    }
+
+    /// Derivative of [`Lens::distorted`]: row by row those of its coordinates.
+    pub(super) fn derivative(&self, at: [f64; 2], domain: f64) -> Option<[[f64; 2]; 2]> {
+        let within = at[0] * at[0] + at[1] * at[1] <= domain;
+        match self {
+            Self::Pinhole => Some([[1.0, 0.0], [0.0, 1.0]]),
+            Self::PlumbBob(k) => within.then(|| bend_derivative(k, at)),
+            Self::Rational(k) => within.then(|| bend_derivative(k, at)),
+            Self::Fisheye(k) => within.then(|| fisheye_derivative(k, at)),
+            Self::InversePlumbBob(k) => {
+                let [[a, b], [c, d]] = bend_derivative(k, unbend(k, at, domain)?);
+                let determinant = a * d - b * c;
+                Some([[d / determinant, -b / determinant], [-c / determinant, a / determinant]])
+            }
+        }
+    }
+}
+
+fn padded<const N: usize>(coefficients: &[f64]) -> [f64; N] {
+    std::array::from_fn(|index| coefficients.get(index).copied().unwrap_or(0.0))
+}
+
+/// A coefficient, zero where a shorter model has none.
+#[inline(always)]
+fn term<const N: usize>(k: &[f64; N], index: usize) -> f64 {
+    if index < N { k[index] } else { 0.0 }
+}
+
+/// The polynomial models.
+#[inline]
+fn bend<const N: usize>(k: &[f64; N], [x, y]: [f64; 2]) -> [f64; 2] {
+    let r2 = x * x + y * y;
+    let (r4, r6) = (r2 * r2, r2 * r2 * r2);
+    let (a1, a2, a3) = (2.0 * x * y, r2 + 2.0 * x * x, r2 + 2.0 * y * y);
+    let upper = 1.0 + k[0] * r2 + k[1] * r4 + k[4] * r6;
+    let (mut u, mut v) = (x * upper, y * upper);
+    if N > 5 {
+        let lower = 1.0 / (1.0 + term(k, 5) * r2 + term(k, 6) * r4 + term(k, 7) * r6);
+        (u, v) = (x * upper * lower, y * upper * lower);
+    }
+    (u, v) = (u + k[2] * a1 + k[3] * a2, v + k[2] * a3 + k[3] * a1);
+    if N > 8 {
+        u = u + term(k, 8) * r2 + term(k, 9) * r4;
+        v = v + term(k, 10) * r2 + term(k, 11) * r4;
+    }
+    match tilt(k) {
+        Some(tilt) => {
+            let [u, v, w] = tilt.map(|row| row[0] * u + row[1] * v + row[2]);
+            [u / w, v / w]
+        }
+        None => [u, v],
+    }
+}
+
+/// Its derivative.
+fn bend_derivative<const N: usize>(k: &[f64; N], [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
+    let r2 = x * x + y * y;
+    let [upper, upper_slope] = cubic([k[0], k[1], k[4]], r2);
+    let [lower, lower_slope] = cubic([term(k, 5), term(k, 6), term(k, 7)], r2);
+    let (radial, slope) = (upper / lower, (upper_slope * lower - upper * lower_slope) / (lower * lower));
+    let (p1, p2) = (k[2], k[3]);
+    let prism = [8, 10].map(|first| 2.0 * (term(k, first) + 2.0 * term(k, first + 1) * r2));
+    let shared = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
+    let mut rows = [
+        [radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x + prism[0] * x, shared + prism[0] * y],
+        [shared + prism[1] * x, radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x + prism[1] * y],
+    ];
+    if let Some(tilt) = tilt(k) {
+        let mut flat = *k;
+        (flat[N - 2], flat[N - 1]) = (0.0, 0.0);
+        let [u, v] = bend(&flat, [x, y]);
+        let [seen_x, seen_y, w] = tilt.map(|row| row[0] * u + row[1] * v + row[2]);
+        let [by_x, by_y] = [0, 1].map(|axis| tilt.map(|row| row[0] * rows[0][axis] + row[1] * rows[1][axis]));
+        let of = |seen: f64, coordinate: usize| [by_x, by_y].map(|by| (by[coordinate] - seen / w * by[2]) / w);
+        rows = [of(seen_x, 0), of(seen_y, 1)];
+    }
+    rows
+}
+
+/// `1 + a s + b s^2 + c s^3` and its derivative.
+fn cubic([a, b, c]: [f64; 3], s: f64) -> [f64; 2] {
+    [1.0 + s * (a + s * (b + s * c)), a + s * (2.0 * b + 3.0 * s * c)]
+}
+
+/// The homography of a tilted sensor; none where it is not tilted.
+fn tilt<const N: usize>(k: &[f64; N]) -> Option<[[f64; 3]; 3]> {
+    let (tx, ty) = (term(k, 12), term(k, 13));
+    if tx == 0.0 && ty == 0.0 {
+        return None;
+    }
+    let ((sx, cx), (sy, cy)) = (tx.sin_cos(), ty.sin_cos());
+    // Turned about x, then about y, and projected back onto the plane at z = 1.
+    let turn = [[cy, sy * sx, -sy * cx], [0.0, cx, sx], [sy, -cy * sx, cy * cx]];
+    let depth = turn[2][2];
+    let row = |axis: usize| [0, 1, 2].map(|column| depth * turn[axis][column] - turn[axis][2] * turn[2][column]);
+    Some([row(0), row(1), turn[2]])
+}
+
+/// Whether neighbours of a place keep their order there.
+fn grows<const N: usize>(k: &[f64; N], at: [f64; 2]) -> bool {
+    let [[a, b], [c, d]] = bend_derivative(k, at);
+    a > 0.0 && a * d - b * c > 0.0
+}
+
+/// The place within the domain that [`bend`] puts at `target`: Newton's method from `target` on, with steps that are halved until
+/// they lead nearer and stay within the domain.
+fn unbend<const N: usize>(k: &[f64; N], target: [f64; 2], domain: f64) -> Option<[f64; 2]> {
+    let square = target[0] * target[0] + target[1] * target[1];
+    if !square.is_finite() {
+        return None;
+    }
+    let shrink = if square > 0.9 * domain { (0.9 * domain / square).sqrt() } else { 1.0 };
+    let mut at = target.map(|value| shrink * value);
+    let miss = |at: [f64; 2]| {
+        let [x, y] = bend(k, at);
+        [x - target[0], y - target[1]]
+    };
+    let size = |off: [f64; 2]| off[0].hypot(off[1]);
+    let mut off = miss(at);
+    'newton: for _ in 0..MOST_STEPS {
+        let [[a, b], [c, d]] = bend_derivative(k, at);
+        let determinant = a * d - b * c;
+        let step = [(d * off[0] - b * off[1]) / determinant, (a * off[1] - c * off[0]) / determinant];
+        let mut share = 1.0;
+        while share > LEAST_SHARE {
+            let next = [at[0] - share * step[0], at[1] - share * step[1]];
+            let left = miss(next);
+            if next[0] * next[0] + next[1] * next[1] <= domain && size(left) < size(off) {
+                (at, off) = (next, left);
+                continue 'newton;
+            }
+            share *= 0.5;
+        }
+        break;
+    }
+    (size(off) <= ACCEPTED * (1.0 + square.sqrt()) && grows(k, at)).then_some(at)
+}
+
+/// Square of the radius up to which the radial part of a polynomial model grows, and its denominator is positive.
+fn polynomial_domain<const N: usize>(k: &[f64; N]) -> f64 {
+    let upper = [1.0, k[0], k[1], k[4]];
+    let lower = [1.0, term(k, 5), term(k, 6), term(k, 7)];
+    // The numerator of the derivative of r U(s) / L(s) by r, where s = r^2: U L + 2 s (U' L - U L').
+    let mut growth = [0.0; 7];
+    for (i, u) in upper.iter().enumerate() {
+        for (j, l) in lower.iter().enumerate() {
+            growth[i + j] += (1.0 + 2.0 * (i as f64 - j as f64)) * u * l;
+        }
+    }
+    first_root(&growth).min(first_root(&lower))
+}
+
+/// The smallest positive root of a polynomial, constant term first, which is positive at zero; infinite without one.
+fn first_root(polynomial: &[f64]) -> f64 {
+    positive_roots(polynomial).first().copied().unwrap_or(f64::INFINITY)
+}
+
+/// Where a polynomial changes its sign, ascending: at most once between neighbouring roots of its derivative.
+fn positive_roots(polynomial: &[f64]) -> Vec<f64> {
+    /// No lens is asked beyond this squared radius: a degree off the camera's plane is 57.
+    const FARTHEST: f64 = 1e9;
+    let Some(degree) = polynomial.iter().rposition(|value| *value != 0.0).filter(|degree| *degree > 0) else {
+        return Vec::new();
+    };
+    let value = |s: f64| polynomial[..=degree].iter().rev().fold(0.0, |sum, factor| sum * s + factor);
+    let derivative: Vec<f64> = (1..=degree).map(|power| power as f64 * polynomial[power]).collect();
+    let mut edges = vec![0.0];
+    edges.extend(positive_roots(&derivative));
+    edges.push(FARTHEST);
+    let mut roots = Vec::new();
+    for edge in edges.windows(2) {
+        let (mut low, mut high) = (edge[0], edge[1]);
+        let rising = value(low) < 0.0;
+        if (value(high) < 0.0) == rising {
+            continue;
+        }
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if (value(middle) < 0.0) == rising {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        roots.push(low);
+    }
+    roots
+}
+
+/// Angle in the image for one to the optical axis, by Kannala and Brandt, and its derivative.
+fn image_angle([k1, k2, k3, k4]: &[f64; 4], angle: f64) -> [f64; 2] {
+    let s = angle * angle;
+    let slope = 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * (7.0 * k3 + s * 9.0 * k4)));
+    [angle * (1.0 + s * (k1 + s * (k2 + s * (k3 + s * k4)))), slope]
+}
+
+#[inline]
+fn fisheye(k: &[f64; 4], [x, y]: [f64; 2]) -> [f64; 2] {
+    let r = (x * x + y * y).sqrt();
+    let scale = if r > 1e-8 { image_angle(k, r.atan())[0] / r } else { 1.0 };
+    [x * scale, y * scale]
+}
+
+fn fisheye_derivative(k: &[f64; 4], [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
+    let square = x * x + y * y;
+    let r = square.sqrt();
+    if r <= 1e-8 {
+        return [[1.0, 0.0], [0.0, 1.0]];
+    }
+    let [angle, slope] = image_angle(k, r.atan());
+    let (across, along) = (angle / r, slope / (1.0 + square));
+    let (cos, sin) = (x / r, y / r);
+    let mixed = (along - across) * cos * sin;
+    [[across + (along - across) * cos * cos, mixed], [mixed, across + (along - across) * sin * sin]]
+}
+
+/// Newton's method on the angle, between bounds that it narrows: the image's angle grows with it.
+fn fisheye_inverse(k: &[f64; 4], at: [f64; 2], domain: f64) -> Option<[f64; 2]> {
+    let target = at[0].hypot(at[1]);
+    let (mut low, mut high) = (0.0, domain.sqrt().atan());
+    if !(target <= image_angle(k, high)[0]) {
+        return None;
+    }
+    if target < 1e-12 {
+        return Some(at);
+    }
+    let mut angle = target.min(high);
+    for _ in 0..MOST_STEPS {
+        let [value, slope] = image_angle(k, angle);
+        if value == target {
+            break;
+        }
+        if value < target {
+            low = angle
+        } else {
+            high = angle
+        }
+        let next = angle - (value - target) / slope;
+        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+        if (next - angle).abs() <= f64::EPSILON * angle {
+            angle = next;
+            break;
+        }
+        angle = next;
+    }
+    let scale = angle.tan() / target;
+    (scale > 0.0 && scale.is_finite()).then(|| at.map(|value| value * scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roots_are_found_between_those_of_the_derivative() {
+        // (1 - s)(2 - s)(5 - s), and one without a positive root.
+        let found = positive_roots(&[10.0, -17.0, 8.0, -1.0]);
+        assert!(found.len() == 3 && found.iter().zip([1.0, 2.0, 5.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+        assert_eq!(first_root(&[1.0, 3.0, 0.5]), f64::INFINITY);
+        assert_eq!(first_root(&[1.0]), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_barrel_lens_folds_where_its_radius_stops_growing() {
+        // r (1 - 0.3 r^2) is greatest at r^2 = 1 / 0.9.
+        let lens = Lens::PlumbBob([-0.3, 0.0, 0.0, 0.0, 0.0]);
+        let domain = lens.domain();
+        assert!((domain - 1.0 / 0.9).abs() < 1e-12, "{domain}");
+        assert!(lens.distorted([1.0, 0.0], domain).is_some() && lens.distorted([1.06, 0.0], domain).is_none());
+        assert_eq!(lens.undistorted([0.71, 0.0], domain), None, "no direction falls there");
+        assert_eq!(Lens::Fisheye([0.0; 4]).domain(), f64::INFINITY);
+    }
+}

@@ -1,0 +1,314 @@
+//! A calibrated camera: pixels of points, and the rays behind pixels, through its lens.
+
+mod lens;
+
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use crate::error::CameraError;
+use crate::math::Vec3;
+
+pub use lens::Lens;
+
+/// Pixels of an image at most, those of an 8K picture: more would be a mistyped size, and memory by the gigabyte.
+pub const MOST_PIXELS: usize = 1 << 25;
+/// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
+pub const NEAREST_SEEN: f64 = 0.05;
+/// Parts into which a side of a rectangle is cut to follow its picture through a lens.
+const SIDE_PARTS: usize = 16;
+
+/// A calibrated camera in its optical frame: x right, y down, z forward, metres. Integer pixel coordinates are pixel centres.
+///
+/// The one camera model of the tracker: images carry a reference to theirs. A point `(x, y, z)` is seen in the pixel
+/// `(fx X + cx, fy Y + cy)`, where `(X, Y)` is where the [`Lens`] puts `(x/z, y/z)`.
+///
+/// ```
+/// use voodoo_core::camera::{Camera, Lens};
+/// use voodoo_core::math::Vec3;
+///
+/// # fn main() -> Result<(), voodoo_core::CameraError> {
+/// let lens = Lens::PlumbBob([-0.25, 0.08, 0.001, -0.002, 0.0]);
+/// let camera = Camera::new(320, 240, [250.0, 252.0, 161.0, 118.0], lens)?;
+/// let pixel = camera.project(Vec3::new(0.4, -0.3, 2.0)).unwrap();
+/// let [x, y] = camera.ray(pixel).unwrap();
+/// assert!((x - 0.2).abs() < 1e-12 && (y + 0.15).abs() < 1e-12);
+/// assert_eq!(camera.project(Vec3::new(0.0, 0.0, -1.0)), None);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Camera {
+    width: usize,
+    height: usize,
+    focal: [f64; 2],
+    center: [f64; 2],
+    lens: Lens,
+    /// Of the lens, see [`Lens::domain`].
+    domain: f64,
+    table: OnceLock<Arc<RayTable>>,
+}
+
+/// The rays of all pixels.
+#[derive(Debug)]
+struct RayTable {
+    rays: Box<[[f32; 2]]>,
+    /// Least and greatest of them.
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl PartialEq for Camera {
+    fn eq(&self, other: &Self) -> bool {
+        let plain = |camera: &Self| (camera.width, camera.height, camera.focal, camera.center, camera.lens);
+        plain(self) == plain(other)
+    }
+}
+
+impl Camera {
+    /// A camera of `width` x `height` pixels with the `intrinsics` `(fx, fy, cx, cy)`, pixels.
+    ///
+    /// # Errors
+    /// [`CameraError`] unless there are 1 to [`MOST_PIXELS`] pixels, the focal lengths are above zero, and all numbers are finite.
+    pub fn new(width: usize, height: usize, intrinsics: [f64; 4], lens: Lens) -> Result<Self, CameraError> {
+        if !width.checked_mul(height).is_some_and(|count| (1..=MOST_PIXELS).contains(&count)) {
+            return Err(CameraError::new("size", "1 to 33554432 pixels", format!("{width}x{height}")));
+        }
+        let [fx, fy, cx, cy] = intrinsics;
+        if !(fx > 0.0 && fy > 0.0 && fx.is_finite() && fy.is_finite()) {
+            return Err(CameraError::new("fx, fy", "finite focal lengths above zero", format!("{fx}, {fy}")));
+        }
+        if !(cx.is_finite() && cy.is_finite()) {
+            return Err(CameraError::new("cx, cy", "a finite principal point", format!("{cx}, {cy}")));
+        }
+        if !lens.coefficients().iter().all(|value| value.is_finite()) {
+            return Err(CameraError::new("distortion", "finite coefficients", format!("{:?}", lens.coefficients())));
+        }
+        let table = OnceLock::new();
+        Ok(Self { width, height, focal: [fx, fy], center: [cx, cy], lens, domain: lens.domain(), table })
+    }
+
+    /// The same without distortion.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> Result<Self, CameraError> {
+        Self::new(width, height, intrinsics, Lens::Pinhole)
+    }
+
+    /// Columns of the image.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows of the image.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Pixels of the image.
+    pub fn pixels(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Focal lengths `fx` and `fy`, pixels.
+    pub fn focal(&self) -> [f64; 2] {
+        self.focal
+    }
+
+    /// Principal point `cx` and `cy`, pixels.
+    pub fn center(&self) -> [f64; 2] {
+        self.center
+    }
+
+    /// The lens.
+    pub fn lens(&self) -> Lens {
+        self.lens
+    }
+
+    /// Whether straight lines may be seen bent.
+    #[inline(always)]
+    pub fn distorts(&self) -> bool {
+        !matches!(self.lens, Lens::Pinhole)
+    }
+
+    /// Column and row in which a point of the camera's frame is seen; inside of the image or not. None at the camera's plane or
+    /// behind it, and where the lens does not put points: beyond the radius at which its distortion stops growing.
+    #[inline]
+    pub fn project(&self, point: Vec3) -> Option<[f64; 2]> {
+        if !(point.z > 0.0) {
+            return None;
+        }
+        if self.distorts() {
+            return self.pixel([point.x / point.z, point.y / point.z]);
+        }
+        let ([fx, fy], [cx, cy]) = (self.focal, self.center);
+        Some([fx * point.x / point.z + cx, fy * point.y / point.z + cy])
+    }
+
+    /// Column and row in which all points on the ray through `(x/z, y/z)` are seen; none as of [`Camera::project`].
+    #[inline(always)]
+    pub fn pixel(&self, ray: [f64; 2]) -> Option<[f64; 2]> {
+        let [x, y] = if self.distorts() { self.lens.distorted(ray, self.domain)? } else { ray };
+        Some([x * self.focal[0] + self.center[0], y * self.focal[1] + self.center[1]])
+    }
+
+    /// Index of the pixel in which a point of the camera's frame is seen, row by row; none outside of the image.
+    #[inline(always)]
+    pub fn index_of(&self, point: Vec3) -> Option<usize> {
+        let near = 1.0 / point.z;
+        let [u, v] = self.pixel([point.x * near, point.y * near])?;
+        // Half a pixel on, so that cutting off rounds.
+        let (column, row) = (u + 0.5, v + 0.5);
+        let inside = column >= 0.0 && row >= 0.0 && column < self.width as f64 && row < self.height as f64;
+        // Within the image; a signed cast costs least.
+        (inside && point.z > 0.0).then(|| row as i32 as usize * self.width + column as i32 as usize)
+    }
+
+    /// `(x/z, y/z)` of the points that are seen at a column and row, whole or not; none where the lens puts nothing.
+    ///
+    /// Polynomial lenses are inverted by Newton's method in double precision, to 1e-12 in `x/z` and better.
+    #[inline]
+    pub fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 2]> {
+        let at = [(u - self.center[0]) / self.focal[0], (v - self.center[1]) / self.focal[1]];
+        if self.distorts() { self.lens.undistorted(at, self.domain) } else { Some(at) }
+    }
+
+    /// `(x/z, y/z)` of a pixel's center; of a distorting lens as in [`Camera::rays`].
+    #[inline(always)]
+    pub fn pixel_ray(&self, column: usize, row: usize) -> [f64; 2] {
+        if self.distorts() {
+            return self.rays()[row * self.width + column].map(f64::from);
+        }
+        [(column as f64 - self.center[0]) / self.focal[0], (row as f64 - self.center[1]) / self.focal[1]]
+    }
+
+    /// `(x/z, y/z)` of all pixels' centers, row by row; NaN where the lens puts nothing. Found once.
+    #[inline]
+    pub fn rays(&self) -> &[[f32; 2]] {
+        &self.table().rays
+    }
+
+    #[inline]
+    fn table(&self) -> &RayTable {
+        self.table.get_or_init(|| Arc::new(self.find_rays()))
+    }
+
+    #[cold]
+    fn find_rays(&self) -> RayTable {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let mut rays = Vec::with_capacity(self.pixels());
+        for row in 0..self.height {
+            for column in 0..self.width {
+                let ray = self.ray([column as f64, row as f64]).unwrap_or([f64::NAN; 2]);
+                for axis in 0..2 {
+                    (low[axis], high[axis]) = (low[axis].min(ray[axis]), high[axis].max(ray[axis]));
+                }
+                rays.push(ray.map(|value| value as f32));
+            }
+        }
+        RayTable { rays: rays.into_boxed_slice(), low, high }
+    }
+
+    /// `x/z` and `y/z` of every `stride`th pixel of a row from `start` on, `count` of them, in single precision: whole SIMD registers
+    /// at once. What lies beyond the last of them means nothing.
+    #[inline(always)]
+    pub(crate) fn row_rays<const N: usize>(
+        &self,
+        row: usize,
+        start: usize,
+        stride: usize,
+        count: usize,
+    ) -> [[f32; N]; 2] {
+        let ([fx, fy], [cx, cy]) = (self.focal.map(|value| value as f32), self.center.map(|value| value as f32));
+        let mut x = [0.0; N];
+        let mut y = [(row as f32 - cy) * (1.0 / fy); N];
+        if self.distorts() {
+            let rays = self.rays()[row * self.width + start..].iter().step_by(stride);
+            for ((x, y), ray) in x.iter_mut().zip(&mut y).zip(rays).take(count) {
+                (*x, *y) = (ray[0], ray[1]);
+            }
+        } else {
+            let inverse = 1.0 / fx;
+            for (x, offset) in x.iter_mut().zip(0_i32..) {
+                *x = ((start as i32 + offset * stride as i32) as f32 - cx) * inverse;
+            }
+        }
+        [x, y]
+    }
+
+    /// How far a point is seen to move along the direction `along` of the image with its place: pixels a metre, camera frame. With the
+    /// image's axes these are the rows of the projection's Jacobian. None where [`Camera::project`] has none.
+    #[inline]
+    pub fn gradient(&self, point: Vec3, along: [f64; 2]) -> Option<Vec3> {
+        if !(point.z > 0.0) {
+            return None;
+        }
+        let mut by = [along[0] * self.focal[0], along[1] * self.focal[1]];
+        if self.distorts() {
+            let [[a, b], [c, d]] = self.lens.derivative([point.x / point.z, point.y / point.z], self.domain)?;
+            by = [by[0] * a + by[1] * c, by[0] * b + by[1] * d];
+        }
+        let (x, y) = (by[0] / point.z, by[1] / point.z);
+        Some(Vec3::new(x, y, -(x * point.x + y * point.y) / point.z))
+    }
+
+    /// Columns and rows that can show anything within the convex hull of `corners`, camera frame: the whole image when one of them is
+    /// nearer than [`NEAREST_SEEN`].
+    pub fn window(&self, corners: impl IntoIterator<Item = Vec3>) -> [Range<usize>; 2] {
+        let whole = [0..self.width, 0..self.height];
+        let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+        let mut take = |place: [f64; 2]| {
+            for (axis, value) in place.into_iter().enumerate() {
+                (low[axis], high[axis]) = (low[axis].min(value), high[axis].max(value));
+            }
+        };
+        for corner in corners {
+            if !(corner.z >= NEAREST_SEEN) {
+                return whole;
+            }
+            let bend = self.distorts();
+            take(self.project(corner).filter(|_| !bend).unwrap_or([corner.x / corner.z, corner.y / corner.z]));
+        }
+        if self.distorts() {
+            match self.bounds(low, high) {
+                Some(bounds) => (low, high) = bounds,
+                None => return whole,
+            }
+        }
+        let range = |axis: usize, size: usize| {
+            let start = low[axis].floor().clamp(0.0, size as f64) as usize;
+            let end = (high[axis].ceil() + 1.0).clamp(0.0, size as f64) as usize;
+            start..end.max(start)
+        };
+        [range(0, self.width), range(1, self.height)]
+    }
+
+    /// Least and greatest column and row of what a distorting lens shows of a rectangle of rays; none when it does not show all of its
+    /// border. A lens puts the rectangle within the picture of its border.
+    fn bounds(&self, low: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64; 2])> {
+        // What no pixel sees does not matter.
+        let table = self.table();
+        let within = |corner: [f64; 2]| [0, 1].map(|axis| corner[axis].max(table.low[axis]).min(table.high[axis]));
+        let [low, high] = [within(low), within(high)];
+        let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
+        let (mut least, mut most) = ([f64::MAX; 2], [f64::MIN; 2]);
+        // Between two places on a side its picture bulges by less than their second differences.
+        let mut bulge = [0.0_f64; 2];
+        for side in 0..4 {
+            let (from, to) = (corners[side], corners[(side + 1) % 4]);
+            let mut before: [Option<[f64; 2]>; 2] = [None; 2];
+            for part in 0..=SIDE_PARTS {
+                let share = part as f64 / SIDE_PARTS as f64;
+                let place = self.pixel([0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])))?;
+                for axis in 0..2 {
+                    (least[axis], most[axis]) = (least[axis].min(place[axis]), most[axis].max(place[axis]));
+                    if let [Some(first), Some(second)] = before {
+                        bulge[axis] = bulge[axis].max((first[axis] - 2.0 * second[axis] + place[axis]).abs());
+                    }
+                }
+                before = [before[1], Some(place)];
+            }
+        }
+        Some(([0, 1].map(|axis| least[axis] - bulge[axis]), [0, 1].map(|axis| most[axis] + bulge[axis])))
+    }
+}

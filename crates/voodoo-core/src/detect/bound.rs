@@ -1,0 +1,164 @@
+//! A detector that was handed in, bound to a body.
+
+use super::{Detect, DetectError, Detected, Detection, DetectionQuery, JointMap, Surroundings, place, world_point};
+use crate::body::Body;
+use crate::math::{Aabb, Vec3, is_place};
+use crate::observation::frame::DepthImage;
+
+/// A detection, and where it puts the body.
+#[derive(Clone, Debug)]
+pub struct PlacedDetection {
+    /// Its number among those of its image, for [`Detect::reject`].
+    pub index: usize,
+    /// The body's root, world frame, metres.
+    pub root: Vec3,
+    /// The detection.
+    pub detection: Detection,
+}
+
+/// No detector, or one with its names resolved on a body. What it reports is checked.
+#[derive(Debug, Default)]
+pub struct BoundDetector {
+    detector: Option<Box<dyn Detect>>,
+    map: JointMap,
+    knows: bool,
+    error: Option<DetectError>,
+}
+
+impl BoundDetector {
+    /// Takes a detector for this body.
+    pub fn set(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
+        self.detector = detector;
+        self.bind(body);
+    }
+
+    /// The body has changed.
+    pub fn bind(&mut self, body: &Body) {
+        let detector = self.detector.as_deref();
+        self.map = detector
+            .map_or_else(JointMap::default, |detector| JointMap::new(body, &detector.joints(), &detector.lengths()));
+        self.knows = detector.is_some_and(|detector| detector.knows(body));
+    }
+
+    /// Whether there is a detector, and it can find the body.
+    pub fn knows(&self) -> bool {
+        self.knows
+    }
+
+    /// What its joints are on the body.
+    pub fn map(&self) -> &JointMap {
+        &self.map
+    }
+
+    /// Another detector of the same kind that has seen nothing.
+    pub fn fresh(&self) -> Option<Box<dyn Detect>> {
+        self.detector.as_ref().map(|detector| detector.fresh())
+    }
+
+    /// The last error since [`Self::clear_error`].
+    pub fn error(&self) -> Option<&DetectError> {
+        self.error.as_ref()
+    }
+
+    /// Forgets the last error.
+    pub fn clear_error(&mut self) {
+        self.error = None;
+    }
+
+    /// The persons that it reports of an image; of [`DetectionQuery::Near`] the nearest alone. Nobody where it fails or reports what
+    /// cannot be meant, see [`Self::error`].
+    pub fn look(
+        &mut self,
+        body: &Body,
+        image: &DepthImage,
+        around: &Surroundings,
+        query: DetectionQuery,
+    ) -> Vec<PlacedDetection> {
+        let Some(detector) = self.detector.as_mut() else { return Vec::new() };
+        let checked = detector.detect(image, around, query).and_then(|found| {
+            let each = found.iter().enumerate();
+            each.into_iter().try_for_each(|(index, detection)| check(index, detection, &self.map, image))?;
+            Ok(found)
+        });
+        let found = match checked {
+            Ok(found) => found,
+            Err(error) => {
+                self.error = Some(error);
+                return Vec::new();
+            }
+        };
+        let map = &self.map;
+        let placed = |(index, detection): (usize, Detection)| {
+            let root = place(body, Detected { detection: &detection, map })?;
+            Some(PlacedDetection { index, root, detection: with_pixels(detection, image, around) })
+        };
+        let mut found: Vec<PlacedDetection> = found.into_iter().enumerate().filter_map(placed).collect();
+        if let DetectionQuery::Near(near) = query {
+            let apart = |placed: &PlacedDetection| placed.root.distance(near);
+            found = found.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).into_iter().collect();
+        }
+        found
+    }
+
+    /// See [`Detect::nearest`].
+    pub fn nearest(&self) -> Option<(f64, Aabb)> {
+        self.detector.as_ref().filter(|_| self.error.is_none())?.nearest()
+    }
+
+    /// See [`Detect::reject`].
+    pub fn reject(&mut self, index: usize) {
+        if let Some(detector) = &mut self.detector {
+            detector.reject(index);
+        }
+    }
+}
+
+/// The detection with its pixels: those that lie within its box where the detector does not report them.
+fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundings) -> Detection {
+    if detection.pixels.is_empty() {
+        let bounds = Aabb { mins: detection.low, maxs: detection.high };
+        let mut depth = Vec::new();
+        around.open_depth(image, &mut depth);
+        let within = |index: &usize| bounds.contains(world_point(image, *index, depth[*index]));
+        detection.pixels = (0..depth.len()).filter(|index| depth[*index] > 0.0).filter(within).collect();
+    }
+    detection
+}
+
+/// Refuses a detection that cannot be meant.
+fn check(index: usize, detection: &Detection, map: &JointMap, image: &DepthImage) -> Result<(), DetectError> {
+    let wrong = |what: &str, expected: String, found: String| -> Result<(), DetectError> {
+        Err(format!("detection[{index}].{what}: expected {expected}, found {found}").into())
+    };
+    let Detection { joints, lengths, facing, person, low, high, floor, pixels } = detection;
+    if joints.len() != map.sites.len() {
+        return wrong("joints", format!("{}, as the detector names them", map.sites.len()), joints.len().to_string());
+    }
+    if !lengths.is_empty() && lengths.len() != map.lengths {
+        return wrong("lengths", format!("{}, as the detector names them", map.lengths), lengths.len().to_string());
+    }
+    for (number, joint) in joints.iter().enumerate().filter_map(|(number, joint)| Some((number, joint.as_ref()?))) {
+        if !is_place(joint.position) {
+            return wrong(&format!("joints[{number}]"), "finite metres".into(), format!("{:?}", joint.position));
+        }
+        if !(joint.sigma > 0.0 && joint.sigma.is_finite()) {
+            return wrong(&format!("joints[{number}].sigma"), "finite metres > 0".into(), joint.sigma.to_string());
+        }
+    }
+    if let Some(pair) = lengths.iter().find(|pair| !pair.iter().all(|value| *value > 0.0 && value.is_finite())) {
+        return wrong("lengths", "finite numbers > 0".into(), format!("{pair:?}"));
+    }
+    if person.is_nan() || facing.is_some_and(f64::is_nan) {
+        return wrong("person and facing", "log odds".into(), "no number".into());
+    }
+    if !(is_place(*low) && is_place(*high)) {
+        return wrong("low and high", "finite metres".into(), format!("{low:?} and {high:?}"));
+    }
+    if let Some(floor) = floor.filter(|floor| !floor.normal.is_finite() || !floor.offset.is_finite()) {
+        return wrong("floor", "finite numbers".into(), format!("{floor:?}"));
+    }
+    match pixels.iter().find(|pixel| **pixel >= image.pixels.len()) {
+        Some(pixel) => wrong("pixels", format!("indices below {}", image.pixels.len()), pixel.to_string()),
+        None => Ok(()),
+    }
+}

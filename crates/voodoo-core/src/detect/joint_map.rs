@@ -1,0 +1,161 @@
+//! A detector's names on a body: resolved once, when the detector or the body is set.
+
+use super::skeleton::Skeleton;
+use super::{DetectedJoint, Detection};
+use crate::body::Body;
+
+/// The site that tells where a body is (H-Anim).
+const ROOT: &str = "humanoid_root";
+/// Joints that tell where the trunk is and which way round, by side.
+const TRUNK: [&str; 2] = ["shoulder", "hip"];
+const LEGS: [&str; 2] = ["knee", "ankle"];
+const ARMS: [&str; 2] = ["elbow", "wrist"];
+const ANKLES: [&str; 1] = ["ankle"];
+/// The length of a limb by the joint that it hangs by; what hangs by another joint is a part of the trunk.
+const LENGTH_OF_LIMB: [(&str, &str); 6] = [
+    ("sternoclavicular", "shoulder_width"),
+    ("shoulder", "upper_arm"),
+    ("elbow", "forearm"),
+    ("hip", "thigh"),
+    ("knee", "shank"),
+    ("vc7", "neck"),
+];
+const TRUNK_LENGTH: &str = "trunk";
+const STATURE: &str = "stature";
+
+/// What a detector's joints and lengths are on a body. Joints and lengths are numbered as the detector does.
+#[derive(Clone, Debug, Default)]
+pub struct JointMap {
+    /// The body's site with the name of each joint.
+    pub(super) sites: Vec<Option<usize>>,
+    /// Number of lengths.
+    pub(super) lengths: usize,
+    /// Joints and lengths of a person's skeleton.
+    pub(super) skeleton: Skeleton,
+    root: Option<usize>,
+    trunk: Vec<usize>,
+    legs: Vec<usize>,
+    arms: Vec<usize>,
+    ankles: Vec<usize>,
+    /// Of every limb, the joint that it hangs by, the other joints on it, and its length.
+    hangs_by: Vec<Option<usize>>,
+    on_limb: Vec<Vec<usize>>,
+    length_of_limb: Vec<Option<usize>>,
+    stature: Option<usize>,
+}
+
+impl JointMap {
+    /// The joints and lengths with these names on a body.
+    pub fn new(body: &Body, joints: &[String], lengths: &[String]) -> Self {
+        let sites: Vec<Option<usize>> = joints.iter().map(|name| body.site_index(name).ok()).collect();
+        let number = |name: &str| joints.iter().position(|joint| joint == name);
+        let joint = |name: &str| number(name).filter(|index| sites[*index].is_some());
+        let length = |name: &str| lengths.iter().position(|length| length == name);
+        // Left before right: sums depend on the order.
+        let of_sides = |stems: &[&str]| -> Vec<usize> {
+            stems.iter().flat_map(|stem| ["l", "r"].map(|side| joint(&format!("{side}_{stem}")))).flatten().collect()
+        };
+        let mut trunk = of_sides(&TRUNK);
+        if trunk.is_empty() {
+            trunk = (0..joints.len()).filter(|index| sites[*index].is_some()).collect();
+        }
+        let hangs_by = |limb: usize| body.limbs()[limb].parent.as_ref().map(|(_, joint)| joint.name.as_str());
+        let limbs = 0..body.limbs().len();
+        let on_limb = |limb: usize| {
+            let own =
+                body.sites().iter().filter(|site| site.limb == limb && hangs_by(limb) != Some(site.name.as_str()));
+            own.filter_map(|site| number(&site.name)).collect()
+        };
+        let length_of_limb = |limb: usize| {
+            let joint = hangs_by(limb).unwrap_or_default();
+            let stem = joint.trim_start_matches("l_").trim_start_matches("r_");
+            let name = LENGTH_OF_LIMB.iter().find(|(by, _)| *by == stem).map_or(TRUNK_LENGTH, |(_, name)| name);
+            length(name)
+        };
+        Self {
+            skeleton: Skeleton::new(joint, length),
+            root: joint(ROOT),
+            trunk,
+            legs: of_sides(&LEGS),
+            arms: of_sides(&ARMS),
+            ankles: of_sides(&ANKLES),
+            hangs_by: limbs.clone().map(|limb| hangs_by(limb).and_then(number)).collect(),
+            on_limb: limbs.clone().map(on_limb).collect(),
+            length_of_limb: limbs.map(length_of_limb).collect(),
+            stature: length(STATURE),
+            lengths: lengths.len(),
+            sites,
+        }
+    }
+
+    /// The body's site of a joint.
+    pub fn site(&self, joint: usize) -> Option<usize> {
+        self.sites.get(joint).copied().flatten()
+    }
+
+    /// Joints that tell where the trunk is and which way round; of a body without shoulders and hips all that it has.
+    pub fn trunk(&self) -> &[usize] {
+        &self.trunk
+    }
+
+    /// Knees and ankles.
+    pub fn legs(&self) -> &[usize] {
+        &self.legs
+    }
+
+    /// Elbows and wrists.
+    pub fn arms(&self) -> &[usize] {
+        &self.arms
+    }
+
+    /// The length of every limb of the body, if the detector reports it; the parts of the trunk share one.
+    pub fn length_of_limb(&self) -> &[Option<usize>] {
+        &self.length_of_limb
+    }
+
+    /// The stature, if the detector reports it.
+    pub fn stature(&self) -> Option<usize> {
+        self.stature
+    }
+
+    /// The joint that is the body's root, if the detector reports it.
+    pub(super) fn root(&self) -> Option<usize> {
+        self.root
+    }
+}
+
+/// A detection, and what its joints are on the body.
+#[derive(Clone, Copy, Debug)]
+pub struct Detected<'a> {
+    /// The detection.
+    pub detection: &'a Detection,
+    /// Its joints and lengths on the body.
+    pub map: &'a JointMap,
+}
+
+impl<'a> Detected<'a> {
+    /// A joint by its number.
+    pub fn joint(&self, index: usize) -> Option<&'a DetectedJoint> {
+        self.detection.joints.get(index)?.as_ref()
+    }
+
+    /// The joint that a limb hangs by.
+    pub fn hangs_by(&self, limb: usize) -> Option<&'a DetectedJoint> {
+        self.joint(self.map.hangs_by.get(limb).copied().flatten()?)
+    }
+
+    /// The first joint found on a limb that is not the one that it hangs by.
+    pub fn on_limb(&self, limb: usize) -> Option<&'a DetectedJoint> {
+        self.map.on_limb.get(limb)?.iter().find_map(|joint| self.joint(*joint))
+    }
+
+    /// The ankles that were found.
+    pub fn ankles(&self) -> impl Iterator<Item = &'a DetectedJoint> + '_ {
+        self.map.ankles.iter().filter_map(|joint| self.joint(*joint))
+    }
+
+    /// A length and its relative standard deviation, by its number.
+    pub fn length(&self, index: usize) -> Option<[f64; 2]> {
+        self.detection.lengths.get(index).copied()
+    }
+}

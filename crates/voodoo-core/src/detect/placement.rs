@@ -1,0 +1,75 @@
+//! A body where a detector sees a person.
+
+use super::Detected;
+use crate::body::{Body, Model};
+use crate::math::{Pose, Vec3};
+
+/// A body of a detected person's sizes, like on both sides, and the pose that fits the joints best, world frame.
+pub(crate) fn sized(model: &Model, detected: Detected) -> Option<(Body, Vec<Pose>)> {
+    let body = with_sizes(&model.reference_body, detected)?;
+    let poses = posed(&body, detected)?;
+    Some((body, poses))
+}
+
+/// The pose of a body that fits a detected person's joints best, world frame.
+pub(crate) fn posed(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
+    let mut joints = positions_of(detected);
+    let skeleton = &detected.map.skeleton;
+    skeleton.take_lengths(&mut joints, &skeleton.measure(&at_rest(body, &detected.map.sites)));
+    body.fit(&positions(&detected.map.sites, &joints), false).ok().map(|(_, poses)| poses)
+}
+
+/// Where the root of a detected person is, world frame: where the detector sees it, else where the body's would be.
+pub(crate) fn place(body: &Body, detected: Detected) -> Option<Vec3> {
+    match detected.map.root().and_then(|root| detected.joint(root)) {
+        Some(root) => Some(root.position),
+        None => posed(body, detected).and_then(|poses| poses.first().map(|root| root.translation)),
+    }
+}
+
+/// Whether a body has the sizes of a detected person, each within so many of its standard deviations.
+pub(crate) fn is_sized_like(body: &Body, detected: Detected, sigmas: f64) -> bool {
+    let skeleton = &detected.map.skeleton;
+    let own = skeleton.measure(&at_rest(body, &detected.map.sites));
+    let both =
+        own.into_iter().zip(skeleton.reported(&detected.detection.lengths)).filter_map(|(own, seen)| own.zip(seen));
+    both.into_iter().all(|(own, [length, sigma])| (own / length).ln().abs() <= sigmas * sigma)
+}
+
+/// Whether the sites with these names fix the pose of a body.
+pub(super) fn fixes_pose(body: &Body, names: &[String]) -> bool {
+    let sites: Vec<Option<usize>> = names.iter().map(|name| body.site_index(name).ok()).collect();
+    body.fit(&positions(&sites, &at_rest(body, &sites)), false).is_ok()
+}
+
+/// The body with a detected person's lengths, like on both sides: those that are reported, or else the joints' distances.
+fn with_sizes(reference: &Body, detected: Detected) -> Option<Body> {
+    let Detected { detection, map } = detected;
+    let lengths = match map.lengths {
+        0 => map.skeleton.measure(&positions_of(detected)),
+        _ => map.skeleton.reported(&detection.lengths).map(|length| length.map(|[length, _]| length)),
+    };
+    if lengths.iter().all(Option::is_none) {
+        return Some(reference.clone());
+    }
+    let mut joints = at_rest(reference, &map.sites);
+    map.skeleton.take_lengths(&mut joints, &lengths);
+    reference.fit(&positions(&map.sites, &joints), true).ok().map(|(body, _)| body)
+}
+
+/// Where a detector sees joints that the body has.
+fn positions_of(detected: Detected) -> Vec<Option<Vec3>> {
+    let sites = detected.map.sites.iter().enumerate();
+    sites.map(|(index, site)| site.and_then(|_| detected.joint(index)).map(|joint| joint.position)).collect()
+}
+
+/// Where a body's sites are at rest.
+fn at_rest(body: &Body, sites: &[Option<usize>]) -> Vec<Option<Vec3>> {
+    let rest = body.rest_pose(Pose::IDENTITY);
+    sites.iter().map(|site| site.map(|site| body.site_position(&rest, site))).collect()
+}
+
+/// Sites with their positions.
+fn positions(sites: &[Option<usize>], joints: &[Option<Vec3>]) -> Vec<(usize, Vec3)> {
+    sites.iter().zip(joints).filter_map(|(site, joint)| site.zip(*joint)).collect()
+}

@@ -1,0 +1,115 @@
+//! Where the body is at other times than the last frame's, by the last two estimates.
+
+use super::Tracker;
+use super::estimate::Estimate;
+use crate::error::TrackError;
+use crate::math::{Pose, Vec3};
+
+/// A site that is faster, metres a second, has jumped: it is expected to rest.
+const FASTEST_SITE: f64 = 8.0;
+
+/// What is kept of the estimate before the last one.
+#[derive(Debug, Default)]
+pub(super) struct Before {
+    stamp: f64,
+    world_from_limb: Vec<Pose>,
+    sites: Vec<Vec3>,
+}
+
+impl Before {
+    /// Keeps an estimate; another one follows.
+    pub(super) fn keep(&mut self, estimate: &Estimate) {
+        self.stamp = estimate.stamp;
+        self.world_from_limb.clone_from(&estimate.world_from_limb);
+        self.sites.clone_from(&estimate.sites);
+    }
+}
+
+/// Poses of all limbs in the last two estimates, world.
+#[derive(Clone, Copy, Debug)]
+pub struct LimbMotion<'a> {
+    /// In the last one.
+    pub now: &'a [Pose],
+    /// In the one before.
+    pub before: &'a [Pose],
+    /// Time between the two, seconds.
+    pub interval: f64,
+}
+
+impl Tracker {
+    /// How limbs moved between the last two estimates; none where they do not belong together, as after a reset.
+    pub fn limb_motion(&self) -> Option<LimbMotion<'_>> {
+        let (before, now) = (&self.before, &self.estimate);
+        let interval = now.stamp - before.stamp;
+        let same = before.world_from_limb.len() == now.world_from_limb.len() && before.sites.len() == now.sites.len();
+        (interval > 0.0 && same).then_some(LimbMotion {
+            now: &now.world_from_limb,
+            before: &before.world_from_limb,
+            interval,
+        })
+    }
+
+    /// Where every site is expected at a time, world, metres: the last estimate moved on by the share of its motion that is expected to
+    /// go on ([`crate::Config::prediction`]).
+    ///
+    /// # Errors
+    /// [`TrackError::NotInitialised`] without a pose.
+    pub fn expected_sites(&self, stamp: f64) -> Result<Vec<Vec3>, TrackError> {
+        if !self.is_started() {
+            return Err(TrackError::NotInitialised);
+        }
+        let sites = &self.estimate.sites;
+        let Some(LimbMotion { interval, .. }) = self.limb_motion() else { return Ok(sites.clone()) };
+        let elapsed = self.config.prediction * (stamp - self.estimate.stamp);
+        let moved = |(place, before): (&Vec3, &Vec3)| {
+            let velocity = (*place - *before) / interval;
+            if velocity.length() <= FASTEST_SITE { *place + elapsed * velocity } else { *place }
+        };
+        Ok(sites.iter().zip(&self.before.sites).map(moved).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::{Body, Config};
+
+    /// A tracker whose body went from one place to another in a tenth of a second.
+    fn moved(shift: Vec3) -> Tracker {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let mut tracker = Tracker::new(body.clone(), Config { prediction: 0.5, ..Config::default() }).unwrap();
+        assert!(matches!(tracker.expected_sites(0.0), Err(TrackError::NotInitialised)));
+        tracker.reset_pose(&body.rest_pose(Pose::IDENTITY)).unwrap();
+        tracker.before.keep(&tracker.estimate);
+        tracker.reset_pose(&body.rest_pose(Pose::from_translation(shift))).unwrap();
+        (tracker.before.stamp, tracker.estimate.stamp) = (0.0, 0.1);
+        tracker
+    }
+
+    #[test]
+    fn sites_go_on_by_a_share_of_their_motion_and_rest_after_a_jump() {
+        let step = Vec3::new(0.1, -0.02, 0.0);
+        let tracker = moved(step);
+        let now = tracker.estimate.sites.clone();
+        for (elapsed, share) in [(0.0, 0.0), (0.1, 0.5), (-0.02, -0.1)] {
+            let expected = tracker.expected_sites(0.1 + elapsed).unwrap();
+            assert!(expected.iter().zip(&now).all(|(site, now)| site.distance(*now + share * step) < 1e-12));
+        }
+        let jumped = moved(Vec3::new(2.0, 0.0, 0.0));
+        assert_eq!(jumped.expected_sites(0.2).unwrap(), jumped.estimate.sites);
+    }
+
+    #[test]
+    fn nothing_is_known_of_the_motion_after_a_reset_or_with_another_body() {
+        let mut tracker = moved(Vec3::X);
+        assert_eq!(tracker.limb_motion().unwrap().interval, 0.1);
+        tracker.remove_limb("l_hand").unwrap();
+        assert!(tracker.limb_motion().is_none());
+        let mut tracker = moved(Vec3::X);
+        let poses = tracker.estimate.world_from_limb.clone();
+        tracker.reset_pose(&poses).unwrap();
+        assert!(tracker.limb_motion().is_none());
+        assert_eq!(tracker.expected_sites(9.0).unwrap(), tracker.estimate.sites);
+    }
+}

@@ -1,0 +1,121 @@
+//! Places on the surface of a limb that face a camera, and what the camera shows there: the one walk over a limb's surface.
+
+use crate::math::{Pose, Vec3};
+use crate::observation::depth_view::{DepthView, Pixel};
+use crate::shape::{FacingSection, TaperedEllipticCylinder};
+use crate::visibility::ALONG_LIMB;
+use crate::visibility::evidence::EXPLAINED;
+
+/// What a camera says about a place on the model's surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// Outside the image, or no return.
+    Unknown,
+    /// Behind what is seen.
+    Occluded,
+    /// Seen where it is.
+    Consistent,
+    /// The camera sees past it.
+    FreeSpace,
+}
+
+/// A place on a limb's surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePlace {
+    /// Camera frame, metres.
+    pub point: Vec3,
+    /// What is seen in its pixel.
+    pub pixel: Pixel,
+}
+
+impl SurfacePlace {
+    /// What the camera says about it.
+    #[inline]
+    pub fn sight(&self) -> Sight {
+        let surface = self.point.z;
+        let (z, past) = match self.pixel {
+            Pixel::Unknown => return Sight::Unknown,
+            Pixel::Background(z) => (z, EXPLAINED),
+            Pixel::Foreground(z) | Pixel::Other(z) => (z, 2.0 * EXPLAINED),
+        };
+        if z > surface + past {
+            Sight::FreeSpace
+        } else if z > surface - 2.0 * EXPLAINED {
+            Sight::Consistent
+        } else {
+            Sight::Occluded
+        }
+    }
+
+    /// Depth of what may be the body, if it is seen less than `tolerance` before or behind the place, metres.
+    #[inline]
+    pub fn seen_within(&self, tolerance: f64) -> Option<f64> {
+        match self.pixel {
+            Pixel::Foreground(z) if (z - self.point.z).abs() < tolerance => Some(z),
+            _ => None,
+        }
+    }
+}
+
+/// What of a limb faces a camera, at one place along it.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceRow<'a> {
+    /// Share of the limb's length, from its proximal end.
+    pub t: f64,
+    /// The section there.
+    pub facing: FacingSection,
+    camera_from_limb: &'a Pose,
+}
+
+impl SurfaceRow<'_> {
+    /// Places across it, camera frame, metres; in shares of the radius from the middle, see [`FacingSection::point`].
+    #[inline]
+    pub fn points<const N: usize>(&self, across: [f64; N]) -> [Vec3; N] {
+        across.map(|s| *self.camera_from_limb * self.facing.point(s))
+    }
+
+    /// The same with what a camera shows there.
+    #[inline]
+    pub fn places<const N: usize>(&self, view: &DepthView, across: [f64; N]) -> [SurfacePlace; N] {
+        self.points(across).map(|point| SurfacePlace { point, pixel: view.at(point) })
+    }
+}
+
+/// The rows at [`ALONG_LIMB`] of a limb; those along whose axis the camera looks are left out.
+#[inline]
+pub fn surface_rows<'a>(
+    shape: &'a TaperedEllipticCylinder,
+    camera_from_limb: &'a Pose,
+) -> impl Iterator<Item = SurfaceRow<'a>> + 'a {
+    ALONG_LIMB.into_iter().filter_map(move |t| {
+        let facing = shape.section(t).facing(camera_from_limb)?;
+        Some(SurfaceRow { t, facing, camera_from_limb })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_is_seen_past_consistent_or_hidden_by_what_its_pixel_shows() {
+        let point = Vec3::new(0.0, 0.0, 2.0);
+        let sight = |pixel| SurfacePlace { point, pixel }.sight();
+        for (pixel, expected) in [
+            (Pixel::Unknown, Sight::Unknown),
+            (Pixel::Background(f64::INFINITY), Sight::FreeSpace),
+            (Pixel::Background(2.05), Sight::FreeSpace),
+            (Pixel::Background(2.03), Sight::Consistent),
+            (Pixel::Foreground(2.09), Sight::FreeSpace),
+            (Pixel::Other(2.05), Sight::Consistent),
+            (Pixel::Foreground(1.95), Sight::Consistent),
+            (Pixel::Other(1.9), Sight::Occluded),
+            (Pixel::Background(1.9), Sight::Occluded),
+        ] {
+            assert_eq!(sight(pixel), expected, "{pixel:?}");
+        }
+        let seen = |pixel| SurfacePlace { point, pixel }.seen_within(0.04);
+        assert_eq!(seen(Pixel::Foreground(2.03)), Some(2.03));
+        assert!(seen(Pixel::Foreground(2.05)).is_none() && seen(Pixel::Other(2.0)).is_none());
+    }
+}

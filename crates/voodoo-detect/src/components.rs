@@ -1,0 +1,422 @@
+//! What hangs together in a depth image, and which of it may be a person.
+
+use crate::view::View;
+use nalgebra::{Matrix3, Vector3};
+use voodoo_core::math::{Vec3, widest};
+
+/// Neighbouring pixels hang together when their depths differ by less than this, metres, and so much of the depth.
+const STEP: [f32; 2] = [0.04, 0.012];
+/// What is too large for a person is cut again with steps of this share of those before.
+const CUT_FINER: f32 = 0.5;
+/// How often.
+const CUTS: usize = 2;
+/// Surface of a person that a camera sees, square metres: from a head and shoulders to a wide coat.
+const AREA: [f64; 2] = [0.08, 1.7];
+/// Length of a person's box along its longest edge, metres.
+const LENGTH: [f64; 2] = [0.45, 2.5];
+/// Parts smaller than this are noise, square metres.
+const LEAST_PART: f64 = 0.004;
+/// Parts of a person that something hides the link of are at most so far apart, metres.
+const GAP: f64 = 0.28;
+/// Standard deviation of a flat part's points across it, metres: walls and table tops are no people.
+const FLAT_PART: f64 = 0.022;
+/// Points of a part that distances are taken from.
+const PART_SAMPLES: usize = 48;
+/// Parts that are looked at, the largest first.
+const MOST_PARTS: usize = 40;
+/// No label.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// What hangs together; camera frame, metres.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    label: u32,
+    area: f64,
+    low: Vec3,
+    high: Vec3,
+    samples: [Vec3; PART_SAMPLES],
+    sampled: usize,
+    /// Points so far, of which every so manyth was kept.
+    seen: usize,
+    every: usize,
+    flat: bool,
+}
+
+impl Part {
+    fn new(label: u32, area: f64) -> Self {
+        let samples = [Vec3::ZERO; PART_SAMPLES];
+        Self {
+            label,
+            area,
+            low: Vec3::INFINITY,
+            high: Vec3::NEG_INFINITY,
+            samples,
+            sampled: 0,
+            seen: 0,
+            every: 1,
+            flat: false,
+        }
+    }
+
+    /// Takes a point in; of many every so manyth is kept.
+    fn add(&mut self, point: Vec3) {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
+        // A power of two: no division for every pixel.
+        if self.seen & (self.every - 1) == 0 {
+            if self.sampled == PART_SAMPLES {
+                // Half of those that are kept make room.
+                for number in 0..PART_SAMPLES / 2 {
+                    self.samples[number] = self.samples[2 * number];
+                }
+                (self.sampled, self.every) = (PART_SAMPLES / 2, 2 * self.every);
+            }
+            self.samples[self.sampled] = point;
+            self.sampled += 1;
+        }
+        self.seen += 1;
+    }
+}
+
+/// Parts that together may be a person.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Labels of its parts.
+    pub(crate) labels: Vec<u32>,
+    /// Surface seen, square metres.
+    pub area: f64,
+    /// Corners of its box, camera frame.
+    pub low: Vec3,
+    /// The other corner.
+    pub high: Vec3,
+}
+
+impl Candidate {
+    /// Distance of a point in the camera's frame to its box, and a little of that to the box's middle.
+    pub(crate) fn distance(&self, point: Vec3) -> f64 {
+        /// A place within several boxes belongs to the one whose middle is nearest.
+        const TO_MIDDLE: f64 = 0.1;
+        let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
+        outside + TO_MIDDLE * point.distance(self.middle())
+    }
+
+    /// The middle of its box, camera frame.
+    pub(crate) fn middle(&self) -> Vec3 {
+        0.5 * (self.low + self.high)
+    }
+
+    /// Whether both have a part in common.
+    pub(crate) fn shares(&self, other: &Self) -> bool {
+        self.labels.iter().any(|label| other.labels.binary_search(label).is_ok())
+    }
+}
+
+/// Working memory, and what was found in the last image.
+#[derive(Debug, Default)]
+pub(crate) struct Components {
+    /// The label of every pixel: the index of another of its part, or of itself.
+    pub(crate) labels: Vec<u32>,
+    parts: Vec<Part>,
+    /// Every label once, ascending.
+    distinct: Vec<u32>,
+    /// Surface of the part with a label, at the label's place; what stands elsewhere says nothing.
+    areas: Vec<f32>,
+    /// 1 for every pixel that is to be joined to its neighbours.
+    again: Vec<u8>,
+    /// To which of its neighbours each pixel is joined, a bit for each.
+    linked: Vec<u8>,
+}
+
+impl Components {
+    /// What may be a person, the likeliest sizes first.
+    pub(crate) fn find(&mut self, view: &View, candidates: &mut Vec<Candidate>) {
+        self.labels.clear();
+        self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
+        self.again.clear();
+        self.again.resize(view.depth.len(), 1);
+        let mut finer = 1.0;
+        self.join(view, finer);
+        self.measure(view);
+        for _ in 0..CUTS {
+            let too_large = |label: &u32| f64::from(self.areas[*label as usize]) > AREA[1];
+            if !self.distinct.iter().any(too_large) {
+                break;
+            }
+            finer *= CUT_FINER;
+            self.cut(view, finer);
+            self.measure(view);
+        }
+        self.sum_up(view);
+        candidates.clear();
+        self.propose(candidates);
+    }
+
+    /// Takes too large parts apart and joins their pixels again by smaller steps.
+    fn cut(&mut self, view: &View, finer: f32) {
+        let Self { labels, areas, again, .. } = self;
+        again.clear();
+        let too_large = |label: &u32| *label != NONE && f64::from(areas[*label as usize]) > AREA[1];
+        again.extend(labels.iter().map(|label| u8::from(too_large(label))));
+        for ((label, again), index) in labels.iter_mut().zip(again).zip(0..) {
+            if *again > 0 {
+                *label = index;
+            }
+        }
+        self.join(view, finer);
+    }
+
+    /// Joins neighbours, and pixels with one between them, of those that are `again` to be joined.
+    fn join(&mut self, view: &View, finer: f32) {
+        self.link(view, finer);
+        let width = view.width;
+        let mut before = NONE;
+        for index in 0..self.labels.len() {
+            let linked = self.linked[index];
+            // No pixel that came before hangs on this one; the one to the left has just been followed to its root.
+            let mut root = if linked & 1 != 0 { before } else { index as u32 };
+            for (bit, back) in [(1, width), (2, 2), (3, 2 * width)] {
+                if linked & (1 << bit) == 0 || self.labels[index - back] == root {
+                    continue;
+                }
+                let other = self.root((index - back) as u32);
+                self.labels[root.max(other) as usize] = root.min(other);
+                root = root.min(other);
+            }
+            if linked != 0 {
+                self.labels[index] = root;
+            }
+            before = root;
+        }
+        self.distinct.clear();
+        for index in 0..self.labels.len() {
+            let label = self.labels[index];
+            if label != NONE {
+                // It hangs on one that came before it and has its label.
+                self.labels[index] = self.labels[label as usize];
+                if label == index as u32 {
+                    self.distinct.push(label);
+                }
+            }
+        }
+    }
+
+    /// Which of the pixels to the left, above, two to the left and two above each pixel is near it, a bit for each.
+    fn link(&mut self, view: &View, finer: f32) {
+        let Self { linked, again, .. } = self;
+        let width = view.width;
+        linked.clear();
+        linked.resize(view.depth.len(), 0);
+        widest(
+            #[inline(always)]
+            || {
+                for (bit, back) in [1, width, 2, 2 * width].into_iter().enumerate() {
+                    let across = back < width;
+                    // Rows one by one: none has a neighbour in the one before it.
+                    for start in (0..view.depth.len()).step_by(width.max(1)) {
+                        let from = if across { start + back } else { start };
+                        let to = start + width;
+                        if from < back || from >= to {
+                            continue;
+                        }
+                        let (own, others) = (&view.depth[from..to], &view.depth[from - back..to - back]);
+                        let (again, again_others) = (&again[from..to], &again[from - back..to - back]);
+                        let pairs = own.iter().zip(others).zip(again).zip(again_others);
+                        for (linked, (((z, other), again), again_other)) in linked[from..to].iter_mut().zip(pairs) {
+                            let near = (z - other).abs() < finer * (STEP[0] + STEP[1] * z.min(*other));
+                            let seen = (*z > 0.0) & (*other > 0.0);
+                            *linked |= (u8::from(near & seen) & again & again_other) << bit;
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    fn root(&mut self, mut index: u32) -> u32 {
+        loop {
+            let parent = self.labels[index as usize];
+            if parent == index {
+                return index;
+            }
+            let next = self.labels[parent as usize];
+            self.labels[index as usize] = next;
+            index = next;
+        }
+    }
+
+    /// Surface of everything that hangs together.
+    fn measure(&mut self, view: &View) {
+        let Self { labels, areas, distinct, .. } = self;
+        areas.resize(labels.len(), 0.0);
+        for label in distinct {
+            areas[*label as usize] = 0.0;
+        }
+        let area = view.pixel_area() as f32;
+        // Neighbours mostly share their label: their sum need not be written for each.
+        let (mut last, mut sum) = (NONE, 0.0);
+        for (label, z) in labels.iter().zip(&view.depth).filter(|(label, _)| **label != NONE) {
+            if *label != last {
+                if last != NONE {
+                    areas[last as usize] = sum;
+                }
+                (last, sum) = (*label, areas[*label as usize]);
+            }
+            sum += area * z * z;
+        }
+        if last != NONE {
+            areas[last as usize] = sum;
+        }
+    }
+
+    /// Sizes of the parts, the largest first.
+    fn sum_up(&mut self, view: &View) {
+        let Self { labels, parts, areas, distinct, .. } = self;
+        parts.clear();
+        for label in distinct.iter() {
+            let area = f64::from(areas[*label as usize]);
+            if area > LEAST_PART {
+                parts.push(Part::new(*label, area));
+            }
+        }
+        parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
+        parts.truncate(MOST_PARTS);
+        // From here on what stands at a label's place is one more than its part's number.
+        for label in distinct {
+            areas[*label as usize] = 0.0;
+        }
+        for (number, part) in parts.iter().enumerate() {
+            areas[part.label as usize] = number as f32 + 1.0;
+        }
+        for (index, label) in labels.iter().enumerate().filter(|(_, label)| **label != NONE) {
+            if let Some(part) = (areas[*label as usize] as usize).checked_sub(1) {
+                parts[part].add(view.point(index));
+            }
+        }
+        for part in parts.iter_mut() {
+            part.flat = is_flat(&part.samples[..part.sampled]);
+        }
+    }
+
+    /// Every part that may be a person by itself, and with the parts near it.
+    fn propose(&self, candidates: &mut Vec<Candidate>) {
+        for (number, part) in self.parts.iter().enumerate() {
+            if part.area > AREA[1] || part.area < 0.3 * AREA[0] || part.flat {
+                continue;
+            }
+            let alone = Candidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
+            let together = self.with_near_parts(number);
+            for candidate in [alone, together] {
+                let fits = candidate.area > AREA[0] && candidate.area < AREA[1] && {
+                    let length = (candidate.high - candidate.low).max_element();
+                    length > LENGTH[0] && length < LENGTH[1]
+                };
+                if fits && !candidates.contains(&candidate) {
+                    candidates.push(candidate);
+                }
+            }
+        }
+        candidates.sort_by(|a, b| unlikely(a).total_cmp(&unlikely(b)).then(a.labels.cmp(&b.labels)));
+    }
+
+    /// A part and those that lie near it, as long as all of it is no larger than a person.
+    fn with_near_parts(&self, seed: usize) -> Candidate {
+        let mut taken = vec![seed];
+        let part = &self.parts[seed];
+        let mut whole = Candidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
+        let mut next = 0;
+        while next < taken.len() {
+            let from = &self.parts[taken[next]];
+            next += 1;
+            for (number, other) in self.parts.iter().enumerate() {
+                if taken.contains(&number) || whole.area + other.area > AREA[1] {
+                    continue;
+                }
+                let (low, high) = (whole.low.min(other.low), whole.high.max(other.high));
+                if (high - low).max_element() < LENGTH[1] && near(from, other) {
+                    taken.push(number);
+                    whole.labels.push(other.label);
+                    whole.area += other.area;
+                    (whole.low, whole.high) = (low, high);
+                }
+            }
+        }
+        whole.labels.sort_unstable();
+        whole
+    }
+}
+
+/// Whether two parts come nearer to each other than a person's parts may be apart.
+fn near(a: &Part, b: &Part) -> bool {
+    let gap = (a.low - b.high).max(b.low - a.high).max(Vec3::ZERO).length();
+    if gap > GAP {
+        return false;
+    }
+    let others = &b.samples[..b.sampled];
+    a.samples[..a.sampled].iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
+}
+
+/// Whether points lie near a plane.
+fn is_flat(points: &[Vec3]) -> bool {
+    let count = points.len() as f64;
+    let mean = points.iter().sum::<Vec3>() / count;
+    let mut scatter = Matrix3::zeros();
+    for point in points {
+        let from = Vector3::from((*point - mean).to_array());
+        scatter += from * from.transpose() / count;
+    }
+    scatter.symmetric_eigenvalues().min() < FLAT_PART * FLAT_PART
+}
+
+/// How far the seen surface is from a standing person's, in powers of e.
+fn unlikely(candidate: &Candidate) -> f64 {
+    /// Surface of a standing person that a camera sees, square metres.
+    const STANDING: f64 = 0.55;
+    (candidate.area / STANDING).ln().abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{before_wall, image, put_board, standing};
+    use voodoo_core::detect::Surroundings;
+
+    /// What may be a person in an image of the unit tests' camera.
+    fn candidates(pixels: &[u16]) -> Vec<Candidate> {
+        let (mut view, mut found) = (View::default(), Vec::new());
+        view.read(&image(pixels), &Surroundings::default());
+        Components::default().find(&view, &mut found);
+        found
+    }
+
+    #[test]
+    fn a_person_before_a_wall_is_a_candidate_and_the_wall_is_none() {
+        let (body, poses) = standing();
+        let found = candidates(&before_wall(&body, &poses));
+        assert_eq!(found.len(), 1, "{found:?}");
+        let (size, middle) = (found[0].high - found[0].low, found[0].middle());
+        assert!((1.5..1.85).contains(&size.y) && size.z < 0.5, "{size}");
+        assert!(middle.distance(poses[0].translation) < 0.25, "{middle}");
+    }
+
+    #[test]
+    fn a_person_cut_in_two_by_something_before_it_is_one_candidate() {
+        let (body, poses) = standing();
+        let mut pixels = before_wall(&body, &poses);
+        // A rail at the height of the hips, a metre before the body.
+        put_board(&mut pixels, Vec3::new(0.0, 0.03, 1.6), [1.5, 0.03]);
+        let found = candidates(&pixels);
+        let whole = found.iter().find(|candidate| candidate.labels.len() > 1);
+        assert!(whole.is_some_and(|whole| (whole.high - whole.low).y > 1.5), "{found:?}");
+    }
+
+    #[test]
+    fn nothing_and_what_is_flat_small_or_too_large_are_no_candidates() {
+        let size = before_wall(&standing().0, &standing().1).len();
+        assert_eq!(candidates(&vec![0; size]), []);
+        for (depth, half) in [(2.6, [0.3, 0.8]), (2.0, [0.05, 0.1]), (3.0, [1.4, 1.2])] {
+            let mut pixels = vec![0; size];
+            put_board(&mut pixels, Vec3::new(0.0, 0.0, depth), half);
+            assert_eq!(candidates(&pixels), [], "{half:?}");
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The picture that the network sees of a candidate: 96 x 96 pixels about its middle, turned so that up is up.
+
+use crate::components::{Candidate, Components, NONE};
+use crate::view::View;
+use voodoo_core::math::Vec3;
+
+/// Pixels along an edge.
+pub const SIZE: usize = 96;
+/// Its width at the depth of the candidate's middle, metres.
+pub const WIDTH: f64 = 2.6;
+/// Depth before and behind the middle that is told apart, metres.
+pub const DEPTH: f64 = 1.2;
+
+/// A picture, and how to come back from it to the camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crop {
+    /// Row by row, for every pixel its depth behind the middle, by `DEPTH`, from -1 to 1, and 1 where the candidate is (else 0).
+    pub pixels: Vec<[f32; 2]>,
+    /// Its middle: `(x/z, y/z)` in the turned camera, and the depth in metres.
+    pub middle: [f64; 3],
+    /// Angle by which the camera is turned about its optical axis for up to be up, radians.
+    pub roll: f64,
+}
+
+impl Crop {
+    /// The picture of a candidate; `up` in the camera's frame. `None` if it has no pixels.
+    pub(crate) fn of(view: &View, parts: &Components, candidate: &Candidate, up: Vec3) -> Option<Self> {
+        let roll = roll(up);
+        let (sin, cos) = roll.sin_cos();
+        let (sin, cos) = (sin as f32, cos as f32);
+        let member =
+            |index: usize| parts.labels[index] != NONE && candidate.labels.binary_search(&parts.labels[index]).is_ok();
+        let (mut xs, mut ys, mut zs) = (Vec::new(), Vec::new(), Vec::new());
+        for index in (0..view.depth.len()).filter(|index| member(*index)) {
+            let [x, y] = view.slopes[index];
+            xs.push(cos * x - sin * y);
+            ys.push(sin * x + cos * y);
+            zs.push(view.depth[index]);
+        }
+        let middle = [median(&mut xs)?, median(&mut ys)?, median(&mut zs)?];
+        let z0 = middle[2];
+        let (pixel, half) = ((WIDTH / SIZE as f64) as f32, 0.5 * (SIZE as f32 - 1.0));
+        let mut pixels = Vec::with_capacity(SIZE * SIZE);
+        for row in 0..SIZE {
+            for column in 0..SIZE {
+                let x = middle[0] + (column as f32 - half) * pixel / z0;
+                let y = middle[1] + (row as f32 - half) * pixel / z0;
+                let seen = view.pixel_at([cos * x + sin * y, cos * y - sin * x]).filter(|index| member(*index));
+                pixels.push(seen.map_or([1.0, 0.0], |index| {
+                    let behind = (view.depth[index] - z0) / DEPTH as f32;
+                    [behind.clamp(-1.0, 1.0), 1.0]
+                }));
+            }
+        }
+        Some(Self { pixels, middle: middle.map(f64::from), roll })
+    }
+
+    /// A place of the picture, metres from its middle to the right, down and behind, as a point in the camera's frame.
+    pub fn to_camera(&self, place: Vec3) -> Vec3 {
+        let [x0, y0, z0] = self.middle;
+        let z = z0 + place.z;
+        let turned = Vec3::new(z * (x0 + place.x / z0), z * (y0 + place.y / z0), z);
+        let (sin, cos) = self.roll.sin_cos();
+        Vec3::new(cos * turned.x + sin * turned.y, cos * turned.y - sin * turned.x, turned.z)
+    }
+}
+
+/// By how much the camera has to be turned about its axis for up to point upwards in the image; none where it looks along up.
+fn roll(up: Vec3) -> f64 {
+    /// Below this sine of the angle between up and the optical axis there is no up in the image.
+    const LEAST: f64 = 0.3;
+    if up.x.hypot(up.y) < LEAST { 0.0 } else { (-up.x).atan2(-up.y) }
+}
+
+fn median(values: &mut [f32]) -> Option<f32> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::segmentation::Segmentation;
+    use crate::testing::{before_wall, image, standing};
+    use voodoo_core::detect::Surroundings;
+    use voodoo_core::math::{Pose, Quat};
+    use voodoo_core::observation::frame::DepthImage;
+
+    #[test]
+    fn places_of_the_picture_are_where_the_camera_saw_them() {
+        let (body, poses) = standing();
+        let pixels = before_wall(&body, &poses);
+        for roll in [0.0, 0.6] {
+            let world_from_sensor = Pose::from_parts(Vec3::ZERO, Quat::from_axis_angle(Vec3::Z, roll));
+            let image = DepthImage { world_from_sensor, ..image(&pixels) };
+            let mut segmentation = Segmentation::default();
+            let around = Surroundings { up: Some(-Vec3::Y), ..Surroundings::default() };
+            let candidate = segmentation.find(&image, &around)[0].clone();
+            let crop = segmentation.crop(&candidate).unwrap();
+            assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
+            // Every pixel of the picture that shows the person, back in the camera, lies on a point that was seen.
+            let seen: Vec<Vec3> = segmentation.pixels(&candidate).map(|(_, point)| point).collect();
+            let half = 0.5 * (SIZE as f64 - 1.0);
+            let mut shown = 0;
+            for (index, [depth, mask]) in crop.pixels.iter().enumerate().filter(|(_, pixel)| pixel[1] > 0.0) {
+                let [column, row] = [index % SIZE, index / SIZE].map(|at| (at as f64 - half) * WIDTH / SIZE as f64);
+                let place = crop.to_camera(Vec3::new(column, row, DEPTH * f64::from(*depth)));
+                let nearest = seen.iter().map(|point| point.distance(place)).fold(f64::INFINITY, f64::min);
+                assert!(nearest < 0.02 && *mask == 1.0, "{nearest}");
+                shown += 1;
+            }
+            assert!(shown > 300, "{shown}");
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! The floor in a depth image where nobody told it: the plane with the most points that has hardly any below it.
+
+use crate::view::View;
+use voodoo_core::math::{LANES, Vec3};
+use voodoo_core::observation::frame::Ground;
+
+/// Points that are looked at, about.
+const FLOOR_SAMPLES: usize = 1200;
+/// Planes that are tried.
+const TRIALS: usize = 96;
+/// A point is on the floor up to this distance from it, metres, and so much more by the square of its depth, 1/m.
+const NEAR: [f64; 2] = [0.025, 0.003];
+/// A floor holds at least this share of the points.
+const LEAST_SHARE: f64 = 0.03;
+/// A point below the floor speaks against it as much as so many on it speak for it: reflections are few.
+const BELOW: f64 = 4.0;
+/// The floor is tilted by at most this against the upwards direction that is assumed: cosine of 40 degrees.
+const LEAST_UPRIGHT: f64 = 0.766;
+
+/// The surface about a point is looked at over so much of the image's width.
+const NEIGHBOUR: f64 = 0.05;
+/// The plane is fitted again to the points within this share of the distance that the trials allowed.
+const NEARER: [f64; 2] = [0.7, 0.5];
+
+/// Points in single precision, coordinate by coordinate, with how far from the floor each may be seen.
+#[derive(Debug, Default)]
+struct Lanes {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+    near: Vec<f32>,
+}
+
+impl Lanes {
+    fn clear(&mut self) {
+        [&mut self.x, &mut self.y, &mut self.z, &mut self.near].into_iter().for_each(Vec::clear);
+    }
+
+    fn push(&mut self, point: Vec3) {
+        self.x.push(point.x as f32);
+        self.y.push(point.y as f32);
+        self.z.push(point.z as f32);
+        self.near.push((NEAR[0] + NEAR[1] * point.z * point.z) as f32);
+    }
+
+    /// Sum of what `worth` says of heights above a plane, in units of how far from the floor points may be seen.
+    fn sum(&self, plane: &Ground, worth: impl Fn(f32) -> f32) -> f64 {
+        let [a, b, c] = plane.normal.to_array().map(|value| value as f32);
+        let offset = plane.offset as f32;
+        let one = |x: f32, y: f32, z: f32, near: f32| worth((a * x + b * y + c * z - offset) / near);
+        let [x, y, z, near] = [&self.x, &self.y, &self.z, &self.near].map(|values| values.as_chunks::<LANES>());
+        let mut sums = [0.0_f32; LANES];
+        for (((x, y), z), near) in x.0.iter().zip(y.0).zip(z.0).zip(near.0) {
+            for lane in 0..LANES {
+                sums[lane] += one(x[lane], y[lane], z[lane], near[lane]);
+            }
+        }
+        let rest = x.1.iter().zip(y.1).zip(z.1).zip(near.1).map(|(((x, y), z), near)| one(*x, *y, *z, *near));
+        f64::from(sums.iter().sum::<f32>() + rest.sum::<f32>())
+    }
+}
+
+/// Working memory.
+#[derive(Debug, Default)]
+pub(crate) struct FloorFinder {
+    points: Lanes,
+    /// Those on surfaces that face upwards.
+    level: Vec<Vec3>,
+    level_lanes: Lanes,
+}
+
+impl FloorFinder {
+    /// The floor in the camera's frame; `up` is the direction upwards about as it is known there.
+    pub(crate) fn find(&mut self, view: &View, up: Vec3) -> Option<Ground> {
+        self.sample(view, up);
+        let count = self.points.x.len();
+        if self.level.len() < 20 {
+            return None;
+        }
+        let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+        let mut best: Option<(f64, Ground)> = None;
+        for _ in 0..TRIALS {
+            let [a, b, c] = [(); 3].map(|()| self.level[draw.below(self.level.len())]);
+            let normal = (b - a).cross(c - a);
+            let Some(normal) = normal.try_normalize() else { continue };
+            let normal = if normal.dot(up) < 0.0 { -normal } else { normal };
+            if normal.dot(up) < LEAST_UPRIGHT {
+                continue;
+            }
+            let plane = Ground { normal, offset: normal.dot(a) };
+            let score = self.score(&plane);
+            if best.is_none_or(|(most, _)| score > most) {
+                best = Some((score, plane));
+            }
+        }
+        let (score, plane) = best?;
+        let fitted = |plane, share: &f64| self.refined(&plane, *share);
+        (score > LEAST_SHARE * count as f64).then(|| NEARER.iter().fold(plane, fitted))
+    }
+
+    fn sample(&mut self, view: &View, up: Vec3) {
+        self.points.clear();
+        self.level.clear();
+        self.level_lanes.clear();
+        let seen = view.depth.iter().filter(|z| **z > 0.0).count();
+        let step = (seen / FLOOR_SAMPLES).max(1);
+        let beside = ((NEIGHBOUR * view.width as f64) as usize).max(2);
+        for index in (0..view.depth.len()).filter(|index| view.depth[*index] > 0.0).step_by(step) {
+            let point = view.point(index);
+            self.points.push(point);
+            let (column, row) = (index % view.width, index / view.width);
+            if column < beside || row < beside {
+                continue;
+            }
+            let [left, above] = [index - beside, index - beside * view.width];
+            if view.depth[left] > 0.0 && view.depth[above] > 0.0 {
+                let normal = (view.point(left) - point).cross(view.point(above) - point).normalize_or_zero();
+                if normal.dot(up).abs() > LEAST_UPRIGHT {
+                    self.level.push(point);
+                    self.level_lanes.push(point);
+                }
+            }
+        }
+    }
+
+    fn score(&self, plane: &Ground) -> f64 {
+        let below = |height: f32| if height < -2.0 { 1.0 } else { 0.0 };
+        // A squared distance, cut off: planes through the middle of what is level win over those beside it.
+        let on = |height: f32| (1.0 - height * height).max(0.0);
+        self.level_lanes.sum(plane, on) - BELOW * self.points.sum(plane, below)
+    }
+
+    /// The plane through all level points near it, by least squares along its normal.
+    fn refined(&self, plane: &Ground, share: f64) -> Ground {
+        let near = |point: &Vec3| share * (NEAR[0] + NEAR[1] * point.z * point.z);
+        let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
+        let (mut count, mut mean) = (0.0, Vec3::ZERO);
+        for point in self.level.iter().filter(on) {
+            count += 1.0;
+            mean += *point;
+        }
+        mean /= f64::max(count, 1.0);
+        let first = plane.normal.any_orthonormal_vector();
+        let second = plane.normal.cross(first);
+        let (mut uu, mut uv, mut vv, mut uh, mut vh) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for point in self.level.iter().filter(on) {
+            let from = *point - mean;
+            let (u, v, h) = (from.dot(first), from.dot(second), from.dot(plane.normal));
+            uu += u * u;
+            uv += u * v;
+            vv += v * v;
+            uh += u * h;
+            vh += v * h;
+        }
+        let determinant = uu * vv - uv * uv;
+        if determinant < 1e-9 {
+            return *plane;
+        }
+        let (along_u, along_v) = ((uh * vv - vh * uv) / determinant, (vh * uu - uh * uv) / determinant);
+        let normal = (plane.normal - along_u * first - along_v * second).normalize();
+        Ground { normal, offset: normal.dot(mean) }
+    }
+}
+
+/// Numbers in an order that is the same on every run (Vigna's splitmix64).
+struct Draw(u64);
+
+impl Draw {
+    fn below(&mut self, count: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut value = self.0;
+        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((value ^ (value >> 31)) % count as u64) as usize
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use voodoo_core::Camera;
+    use voodoo_core::detect::Surroundings;
+    use voodoo_core::math::Pose;
+    use voodoo_core::observation::frame::{DepthImage, DepthPixels};
+
+    /// Edge of the image, and its focal length, pixels.
+    const EDGE: usize = 120;
+    const FOCAL: f64 = 100.0;
+
+    /// The floor found by a camera that looks down by `tilt` radians from 1.2 m above a floor, in a room that ends at 4.5 m.
+    fn found(tilt: f64, seen: impl Fn(Vec3) -> bool) -> Option<Ground> {
+        let (sin, cos) = tilt.sin_cos();
+        let up = Vec3::new(0.0, -cos, -sin);
+        let pixels: Vec<f32> = (0..EDGE * EDGE)
+            .map(|index| {
+                let half = 0.5 * (EDGE as f64 - 1.0);
+                let ray =
+                    Vec3::new(((index % EDGE) as f64 - half) / FOCAL, ((index / EDGE) as f64 - half) / FOCAL, 1.0);
+                let wall = 4.5;
+                let floor = -1.2 / up.dot(ray);
+                let z = if floor > 0.0 && floor < wall { floor } else { wall };
+                if seen(z * ray) { (z + 0.01 * (index as f64 * 12.9898).sin()) as f32 } else { 0.0 }
+            })
+            .collect();
+        let mut view = View::default();
+        let half = 0.5 * (EDGE as f64 - 1.0);
+        let camera = Camera::pinhole(EDGE, EDGE, [FOCAL, FOCAL, half, half]).unwrap();
+        let image = DepthImage {
+            pixels: DepthPixels::F32(&pixels),
+            camera: &camera,
+            metres_per_unit: 1.0,
+            world_from_sensor: Pose::IDENTITY,
+            weight: 1.0,
+            source: 0,
+        };
+        view.read(&image, &Surroundings::default());
+        FloorFinder::default().find(&view, -Vec3::Y)
+    }
+
+    #[test]
+    fn a_floor_is_found_under_tilted_cameras() {
+        for tilt in [0.0_f64, 0.25, 0.5] {
+            let floor = found(tilt, |_| true).unwrap();
+            let up = Vec3::new(0.0, -tilt.cos(), -tilt.sin());
+            assert!(floor.normal.dot(up) > 0.9998, "tilt {tilt}: {:?}", floor.normal);
+            assert!((floor.offset + 1.2).abs() < 0.03, "tilt {tilt}: {}", floor.offset);
+        }
+    }
+
+    #[test]
+    fn a_wall_alone_is_no_floor_and_neither_is_nothing() {
+        assert_eq!(found(0.0, |point| point.z > 4.4), None);
+        assert_eq!(found(0.0, |_| false), None);
+    }
+}

@@ -1,0 +1,228 @@
+//! Finds persons in depth images: what may be one, what a small network reports of it, and where its joints are.
+//!
+//! ```
+//! use voodoo_core::body::HumanModel;
+//! use voodoo_core::{Body, Config, Tracker};
+//! use voodoo_detect::Detector;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let body = Body::human(1.75, HumanModel::Full)?;
+//! let tracker = Tracker::new(body, Config::default())?.with_detector(Box::new(Detector::new()));
+//! assert!(tracker.can_search());
+//! # Ok(())
+//! # }
+//! ```
+
+mod components;
+mod convolution;
+pub mod crop;
+mod floor;
+mod names;
+pub mod network;
+mod product;
+mod rejections;
+pub mod segmentation;
+#[cfg(test)]
+mod testing;
+mod view;
+pub mod weights;
+mod winograd;
+
+pub use components::Candidate;
+pub use names::{JOINTS, LENGTHS};
+
+use crop::Crop;
+use network::{Answer, Memory, Network};
+use rejections::Rejections;
+use segmentation::Segmentation;
+use std::sync::{Arc, OnceLock};
+use voodoo_core::Body;
+use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::math::{Aabb, Pose, Vec3};
+use voodoo_core::observation::frame::{DepthImage, Ground};
+use weights::WeightsError;
+
+/// Log odds from which on a candidate is taken for a person.
+const PERSON: f32 = 0.0;
+/// Candidates of an image that the network looks at where everybody is asked for: costs time in proportion.
+const MOST_LOOKS: usize = 12;
+/// The standard deviation of a Laplace distribution is this many times its scale.
+const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
+
+/// Finds persons in depth images, with a network of 17 joints and 9 lengths.
+#[derive(Debug, Default)]
+pub struct Detector {
+    /// None: the one that comes with the library, which is read when it is needed.
+    network: Option<Arc<Network>>,
+    memory: Memory,
+    segmentation: Segmentation,
+    /// Numbers of the candidates of the last image's detections.
+    found: Vec<usize>,
+    /// Log odds that what was looked at first of the last image is a person, and its box in the world.
+    nearest: Option<(f64, Aabb)>,
+    rejections: Rejections,
+}
+
+/// The network that comes with the library, read once.
+fn shipped() -> Result<Arc<Network>, WeightsError> {
+    static NETWORK: OnceLock<Result<Arc<Network>, WeightsError>> = OnceLock::new();
+    let read = || Network::read(include_bytes!("../person.weights")).map(Arc::new);
+    NETWORK.get_or_init(read).clone()
+}
+
+impl Detector {
+    /// A detector with the network that comes with the library. Its weights are read once a process, at the first image.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A detector with a network of one's own.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no weights of a network of this structure and these joints.
+    pub fn with_weights(bytes: &[u8]) -> Result<Self, WeightsError> {
+        let network = Network::read(bytes)?;
+        if network.joints() != JOINTS.len() {
+            return Err(WeightsError::new(format!("{} joints", JOINTS.len()), network.joints().to_string()));
+        }
+        Ok(Self { network: Some(Arc::new(network)), ..Self::default() })
+    }
+
+    /// Numbers of the candidates of the last image that are to be looked at, in that order.
+    fn order(&self, query: DetectionQuery, camera_from_world: &Pose) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.segmentation.candidates().len()).collect();
+        let at = |number: usize| &self.segmentation.candidates()[number];
+        match query {
+            DetectionQuery::All => {}
+            DetectionQuery::Any => order.sort_by_key(|number| self.rejections.last(at(*number))),
+            DetectionQuery::New => {
+                order.retain(|number| !self.rejections.is_old(at(*number)));
+                order.sort_by_key(|number| self.rejections.last(at(*number)));
+            }
+            DetectionQuery::Near(place) => {
+                let place = *camera_from_world * place;
+                order.sort_by(|a, b| at(*a).distance(place).total_cmp(&at(*b).distance(place)));
+            }
+        }
+        order
+    }
+}
+
+impl Detect for Detector {
+    fn joints(&self) -> Vec<String> {
+        JOINTS.map(String::from).to_vec()
+    }
+
+    fn lengths(&self) -> Vec<String> {
+        LENGTHS.map(String::from).to_vec()
+    }
+
+    /// Bodies that have all of its joints: those of people.
+    fn knows(&self, body: &Body) -> bool {
+        JOINTS.iter().all(|joint| body.site_index(joint).is_ok())
+    }
+
+    fn fresh(&self) -> Box<dyn Detect> {
+        Box::new(Self { network: self.network.clone(), ..Self::default() })
+    }
+
+    fn detect(
+        &mut self,
+        image: &DepthImage,
+        around: &Surroundings,
+        query: DetectionQuery,
+    ) -> Result<Vec<Detection>, DetectError> {
+        let network = match &self.network {
+            Some(network) => network.clone(),
+            None => shipped()?,
+        };
+        self.found.clear();
+        self.nearest = None;
+        self.rejections.next_image();
+        self.segmentation.find(image, around);
+        let order = self.order(query, &image.world_from_sensor.inverse());
+        let Self { memory, segmentation, found: numbers, nearest, rejections, .. } = self;
+        let mut found: Vec<(usize, Detection)> = Vec::new();
+        let mut looks = 0;
+        for number in order {
+            let candidate = &segmentation.candidates()[number];
+            let Some(crop) = segmentation.crop(candidate) else { continue };
+            let answer = network.look(&crop.pixels, memory);
+            looks += 1;
+            if nearest.is_none() {
+                *nearest = Some((f64::from(answer.person), in_world(candidate, &image.world_from_sensor)));
+            }
+            if answer.person > PERSON {
+                found.push((number, detection(&answer, &crop, candidate, &image.world_from_sensor)));
+            }
+            rejections.note(candidate, answer.person > PERSON);
+            if looks == MOST_LOOKS || query != DetectionQuery::All {
+                break;
+            }
+        }
+        found.sort_by(|(_, a), (_, b)| b.person.total_cmp(&a.person));
+        let floor = segmentation.floor().map(|floor| {
+            let normal = image.world_from_sensor.rotation * floor.normal;
+            Ground { normal, offset: floor.offset + normal.dot(image.world_from_sensor.translation) }
+        });
+        let mut kept = Vec::new();
+        for (number, mut detection) in found {
+            let candidate = &segmentation.candidates()[number];
+            // Of candidates that share parts the surest stays.
+            if numbers.iter().any(|other| segmentation.candidates()[*other].shares(candidate)) {
+                continue;
+            }
+            detection.floor = floor;
+            segmentation.mask(candidate, &mut detection.pixels);
+            numbers.push(number);
+            kept.push(detection);
+        }
+        Ok(kept)
+    }
+
+    fn nearest(&self) -> Option<(f64, Aabb)> {
+        self.nearest
+    }
+
+    fn reject(&mut self, index: usize) {
+        let number = self.found.get(index);
+        if let Some(candidate) = number.and_then(|number| self.segmentation.candidates().get(*number)) {
+            self.rejections.note(candidate, false);
+        }
+    }
+}
+
+/// The box about a candidate's box.
+fn in_world(candidate: &Candidate, world_from_camera: &Pose) -> Aabb {
+    let corners = [candidate.low, candidate.high];
+    let corner = |number: usize| {
+        let pick = |bit: usize, axis: usize| corners[(number >> bit) & 1][axis];
+        *world_from_camera * Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2))
+    };
+    Aabb::from_points((0..8).map(corner))
+}
+
+/// What the network reports, in the world.
+fn detection(answer: &Answer, crop: &Crop, candidate: &Candidate, world_from_camera: &Pose) -> Detection {
+    let joint = |((place, log_scale), visible): ((&[f32; 3], &f32), &f32)| {
+        Some(DetectedJoint {
+            position: *world_from_camera * crop.to_camera(Vec3::from_array(place.map(f64::from))),
+            sigma: SIGMA_BY_SCALE * f64::from(*log_scale).exp(),
+            visible: 1.0 / (1.0 + f64::from(-visible).exp()),
+        })
+    };
+    let joints = answer.joints.iter().zip(&answer.log_scale).zip(&answer.visible).map(joint).collect();
+    let length = |(length, scale): (&f32, &f32)| [f64::from(*length).exp(), SIGMA_BY_SCALE * f64::from(*scale).exp()];
+    let bounds = in_world(candidate, world_from_camera);
+    Detection {
+        joints,
+        lengths: answer.log_lengths.iter().zip(&answer.log_length_scale).map(length).collect(),
+        facing: Some(f64::from(answer.facing)),
+        person: f64::from(answer.person),
+        low: bounds.mins,
+        high: bounds.maxs,
+        floor: None,
+        pixels: Vec::new(),
+    }
+}

@@ -1,0 +1,333 @@
+//! The network that looks at a picture.
+//!
+//! The structure is that of A2J (Xiong et al., "A2J: Anchor-to-Joint Regression Network", ICCV 2019) on a small residual network:
+//! every cell of a 12 x 12 grid says of every joint how much it counts and where the joint is from there.
+
+use crate::convolution::{Convolution, Map, Working, rectify};
+use crate::crop::{SIZE, WIDTH};
+use crate::product::Panels;
+use crate::weights::{Weights, WeightsError};
+
+/// Numbers a cell gives for a joint: how much it counts, offset to the right, offset down, depth.
+const A_JOINT: usize = 4;
+
+/// Two convolutions beside the identity.
+#[derive(Debug)]
+struct Residual {
+    first: Convolution,
+    second: Convolution,
+}
+
+impl Residual {
+    fn take(weights: &mut Weights, name: &str, edge: usize) -> Result<Self, WeightsError> {
+        let first = Convolution::take(weights, &format!("{name}.a"), 1, edge)?;
+        Ok(Self { first, second: Convolution::take(weights, &format!("{name}.b"), 1, edge)? })
+    }
+
+    fn apply(&self, map: &mut Map, memory: &mut [Map; 2], working: &mut Working) {
+        let [between, out] = memory;
+        self.first.apply(map, between, working, true);
+        self.second.apply(between, out, working, false);
+        map.values.iter_mut().zip(&out.values).for_each(|(value, more)| *value = (*value + more).max(0.0));
+    }
+}
+
+/// A convolution that makes the map smaller, and residual blocks.
+#[derive(Debug)]
+struct Stage {
+    reduce: Convolution,
+    blocks: Vec<Residual>,
+}
+
+impl Stage {
+    /// One that looks at maps of this `edge`.
+    fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
+        let reduce = Convolution::take(weights, &format!("{name}.conv"), stride, edge)?;
+        let mut blocks = Vec::new();
+        while weights.has(&format!("{name}.res{}.a.weight", blocks.len())) {
+            blocks.push(Residual::take(weights, &format!("{name}.res{}", blocks.len()), edge / stride)?);
+        }
+        Ok(Self { reduce, blocks })
+    }
+}
+
+/// A matrix and a bias.
+#[derive(Debug)]
+struct Linear(Panels);
+
+impl Linear {
+    fn take(weights: &mut Weights, name: &str) -> Result<Self, WeightsError> {
+        let layer = weights.layer(name, 2)?;
+        Ok(Self(Panels::of(&layer.weights, &layer.bias)))
+    }
+
+    fn apply(&self, values: &[f32]) -> Vec<f32> {
+        let mut out = vec![0.0; self.0.outputs];
+        self.0.apply(values, &mut out);
+        out
+    }
+}
+
+/// What the network says of a picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Answer {
+    /// Places of the joints: metres to the right, down and behind the picture's middle.
+    pub joints: Vec<[f32; 3]>,
+    /// Natural logarithm of the scale (metres) of their error (Laplace).
+    pub log_scale: Vec<f32>,
+    /// Log odds that they are in the image.
+    pub visible: Vec<f32>,
+    /// Log odds that the trunk faces the camera.
+    pub facing: f32,
+    /// Log odds that it is a person.
+    pub person: f32,
+    /// Natural logarithms of lengths, metres.
+    pub log_lengths: Vec<f32>,
+    /// Natural logarithms of the scale of their error.
+    pub log_length_scale: Vec<f32>,
+}
+
+/// The trained layers.
+pub struct Network {
+    stages: [Stage; 4],
+    top: [Convolution; 2],
+    middle: Residual,
+    head: Convolution,
+    hidden: Option<Linear>,
+    visible: Linear,
+    facing: Linear,
+    person: Linear,
+    sizes: Option<[Linear; 3]>,
+}
+
+impl std::fmt::Debug for Network {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Network").field("joints", &self.joints()).finish_non_exhaustive()
+    }
+}
+
+/// Working memory of a network.
+#[derive(Debug, Default)]
+pub struct Memory {
+    maps: [Map; 4],
+    between: [Map; 2],
+    top: Map,
+    working: Working,
+}
+
+impl Network {
+    /// Reads the bytes of a file of weights.
+    pub fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
+        let mut weights = Weights::read(bytes)?;
+        let weights = &mut weights;
+        let stages = [
+            Stage::take(weights, "s2", 4, SIZE)?,
+            Stage::take(weights, "s3", 2, SIZE / 4)?,
+            Stage::take(weights, "s4", 2, SIZE / 8)?,
+            Stage::take(weights, "s5", 2, SIZE / 16)?,
+        ];
+        let top =
+            [Convolution::take(weights, "top5", 1, SIZE / 32)?, Convolution::take(weights, "top4", 1, SIZE / 16)?];
+        let hidden = if weights.has("hidden.weight") { Some(Linear::take(weights, "hidden")?) } else { None };
+        let sizes = ["scale", "length", "length_scale"];
+        let sizes = if weights.has("scale.weight") {
+            let [scale, length, length_scale] = sizes.map(|name| Linear::take(weights, name));
+            Some([scale?, length?, length_scale?])
+        } else {
+            None
+        };
+        let network = Self {
+            middle: Residual::take(weights, "mid", SIZE / 8)?,
+            head: Convolution::take(weights, "head", 1, SIZE / 8)?,
+            visible: Linear::take(weights, "visible")?,
+            facing: Linear::take(weights, "facing")?,
+            person: Linear::take(weights, "person")?,
+            stages,
+            top,
+            hidden,
+            sizes,
+        };
+        network.check()?;
+        Ok(network)
+    }
+
+    /// Every layer takes what the one before gives.
+    fn check(&self) -> Result<(), WeightsError> {
+        let mut channels = 2;
+        let mut ends = Vec::new();
+        let mut chain = Vec::new();
+        for stage in &self.stages {
+            chain.push((&stage.reduce, channels, None));
+            channels = stage.reduce.outputs();
+            for block in &stage.blocks {
+                chain.push((&block.first, channels, Some(block.first.outputs())));
+                chain.push((&block.second, block.first.outputs(), Some(channels)));
+            }
+            ends.push(channels);
+        }
+        chain.push((&self.top[0], ends[3], Some(ends[2])));
+        chain.push((&self.top[1], ends[2], Some(ends[1])));
+        chain.push((&self.middle.first, ends[1], Some(self.middle.first.outputs())));
+        chain.push((&self.middle.second, self.middle.first.outputs(), Some(ends[1])));
+        chain.push((&self.head, ends[1], None));
+        for (layer, inputs, outputs) in chain {
+            let outputs = outputs.unwrap_or(layer.outputs());
+            if layer.inputs() != inputs || layer.outputs() != outputs {
+                let found = format!("{} and {}", layer.inputs(), layer.outputs());
+                return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
+            }
+        }
+        let pooled = self.hidden.as_ref().map_or(ends[3], |hidden| hidden.0.outputs);
+        let joints = self.head.outputs() / A_JOINT;
+        let lengths = self.sizes.as_ref().map_or(0, |sizes| sizes[1].0.outputs);
+        let mut linear = vec![(&self.visible, pooled, joints), (&self.facing, pooled, 1), (&self.person, pooled, 1)];
+        linear.extend(self.hidden.iter().map(|hidden| (hidden, ends[3], pooled)));
+        if let Some([scale, length, length_scale]) = &self.sizes {
+            linear.extend([(scale, pooled, joints), (length, pooled, lengths), (length_scale, pooled, lengths)]);
+        }
+        for (layer, inputs, outputs) in linear {
+            let Linear(layer) = layer;
+            if layer.inputs != inputs || layer.outputs != outputs {
+                let found = format!("{} and {}", layer.inputs, layer.outputs);
+                return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of joints it tells.
+    pub fn joints(&self) -> usize {
+        self.head.outputs() / A_JOINT
+    }
+
+    /// Looks at a picture, `SIZE * SIZE` pixels.
+    pub fn look(&self, picture: &[[f32; 2]], memory: &mut Memory) -> Answer {
+        let Memory { maps, between, top, working } = memory;
+        top.edge = SIZE;
+        top.channels = 2;
+        top.values.clear();
+        top.values.extend_from_slice(picture.as_flattened());
+        for (number, stage) in self.stages.iter().enumerate() {
+            let (before, rest) = maps.split_at_mut(number);
+            stage.reduce.apply(before.last().unwrap_or(top), &mut rest[0], working, true);
+            for block in &stage.blocks {
+                block.apply(&mut rest[0], between, working);
+            }
+        }
+        let mut answer = self.overall(&mean(&maps[3]));
+        top.clone_from(&maps[3]);
+        for (layer, skip) in self.top.iter().zip([&maps[2], &maps[1]]) {
+            layer.apply(top, &mut between[0], working, true);
+            enlarge(&between[0], skip, top);
+        }
+        self.middle.apply(top, between, working);
+        self.head.apply(top, &mut between[0], working, false);
+        answer.joints = (0..self.joints()).map(|joint| place(&between[0], joint)).collect();
+        answer
+    }
+
+    /// What the whole picture says.
+    fn overall(&self, pooled: &[f32]) -> Answer {
+        let mut values = pooled.to_vec();
+        if let Some(hidden) = &self.hidden {
+            values = hidden.apply(&values);
+            rectify(&mut values);
+        }
+        let [log_scale, log_lengths, log_length_scale] = match &self.sizes {
+            Some(layers) => [0, 1, 2].map(|number: usize| layers[number].apply(&values)),
+            None => [vec![UNKNOWN.ln(); self.joints()], Vec::new(), Vec::new()],
+        };
+        Answer {
+            joints: Vec::new(),
+            log_scale,
+            visible: self.visible.apply(&values),
+            facing: self.facing.apply(&values)[0],
+            person: self.person.apply(&values)[0],
+            log_lengths,
+            log_length_scale,
+        }
+    }
+}
+
+/// Scale of a joint's error where a network does not tell it, metres.
+const UNKNOWN: f32 = 0.04;
+
+fn mean(map: &Map) -> Vec<f32> {
+    let mut sum = vec![0.0; map.channels];
+    for pixel in map.values.chunks_exact(map.channels) {
+        sum.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += value);
+    }
+    let count = (map.edge * map.edge) as f32;
+    sum.iter_mut().for_each(|sum| *sum /= count);
+    sum
+}
+
+/// A map of twice the edge, every pixel repeated, with another added.
+fn enlarge(map: &Map, skip: &Map, out: &mut Map) {
+    out.clone_from(skip);
+    for (pixel, values) in out.values.chunks_exact_mut(skip.channels).enumerate() {
+        let (row, column) = (pixel / skip.edge / 2, pixel % skip.edge / 2);
+        let from = (row * map.edge + column) * map.channels;
+        values.iter_mut().zip(&map.values[from..from + map.channels]).for_each(|(value, more)| *value += more);
+    }
+}
+
+/// Where the cells together put a joint, metres from the picture's middle.
+fn place(map: &Map, joint: usize) -> [f32; 3] {
+    let cell = (WIDTH / map.edge as f64) as f32;
+    let half = 0.5 * (map.edge as f32 - 1.0);
+    let said = |pixel: usize| &map.values[pixel * map.channels + joint * A_JOINT..][..A_JOINT];
+    let pixels = 0..map.edge * map.edge;
+    let most = pixels.clone().map(|pixel| said(pixel)[0]).fold(f32::NEG_INFINITY, f32::max);
+    let (mut sum, mut place) = (0.0, [0.0; 3]);
+    for pixel in pixels {
+        let [counts, right, down, behind] = said(pixel) else { continue };
+        let weight = (counts - most).exp();
+        let (row, column) = ((pixel / map.edge) as f32, (pixel % map.edge) as f32);
+        sum += weight;
+        place[0] += weight * ((column - half) * cell + right);
+        place[1] += weight * ((row - half) * cell + down);
+        place[2] += weight * behind;
+    }
+    place.map(|value| value / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_is_where_the_cells_that_count_put_it() {
+        let edge = 12;
+        let mut map = Map { edge, channels: 2 * A_JOINT, values: vec![0.0; edge * edge * 2 * A_JOINT] };
+        // Of the second joint one cell counts, in row 2 and column 9: half a cell beside its middle, 0.4 m behind.
+        let cell = WIDTH as f32 / edge as f32;
+        let at = (2 * edge + 9) * map.channels + A_JOINT;
+        map.values[at..at + A_JOINT].copy_from_slice(&[60.0, 0.5 * cell, -0.5 * cell, 0.4]);
+        let [x, y, z] = place(&map, 1);
+        assert!(
+            (x - 4.0 * cell).abs() < 1e-5 && (y + 4.0 * cell).abs() < 1e-5 && (z - 0.4).abs() < 1e-5,
+            "{x} {y} {z}"
+        );
+        // Of the first all count the same, and the middle is between them.
+        assert!(place(&map, 0).iter().all(|value| value.abs() < 1e-5));
+    }
+
+    #[test]
+    fn layers_that_do_not_fit_are_refused() {
+        let good = include_bytes!("../person.weights");
+        let network = Network::read(good);
+        assert!(
+            network.as_ref().is_ok_and(|network| network.joints() == crate::names::JOINTS.len()),
+            "{:?}",
+            network.err()
+        );
+        let end = good.windows(2).position(|pair| pair == b"\n\n").unwrap_or(0);
+        let header = String::from_utf8_lossy(&good[..end]).into_owned();
+        let line = header.lines().find(|line| line.starts_with("top4.weight")).unwrap_or_default();
+        // The same number of values in another shape.
+        let [name, out, ky, kx, inputs] = line.split(' ').collect::<Vec<_>>()[..] else { panic!("{line}") };
+        let changed = header.replace(line, &format!("{name} {inputs} {ky} {kx} {out}"));
+        assert!(Network::read(&[changed.as_bytes(), &good[end..]].concat()).is_err());
+    }
+}

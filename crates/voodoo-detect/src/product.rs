@@ -1,0 +1,156 @@
+//! Products of matrices with trained weights, which are sorted once for the order they are read in.
+//!
+//! No multiplication is fused with an addition: every processor gives the same bits.
+
+use voodoo_core::math::widest;
+
+/// Columns that are worked on together.
+const TOGETHER: usize = 16;
+/// Rows that are: the network's maps have multiples of nine pixels, and the sums of nine rows fit the registers of AVX-512, those of
+/// six the registers of AVX2. What is left is worked on by threes.
+const ROWS: [usize; 2] = [9, 6];
+const FEW_ROWS: usize = 3;
+
+/// Trained weights and biases, columns in groups of `TOGETHER`; missing columns are zeros.
+#[derive(Debug)]
+pub(crate) struct Panels {
+    pub(crate) inputs: usize,
+    pub(crate) outputs: usize,
+    weights: Vec<[f32; TOGETHER]>,
+    bias: Vec<[f32; TOGETHER]>,
+}
+
+impl Panels {
+    /// Of `weights` for every output, one output after the other, and its `bias`.
+    pub(crate) fn of(weights: &[f32], bias: &[f32]) -> Self {
+        let outputs = bias.len();
+        let inputs = weights.len().checked_div(outputs).unwrap_or(0);
+        let groups = outputs.div_ceil(TOGETHER);
+        let mut sorted = vec![[0.0; TOGETHER]; groups * inputs];
+        let mut sorted_bias = vec![[0.0; TOGETHER]; groups];
+        for (output, bias) in bias.iter().enumerate() {
+            let (group, lane) = (output / TOGETHER, output % TOGETHER);
+            sorted_bias[group][lane] = *bias;
+            let own = &weights[output * inputs..][..inputs];
+            for (sorted, weight) in sorted[group * inputs..][..inputs].iter_mut().zip(own) {
+                sorted[lane] = *weight;
+            }
+        }
+        Self { inputs, outputs, weights: sorted, bias: sorted_bias }
+    }
+
+    /// For each row of `seen`, `inputs` values, its products with the weights, and the biases: a row of `out`, `outputs` values.
+    pub(crate) fn apply(&self, seen: &[f32], out: &mut [f32]) {
+        if self.inputs == 0 || self.outputs == 0 {
+            return;
+        }
+        let whole = wide_registers();
+        widest(
+            #[inline(always)]
+            || {
+                for group in 0..self.bias.len() {
+                    if whole {
+                        self.columns::<{ ROWS[0] }>(group, seen, out);
+                    } else {
+                        self.columns::<{ ROWS[1] }>(group, seen, out);
+                    }
+                }
+            },
+        );
+    }
+
+    /// The products with the columns of a group, `MOST` rows together.
+    #[inline(always)]
+    fn columns<const MOST: usize>(&self, group: usize, seen: &[f32], out: &mut [f32]) {
+        let (seen, out) = self.rows::<MOST>(group, seen, out);
+        let (seen, out) = self.rows::<FEW_ROWS>(group, seen, out);
+        self.rows::<1>(group, seen, out);
+    }
+
+    /// The same of so many rows together, as far as there are so many; what is left.
+    #[inline(always)]
+    fn rows<'a, 'b, const COUNT: usize>(
+        &self,
+        group: usize,
+        seen: &'a [f32],
+        out: &'b mut [f32],
+    ) -> (&'a [f32], &'b mut [f32]) {
+        let column = group * TOGETHER;
+        let width = TOGETHER.min(self.outputs - column);
+        let panel = &self.weights[group * self.inputs..][..self.inputs];
+        let whole = seen.len() / (COUNT * self.inputs);
+        let (seen, seen_last) = seen.split_at(whole * COUNT * self.inputs);
+        let (out, out_last) = out.split_at_mut(whole * COUNT * self.outputs);
+        for (rows, here) in seen.chunks_exact(COUNT * self.inputs).zip(out.chunks_exact_mut(COUNT * self.outputs)) {
+            let sums = product::<COUNT>(rows, panel, &self.bias[group]);
+            let here = here.chunks_exact_mut(self.outputs);
+            here.zip(&sums).for_each(|(row, sums)| store(&mut row[column..][..width], sums));
+        }
+        (seen_last, out_last)
+    }
+}
+
+/// Copies the sums of the columns that there are, mostly all: their number is then known to the compiler.
+#[inline(always)]
+fn store(to: &mut [f32], from: &[f32; TOGETHER]) {
+    match to.first_chunk_mut() {
+        Some(to) => *to = *from,
+        None => to.copy_from_slice(&from[..to.len()]),
+    }
+}
+
+/// Whether registers hold the sums of a whole group of columns.
+fn wide_registers() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return voodoo_core::math::has_avx512();
+    #[cfg(not(target_arch = "x86_64"))]
+    return false;
+}
+
+/// So many rows times the columns of a group.
+#[inline(always)]
+fn product<const COUNT: usize>(
+    rows: &[f32],
+    panel: &[[f32; TOGETHER]],
+    bias: &[f32; TOGETHER],
+) -> [[f32; TOGETHER]; COUNT] {
+    let inputs = panel.len();
+    // Sliced one by one, their length is known to the compiler.
+    let (mut own, mut rest): ([&[f32]; COUNT], _) = ([&[]; COUNT], rows);
+    for row in &mut own {
+        (*row, rest) = rest.split_at(inputs);
+    }
+    let mut sums = [*bias; COUNT];
+    for (input, weights) in panel.iter().enumerate() {
+        for (row, sums) in own.iter().zip(&mut sums) {
+            let value = row[input];
+            for (sum, weight) in sums.iter_mut().zip(weights) {
+                *sum += value * weight;
+            }
+        }
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_sums_of_products() {
+        let number = |index: usize| (index as f32 * 12.9898).sin();
+        for (count, inputs, outputs) in [(1_usize, 5, 1), (9, 3, 32), (20, 7, 75)] {
+            let weights: Vec<f32> = (0..inputs * outputs).map(number).collect();
+            let bias: Vec<f32> = (0..outputs).map(|index| number(index + 100)).collect();
+            let seen: Vec<f32> = (0..count * inputs).map(|index| number(index + 1000)).collect();
+            let mut out = vec![f32::NAN; count * outputs];
+            Panels::of(&weights, &bias).apply(&seen, &mut out);
+            for (index, found) in out.iter().enumerate() {
+                let (row, output) = (index / outputs, index % outputs);
+                let terms = (0..inputs).map(|input| seen[row * inputs + input] * weights[output * inputs + input]);
+                let sum = bias[output] + terms.sum::<f32>();
+                assert!((found - sum).abs() < 1e-5, "{found} for {sum}");
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! What unit tests share: a synthetic depth camera that stands in the world's origin and looks along z.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use std::sync::LazyLock;
+use voodoo_core::body::HumanModel;
+use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::observation::frame::{DepthImage, DepthPixels};
+use voodoo_core::visibility::render::{Rendering, Viewpoint};
+use voodoo_core::{Body, Camera};
+
+/// The camera.
+static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());
+
+/// Depth of the wall behind the body, millimetres.
+const WALL: u16 = 4500;
+
+/// A human who stands 2.6 m before the camera and faces it.
+pub(crate) fn standing() -> (Body, Vec<Pose>) {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    // The body's x looks forward and z up; the camera's y points down.
+    let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
+    let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
+    let poses = body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces));
+    (body, poses)
+}
+
+/// Depth in millimetres, as the camera sees a posed body before a wall.
+pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
+    let mut rendering = Rendering::default();
+    let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
+    rendering.render(body, poses, &view, None).unwrap();
+    rendering.depth().iter().map(|depth| if *depth > 0.0 { (depth * 1000.0) as u16 } else { WALL }).collect()
+}
+
+/// Puts a board that faces the camera before what an image shows; half its width and height, metres.
+pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64; 2]) {
+    for (index, pixel) in pixels.iter_mut().enumerate() {
+        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| centre.z * ray);
+        let depth = (1000.0 * centre.z) as u16;
+        if (x - centre.x).abs() < width && (y - centre.y).abs() < height && (*pixel == 0 || depth < *pixel) {
+            *pixel = depth;
+        }
+    }
+}
+
+/// The camera's image of these pixels.
+pub(crate) fn image(pixels: &[u16]) -> DepthImage<'_> {
+    DepthImage {
+        pixels: DepthPixels::U16(pixels),
+        camera: &CAMERA,
+        metres_per_unit: 0.001,
+        world_from_sensor: Pose::IDENTITY,
+        weight: 1.0,
+        source: 0,
+    }
+}

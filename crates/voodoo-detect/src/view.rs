@@ -1,0 +1,124 @@
+//! A depth image as the detector looks at it: thinned out, in metres, without what cannot be a person.
+
+use voodoo_core::Camera;
+use voodoo_core::detect::Surroundings;
+use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::observation::frame::{DepthImage, Ground};
+
+/// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 30 wide and 80 high.
+const MOST_PIXELS: usize = 26_000;
+/// What lies less than this above the floor is left out, metres: feet would join the person to the floor.
+const FLOOR_CLEARANCE: f64 = 0.06;
+/// Depths between which persons are looked for, metres.
+const RANGE: [f32; 2] = [0.4, 12.0];
+
+/// The thinned image. Points are in the camera's optical frame.
+#[derive(Debug, Default)]
+pub(crate) struct View {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Every so manyth column and row of the image was kept.
+    pub(crate) step: usize,
+    /// Depth, metres; 0: nothing, or nothing that may be a person.
+    pub(crate) depth: Vec<f32>,
+    /// `(x/z, y/z)` of every pixel.
+    pub(crate) slopes: Vec<[f32; 2]>,
+    /// The image's width, for its pixels' indices.
+    columns: usize,
+    camera: Option<Camera>,
+}
+
+impl View {
+    /// Reads an image; what holds nobody is left out but for the floor.
+    pub(crate) fn read(&mut self, image: &DepthImage, around: &Surroundings) {
+        let mut step = 1;
+        let [width, height] = [image.camera.width(), image.camera.height()];
+        while (width.div_ceil(step)) * (height.div_ceil(step)) > MOST_PIXELS {
+            step += 1;
+        }
+        (self.width, self.height, self.step) = (width.div_ceil(step), height.div_ceil(step), step);
+        (self.columns, self.camera) = (width, Some(image.camera.clone()));
+        self.depth.clear();
+        self.slopes.clear();
+        for row in (0..height).step_by(step) {
+            for column in (0..width).step_by(step) {
+                let index = row * width + column;
+                let slope = image.camera.pixel_ray(column, row).map(|value| value as f32);
+                let z = image.pixels.get(index) * image.metres_per_unit as f32;
+                let seen = z > RANGE[0] && z < RANGE[1] && !slope[0].is_nan();
+                let kept = seen && !around.explains(index, z);
+                self.depth.push(if kept { z } else { 0.0 });
+                self.slopes.push(slope);
+            }
+        }
+        self.exclude(&image.world_from_sensor, around);
+    }
+
+    fn exclude(&mut self, world_from_camera: &Pose, around: &Surroundings) {
+        if around.excluded.is_empty() {
+            return;
+        }
+        for index in 0..self.depth.len() {
+            if self.depth[index] > 0.0 {
+                let point = *world_from_camera * self.point(index);
+                if around.excludes(point) {
+                    self.depth[index] = 0.0;
+                }
+            }
+        }
+    }
+
+    /// The point of a pixel, camera frame.
+    pub(crate) fn point(&self, index: usize) -> Vec3 {
+        let (z, [x, y]) = (f64::from(self.depth[index]), self.slopes[index]);
+        Vec3::new(z * f64::from(x), z * f64::from(y), z)
+    }
+
+    /// Leaves out what is on the floor or below it.
+    pub(crate) fn remove_floor(&mut self, floor: &Ground) {
+        let normal = floor.normal.to_array().map(|value| value as f32);
+        let least = (floor.offset + FLOOR_CLEARANCE) as f32;
+        for (z, [x, y]) in self.depth.iter_mut().zip(&self.slopes) {
+            if *z * (normal[0] * x + normal[1] * y + normal[2]) < least {
+                *z = 0.0;
+            }
+        }
+    }
+
+    /// The pixel in whose direction `(x/z, y/z)` lies.
+    pub(crate) fn pixel_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
+        let camera = self.camera.as_ref()?;
+        if camera.distorts() {
+            let [column, row] = camera.pixel([f64::from(x), f64::from(y)])?;
+            return self.index(column as f32, row as f32);
+        }
+        let ([fx, fy], [cx, cy]) = (camera.focal().map(|f| f as f32), camera.center().map(|c| c as f32));
+        self.index(fx * x + cx, fy * y + cy)
+    }
+
+    fn index(&self, column: f32, row: f32) -> Option<usize> {
+        let step = self.step as f32;
+        let (column, row) = ((column / step).round(), (row / step).round());
+        let inside = column >= 0.0 && row >= 0.0 && column < self.width as f32 && row < self.height as f32;
+        inside.then(|| row as usize * self.width + column as usize)
+    }
+
+    /// Surface that a pixel covers at a depth of 1 m, square metres.
+    pub(crate) fn pixel_area(&self) -> f64 {
+        let [fx, fy] = self.camera.as_ref().map_or([1.0; 2], Camera::focal);
+        (self.step * self.step) as f64 / (fx * fy)
+    }
+
+    /// The pixels of the image for which one with this index in the image stands.
+    pub(crate) fn block(&self, index: usize, into: &mut Vec<usize>) {
+        let (row, column) = (index / self.columns, index % self.columns);
+        for row in row..row + self.step {
+            into.extend((column..(column + self.step).min(self.columns)).map(|column| row * self.columns + column));
+        }
+    }
+
+    /// Index in the image of a pixel.
+    pub(crate) fn in_image(&self, index: usize) -> usize {
+        (index / self.width) * self.step * self.columns + (index % self.width) * self.step
+    }
+}

@@ -1,0 +1,172 @@
+//! The file of a trained network's weights.
+//!
+//! Lines of ASCII, each ended by a newline: `voodoo person 1`, then for every tensor its name and shape, as in
+//! `s2.conv.weight 32 6 6 2`, then an empty line. The values follow in that order, row by row, as little-endian half floats
+//! (IEEE 754 binary16). Weights of convolutions have the shape (out, ky, kx, in), those of linear layers (out, in).
+
+use std::collections::BTreeMap;
+
+/// First line of a file.
+const FIRST_LINE: &str = "voodoo person 1";
+
+/// What is wrong with a file of weights.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("weights: expected {expected}, found {found}")]
+pub struct WeightsError {
+    /// What was expected.
+    pub expected: String,
+    /// What was found.
+    pub found: String,
+}
+
+impl WeightsError {
+    pub(crate) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { expected: expected.into(), found: found.into() }
+    }
+}
+
+/// A matrix, a row for every output and a column for every input, with its biases and the edge of its kernel.
+#[derive(Debug)]
+pub(crate) struct Layer {
+    pub(crate) weights: Vec<f32>,
+    pub(crate) bias: Vec<f32>,
+    pub(crate) kernel: usize,
+}
+
+/// Named tensors.
+#[derive(Debug, Default)]
+pub(crate) struct Weights {
+    tensors: BTreeMap<String, (Vec<usize>, Vec<f32>)>,
+}
+
+impl Weights {
+    /// Reads a file's bytes.
+    pub(crate) fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
+        let mut rest = bytes;
+        let first = line(&mut rest)?;
+        if first != FIRST_LINE {
+            return Err(WeightsError::new(format!("a first line {FIRST_LINE:?}"), format!("{first:?}")));
+        }
+        let mut shapes = Vec::new();
+        loop {
+            let words = line(&mut rest)?;
+            let mut words = words.split(' ');
+            let name = words.next().unwrap_or_default();
+            if name.is_empty() {
+                break;
+            }
+            let wrong = |_| WeightsError::new("a name and whole numbers in each line", format!("the line of {name}"));
+            let shape = words.map(str::parse::<usize>).collect::<Result<Vec<_>, _>>().map_err(wrong)?;
+            shapes.push((name.to_owned(), shape));
+        }
+        let mut tensors = BTreeMap::new();
+        for (name, shape) in shapes {
+            let count = shape.iter().try_fold(1_usize, |count, edge| count.checked_mul(*edge));
+            let bytes = count.and_then(|count| count.checked_mul(2)).and_then(|bytes| rest.split_at_checked(bytes));
+            let Some((values, after)) = bytes else {
+                return Err(WeightsError::new(format!("{shape:?} values of {name}"), format!("{} bytes", rest.len())));
+            };
+            rest = after;
+            tensors.insert(name, (shape, values.as_chunks().0.iter().map(|half| from_half(*half)).collect()));
+        }
+        if rest.is_empty() {
+            Ok(Self { tensors })
+        } else {
+            Err(WeightsError::new("the end", format!("{} bytes", rest.len())))
+        }
+    }
+
+    /// Whether there is a tensor of this name.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.tensors.contains_key(name)
+    }
+
+    /// Shape and values of a tensor with so many edges.
+    fn take(&mut self, name: &str, edges: usize) -> Result<(Vec<usize>, Vec<f32>), WeightsError> {
+        let wanted = || format!("{name} with {edges} edge(s)");
+        let Some((shape, values)) = self.tensors.remove(name) else {
+            return Err(WeightsError::new(wanted(), "none"));
+        };
+        if shape.len() != edges || values.is_empty() || !values.iter().all(|value| value.is_finite()) {
+            return Err(WeightsError::new(wanted(), format!("{shape:?}, or values that are not finite")));
+        }
+        Ok((shape, values))
+    }
+
+    /// A layer whose weights have so many edges.
+    pub(crate) fn layer(&mut self, name: &str, edges: usize) -> Result<Layer, WeightsError> {
+        let (shape, weights) = self.take(&format!("{name}.weight"), edges)?;
+        let (_, bias) = self.take(&format!("{name}.bias"), 1)?;
+        let square = edges == 2 || shape[1] == shape[2];
+        if !square || bias.len() != shape[0] {
+            return Err(WeightsError::new(
+                format!("a square kernel and {} biases of {name}", shape[0]),
+                format!("{shape:?} and {}", bias.len()),
+            ));
+        }
+        let kernel = if edges == 4 { shape[1] } else { 1 };
+        Ok(Layer { weights, bias, kernel })
+    }
+}
+
+/// The next line, without its end.
+fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, WeightsError> {
+    let wrong = || WeightsError::new("lines of ASCII", "something else");
+    let end = rest.iter().take(200).position(|byte| *byte == b'\n').ok_or_else(wrong)?;
+    let (line, after) = rest.split_at(end);
+    *rest = &after[1..];
+    std::str::from_utf8(line).map_err(|_| wrong())
+}
+
+/// A half float in single precision, exactly.
+fn from_half(bytes: [u8; 2]) -> f32 {
+    let half = u32::from(u16::from_le_bytes(bytes));
+    let (sign, exponent, fraction) = ((half & 0x8000) << 16, (half >> 10) & 0x1f, half & 0x3ff);
+    match exponent {
+        // Below the least normal number: the fraction counts in steps of 2^-24.
+        0 => f32::from_bits(sign | (fraction as f32 * 2.0_f32.powi(-24)).to_bits()),
+        0x1f => f32::from_bits(sign | 0x7f80_0000 | (fraction << 13)),
+        _ => f32::from_bits(sign | ((exponent + 112) << 23) | (fraction << 13)),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_floats_are_exact() {
+        let known = [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x3555, 0.333_251_95),
+            (0x0001, 5.960_464_5e-8),
+            (0x7bff, 65504.0),
+            (0x8000, 0.0),
+        ];
+        for (half, value) in known {
+            assert_eq!(from_half(u16::to_le_bytes(half)), value, "{half:x}");
+        }
+        assert!(
+            from_half(u16::to_le_bytes(0x7e00)).is_nan() && from_half(u16::to_le_bytes(0xfc00)) == f32::NEG_INFINITY
+        );
+    }
+
+    #[test]
+    fn damaged_files_are_refused() {
+        let good = b"voodoo person 1\nhead.weight 2 1\nhead.bias 2\n\n\x00\x3c\x00\x40\x00\x00\x00\x3c".to_vec();
+        let mut weights = Weights::read(&good).unwrap();
+        let layer = weights.layer("head", 2).unwrap();
+        assert_eq!((layer.weights, layer.bias, layer.kernel), (vec![1.0, 2.0], vec![0.0, 1.0], 1));
+        assert!(weights.layer("head", 2).is_err(), "taken already");
+        let mut wrong =
+            vec![good[..good.len() - 1].to_vec(), [&good[..], b"x"].concat(), b"voodoo person 2\n\n".to_vec()];
+        wrong.push(b"voodoo person 1\nhead.weight 4294967296 4294967296 2\n\n".to_vec());
+        wrong.push(b"voodoo person 1\nhead.weight x\n\n".to_vec());
+        wrong.push(Vec::new());
+        for bytes in wrong {
+            assert!(Weights::read(&bytes).is_err(), "{:?}", String::from_utf8_lossy(&bytes));
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Convolutions with kernels of 3 x 3 by fewer multiplications: Winograd's minimal filtering F(2 x 2, 3 x 3), see Lavin and Gray, "Fast
+//! Algorithms for Convolutional Neural Networks", CVPR 2016.
+//!
+//! Every 4 x 4 pixels of the map give 2 x 2 pixels after it. Both are sums of transformed ones; there the convolution is a product
+//! for each of the 16 places, 16 multiplications instead of 36.
+
+use crate::product::Panels;
+use voodoo_core::math::widest;
+
+/// Edge of the kernel.
+pub(crate) const KERNEL: usize = 3;
+/// Edge of what is seen at once.
+const SEEN: usize = 4;
+/// Edge of what that gives.
+const GIVEN: usize = SEEN + 1 - KERNEL;
+/// Places of a transformed tile.
+const PLACES: usize = SEEN * SEEN;
+/// Of these the one that all pixels of a tile get with weight one: the bias is added there.
+const EVERYWHERE: usize = SEEN + 1;
+
+/// A convolution with a kernel of 3 x 3 that keeps the map's even edge.
+#[derive(Debug)]
+pub(crate) struct Winograd {
+    places: Vec<Panels>,
+}
+
+/// Working memory: all tiles of the map, place by place, before and after the products.
+#[derive(Debug, Default)]
+pub(crate) struct Tiles {
+    seen: Vec<f32>,
+    given: Vec<f32>,
+}
+
+impl Winograd {
+    /// Of `weights` (out, ky, kx, in) and biases.
+    pub(crate) fn of(weights: &[f32], bias: &[f32]) -> Self {
+        let none = vec![0.0; bias.len()];
+        let inputs = weights.len().checked_div(bias.len() * KERNEL * KERNEL).unwrap_or(0);
+        let mut transformed = vec![Vec::new(); PLACES];
+        for kernel in weights.chunks_exact((KERNEL * KERNEL * inputs).max(1)) {
+            for input in 0..inputs {
+                let at = |ky: usize, kx: usize| kernel[(ky * KERNEL + kx) * inputs + input];
+                let columns: [[f32; SEEN]; KERNEL] =
+                    std::array::from_fn(|kx| of_kernel([0, 1, 2].map(|ky| at(ky, kx))));
+                for row in 0..SEEN {
+                    let places = of_kernel(columns.map(|column| column[row]));
+                    (0..SEEN).for_each(|column| transformed[row * SEEN + column].push(places[column]));
+                }
+            }
+        }
+        let panels =
+            |(place, weights): (usize, &Vec<f32>)| Panels::of(weights, if place == EVERYWHERE { bias } else { &none });
+        Self { places: transformed.iter().enumerate().map(panels).collect() }
+    }
+
+    pub(crate) fn inputs(&self) -> usize {
+        self.places[0].inputs
+    }
+
+    pub(crate) fn outputs(&self) -> usize {
+        self.places[0].outputs
+    }
+
+    /// The map after it, of the same `edge`.
+    pub(crate) fn apply(&self, map: &[f32], edge: usize, tiles: &mut Tiles, out: &mut [f32]) {
+        let (inputs, outputs) = (self.inputs(), self.outputs());
+        let count = (edge / GIVEN) * (edge / GIVEN);
+        let Tiles { seen, given } = tiles;
+        seen.resize(PLACES * count * inputs, 0.0);
+        given.resize(PLACES * count * outputs, 0.0);
+        widest(
+            #[inline(always)]
+            || look(map, edge, inputs, seen),
+        );
+        for (place, panels) in self.places.iter().enumerate() {
+            panels.apply(
+                &seen[place * count * inputs..][..count * inputs],
+                &mut given[place * count * outputs..][..count * outputs],
+            );
+        }
+        widest(
+            #[inline(always)]
+            || give(given, edge, outputs, out),
+        );
+    }
+}
+
+/// Transforms a line of the kernel.
+fn of_kernel([a, b, c]: [f32; KERNEL]) -> [f32; SEEN] {
+    [a, 0.5 * (a + b + c), 0.5 * (a - b + c), c]
+}
+
+/// Channels that are transformed together.
+const CHANNELS: usize = 16;
+/// The values of these channels.
+type Values = [f32; CHANNELS];
+
+/// All transformed tiles of a map, with zeros around it.
+#[inline(always)]
+fn look(map: &[f32], edge: usize, channels: usize, seen: &mut [f32]) {
+    let across = edge / GIVEN;
+    let count = across * across;
+    let (mut tile, mut half, mut whole) =
+        ([[[0.0; CHANNELS]; SEEN]; SEEN], [[[0.0; CHANNELS]; SEEN]; SEEN], [[[0.0; CHANNELS]; SEEN]; SEEN]);
+    for number in 0..count {
+        let (top, left) = (GIVEN * (number / across), GIVEN * (number % across));
+        for first in (0..channels).step_by(CHANNELS) {
+            let here = CHANNELS.min(channels - first);
+            for (row, line) in tile.iter_mut().enumerate() {
+                for (column, values) in line.iter_mut().enumerate() {
+                    // The tile begins a pixel before what it gives.
+                    let [y, x] = [top + row, left + column];
+                    if y == 0 || x == 0 || y > edge || x > edge {
+                        *values = [0.0; CHANNELS];
+                    } else {
+                        load(values, &map[((y - 1) * edge + x - 1) * channels + first..][..here]);
+                    }
+                }
+            }
+            for column in 0..SEEN {
+                for lane in 0..CHANNELS {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|row: usize| tile[row][column][lane]);
+                    half[0][column][lane] = a - c;
+                    half[1][column][lane] = b + c;
+                    half[2][column][lane] = c - b;
+                    half[3][column][lane] = b - d;
+                }
+            }
+            for (half, whole) in half.iter().zip(&mut whole) {
+                for lane in 0..CHANNELS {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|column: usize| half[column][lane]);
+                    whole[0][lane] = a - c;
+                    whole[1][lane] = b + c;
+                    whole[2][lane] = c - b;
+                    whole[3][lane] = b - d;
+                }
+            }
+            for (place, values) in whole.as_flattened().iter().enumerate() {
+                store(&mut seen[(place * count + number) * channels + first..][..here], values);
+            }
+        }
+    }
+}
+
+/// The map from all its tiles.
+#[inline(always)]
+fn give(given: &[f32], edge: usize, channels: usize, out: &mut [f32]) {
+    let across = edge / GIVEN;
+    let count = across * across;
+    let (mut tile, mut half, mut whole) =
+        ([[0.0; CHANNELS]; PLACES], [[[0.0; CHANNELS]; SEEN]; GIVEN], [[0.0; CHANNELS]; GIVEN]);
+    for number in 0..count {
+        let (top, left) = (GIVEN * (number / across), GIVEN * (number % across));
+        for first in (0..channels).step_by(CHANNELS) {
+            let here = CHANNELS.min(channels - first);
+            for (place, values) in tile.iter_mut().enumerate() {
+                load(values, &given[(place * count + number) * channels + first..][..here]);
+            }
+            for column in 0..SEEN {
+                for lane in 0..CHANNELS {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|row: usize| tile[row * SEEN + column][lane]);
+                    half[0][column][lane] = a + b + c;
+                    half[1][column][lane] = b - c - d;
+                }
+            }
+            for (row, half) in half.iter().enumerate() {
+                for lane in 0..CHANNELS {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|column: usize| half[column][lane]);
+                    whole[0][lane] = a + b + c;
+                    whole[1][lane] = b - c - d;
+                }
+                for (column, values) in whole.iter().enumerate() {
+                    let pixel = (top + row) * edge + left + column;
+                    store(&mut out[pixel * channels + first..][..here], values);
+                }
+            }
+        }
+    }
+}
+
+/// Copies all channels, or those that there are.
+#[inline(always)]
+fn load(to: &mut Values, from: &[f32]) {
+    match from.first_chunk() {
+        Some(from) => *to = *from,
+        None => to[..from.len()].copy_from_slice(from),
+    }
+}
+
+#[inline(always)]
+fn store(to: &mut [f32], from: &Values) {
+    match to.first_chunk_mut() {
+        Some(to) => *to = *from,
+        None => to.copy_from_slice(&from[..to.len()]),
+    }
+}

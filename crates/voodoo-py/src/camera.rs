@@ -1,0 +1,81 @@
+//! The core's camera: what `voodoo.Camera` asks, and what every function that takes one is given.
+
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+use voodoo_core::Camera;
+use voodoo_core::camera::Lens;
+use voodoo_core::math::Vec3;
+
+use crate::arrays::rows;
+use crate::errors::{IntoPy, exception};
+
+type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
+
+#[pyclass(name = "Camera", module = "voodoo._core", frozen)]
+pub struct PyCamera {
+    pub camera: Arc<Camera>,
+    model: String,
+    coefficients: Vec<f64>,
+}
+
+#[pymethods]
+impl PyCamera {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        width: usize,
+        height: usize,
+        intrinsics: [f64; 4],
+        model: String,
+        coefficients: Vec<f64>,
+    ) -> PyResult<Self> {
+        let camera = Lens::from_model(&model, &coefficients)
+            .and_then(|lens| Camera::new(width, height, intrinsics, lens))
+            .map_err(|error| error.into_py(py))?;
+        Ok(Self { camera: Arc::new(camera), model, coefficients })
+    }
+
+    fn __getnewargs__(&self) -> Arguments {
+        let ([fx, fy], [cx, cy]) = (self.camera.focal(), self.camera.center());
+        let (width, height) = (self.camera.width(), self.camera.height());
+        (width, height, [fx, fy, cx, cy], self.model.clone(), self.coefficients.clone())
+    }
+
+    /// Pixels (N, 2) of points (N, 3) in the camera's frame; NaN where there is none.
+    fn project<'py>(&self, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let pixel = |point: &[f64; 3]| {
+            let point = Vec3::from_array(*point);
+            self.camera.project(point).filter(|_| point.is_finite()).unwrap_or([f64::NAN; 2])
+        };
+        pairs(points.py(), rows("points", &points)?.iter().map(pixel))
+    }
+
+    /// `(x/z, y/z)` (N, 2) of pixels (N, 2); NaN where the lens puts nothing.
+    fn undistorted<'py>(&self, pixels: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let ray = |pixel: &[f64; 2]| self.camera.ray(*pixel).unwrap_or([f64::NAN; 2]);
+        pairs(pixels.py(), rows("pixels", &pixels)?.iter().map(ray))
+    }
+
+    /// `(x/z, y/z)` (H, W, 2) of all pixels; releases the GIL.
+    fn rays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let rays = py.detach(|| self.camera.rays());
+        PyArray1::from_slice(py, rays.as_flattened()).reshape([self.camera.height(), self.camera.width(), 2])
+    }
+}
+
+fn pairs<'py>(py: Python<'py>, found: impl ExactSizeIterator<Item = [f64; 2]>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let count = found.len();
+    PyArray1::from_vec(py, found.flatten().collect()).reshape([count, 2])
+}
+
+/// The core's camera of a `voodoo.Camera`.
+pub fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
+    let core = camera.getattr("core").ok().and_then(|core| core.cast_into::<PyCamera>().ok());
+    core.map(|core| Arc::clone(&core.get().camera)).ok_or_else(|| {
+        let found = camera.get_type().name().map_or_else(|_| "something else".into(), |name| name.to_string());
+        let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
+        exception(camera.py(), "MeasurementError", text)
+    })
+}

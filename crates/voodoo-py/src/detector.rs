@@ -1,0 +1,273 @@
+//! Detectors that are handed in from Python.
+
+use std::collections::HashMap;
+use std::ffi::CString;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString, PyTuple};
+use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::math::Vec3;
+use voodoo_core::observation::frame::{DepthImage, Ground};
+
+use crate::arrays::{contiguous, matrix, vector};
+use crate::errors::{exception, wrong_argument};
+
+/// Standard deviation of a joint that a detector does not give one for, metres.
+const SIGMA: f64 = 0.05;
+/// Probabilities are this far from 0 and 1 at least: their log odds are finite.
+const LEAST: f64 = 1e-7;
+
+/// What a caller wants as a detector: "shipped", None, a `voodoo.Detector`, or an object with `joints` and `detect(image)`.
+pub fn detector(wanted: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
+    let py = wanted.py();
+    if wanted.is_none() {
+        return Ok(None);
+    }
+    if wanted.cast::<PyString>().is_ok_and(|word| word == "shipped") {
+        return Ok(shipped());
+    }
+    #[cfg(feature = "detect")]
+    if let Ok(detector) = wanted.cast::<crate::detect::PyDetector>() {
+        return Ok(Some(detector.try_borrow()?.0.fresh()));
+    }
+    if wanted.hasattr("joints")? && wanted.hasattr("detect")? {
+        return Ok(Some(Box::new(PythonDetector::new(wanted)?)));
+    }
+    let text = format!(
+        "detector: expected \"shipped\", None, a voodoo.Detector, or an object with joints and detect(image), found {}",
+        wanted.repr()?
+    );
+    Err(exception(py, "ConfigError", text))
+}
+
+/// The detector that comes with the library, if this build has it.
+fn shipped() -> Option<Box<dyn Detect>> {
+    #[cfg(feature = "detect")]
+    return Some(Box::new(voodoo_detect::Detector::new()));
+    #[cfg(not(feature = "detect"))]
+    None
+}
+
+/// Says that a detector failed in a step, which went on without it: a warning, or what ends programs (KeyboardInterrupt) itself.
+pub fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>) -> PyResult<()> {
+    let Some(error) = error else { return Ok(()) };
+    let cause = error.downcast_ref::<PyErr>();
+    if let Some(cause) = cause.filter(|cause| !cause.is_instance_of::<PyException>(py)) {
+        return Err(cause.clone_ref(py));
+    }
+    let category = py.import("voodoo.errors")?.getattr("DetectorWarning")?;
+    let text = format!("the detector failed, the step went on without it: {error}").replace('\0', "");
+    // Python's own wrapper of the step is one frame, whoever called it the next.
+    PyErr::warn(py, &category, &CString::new(text)?, 2).inspect_err(|raised| {
+        raised.set_cause(py, cause.map(|cause| cause.clone_ref(py)));
+    })
+}
+
+/// An object with `joints`, `lengths` and `detect(image)`.
+#[derive(Clone, Debug)]
+struct PythonDetector {
+    object: Arc<Py<PyAny>>,
+    joints: Vec<String>,
+    lengths: Vec<String>,
+}
+
+impl PythonDetector {
+    fn new(object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let names = |attribute: &str| -> PyResult<Vec<String>> {
+            let Some(found) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
+            found.extract().map_err(|_| {
+                let found = found.repr().map_or_else(|_| "something else".into(), |text| text.to_string());
+                let text = format!("detector.{attribute}: expected a sequence of names, found {found}");
+                exception(object.py(), "ConfigError", text)
+            })
+        };
+        Ok(Self { joints: names("joints")?, lengths: names("lengths")?, object: Arc::new(object.clone().unbind()) })
+    }
+
+    fn ask(
+        &self,
+        py: Python<'_>,
+        image: &DepthImage,
+        around: &Surroundings,
+        query: DetectionQuery,
+    ) -> PyResult<Vec<Detection>> {
+        let input = input(py, image, around, query)?;
+        let found = self.object.bind(py).call_method1("detect", (input,))?;
+        let mut persons =
+            found.try_iter()?.map(|person| self.detection(&person?, image)).collect::<PyResult<Vec<Detection>>>()?;
+        persons.sort_by(|a, b| b.person.total_cmp(&a.person));
+        Ok(persons)
+    }
+
+    /// What an object with the attributes of `voodoo.detectors.DetectedPerson` says.
+    fn detection(&self, person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Detection> {
+        let py = person.py();
+        if person.getattr("joints")?.is_none() {
+            return Err(wrong_argument(py, "joints", "a mapping from names", &person.getattr("joints")?));
+        }
+        let positions: HashMap<String, Bound<'_, PyAny>> = mapping(person, "joints")?;
+        if let Some(name) = positions.keys().find(|name| !self.joints.contains(name)) {
+            let text = format!("joints: expected some of {}, found {name:?}", self.joints.join(", "));
+            return Err(exception(py, "MeasurementError", text));
+        }
+        let (sigma, visible) = (of_each(person, "joint_sigma", SIGMA)?, of_each(person, "visible", 1.0)?);
+        let joint = |name: &String| {
+            let Some(position) = positions.get(name) else { return Ok(None) };
+            let position = vector(&format!("joints[{name}]"), position)?;
+            Ok(Some(DetectedJoint { position, sigma: sigma(name), visible: visible(name) }))
+        };
+        let joints = self.joints.iter().map(joint).collect::<PyResult<Vec<_>>>()?;
+        let confidence = log_odds(person, "confidence")?;
+        Ok(Detection {
+            lengths: self.lengths_of(person)?,
+            facing: log_odds(person, "facing")?,
+            floor: floor(person)?,
+            pixels: pixels(person, image)?,
+            ..Detection::new(joints, confidence.unwrap_or(0.0))
+        })
+    }
+
+    /// All lengths that the detector names, or none.
+    fn lengths_of(&self, person: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 2]>> {
+        let lengths: HashMap<String, f64> = mapping(person, "lengths")?;
+        if lengths.is_empty() {
+            return Ok(Vec::new());
+        }
+        let sigmas: HashMap<String, f64> = mapping(person, "length_sigma")?;
+        let length = |name: &String| match (lengths.get(name), sigmas.get(name)) {
+            (Some(length), Some(sigma)) => Ok([*length, sigma / length]),
+            _ => {
+                let text = format!(
+                    "lengths and length_sigma: expected all of {}, found none of {name}",
+                    self.lengths.join(", ")
+                );
+                Err(exception(person.py(), "MeasurementError", text))
+            }
+        };
+        self.lengths.iter().map(length).collect()
+    }
+}
+
+impl Detect for PythonDetector {
+    fn joints(&self) -> Vec<String> {
+        self.joints.clone()
+    }
+
+    fn lengths(&self) -> Vec<String> {
+        self.lengths.clone()
+    }
+
+    fn fresh(&self) -> Box<dyn Detect> {
+        Box::new(self.clone())
+    }
+
+    fn detect(
+        &mut self,
+        image: &DepthImage,
+        around: &Surroundings,
+        query: DetectionQuery,
+    ) -> Result<Vec<Detection>, DetectError> {
+        // A step has released the GIL.
+        Python::attach(|py| self.ask(py, image, around, query)).map_err(DetectError::from)
+    }
+}
+
+/// A `voodoo.detectors.DetectorImage`.
+fn input<'py>(
+    py: Python<'py>,
+    image: &DepthImage,
+    around: &Surroundings,
+    query: DetectionQuery,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (width, height, lens) = (image.camera.width(), image.camera.height(), image.camera.lens());
+    let ([fx, fy], [cx, cy]) = (image.camera.focal(), image.camera.center());
+    let mut depth = Vec::new();
+    around.open_depth(image, &mut depth);
+    let camera = PyDict::new(py);
+    camera.set_item("width", width)?;
+    camera.set_item("height", height)?;
+    for (name, value) in [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)] {
+        camera.set_item(name, value)?;
+    }
+    camera.set_item("distortion", PyTuple::new(py, lens.coefficients())?)?;
+    camera.set_item("model", lens.model())?;
+    let camera = py.import("voodoo.model.camera")?.getattr("Camera")?.call((), Some(&camera))?;
+    let (query, near) = match query {
+        DetectionQuery::All => ("all", None),
+        DetectionQuery::Any => ("any", None),
+        DetectionQuery::New => ("new", None),
+        DetectionQuery::Near(place) => ("near", Some(PyArray1::from_slice(py, &place.to_array()))),
+    };
+    let fields = PyDict::new(py);
+    fields.set_item("depth", PyArray1::from_vec(py, depth).reshape([height, width])?)?;
+    fields.set_item("camera", camera)?;
+    fields.set_item(
+        "world_from_sensor",
+        PyArray1::from_slice(py, matrix(&image.world_from_sensor).as_flattened()).reshape([4, 4])?,
+    )?;
+    fields.set_item("floor", around.ground.map(|Ground { normal, offset }| (normal.to_array(), offset)))?;
+    fields.set_item("query", query)?;
+    fields.set_item("near", near)?;
+    py.import("voodoo.detectors")?.getattr("DetectorImage")?.call((), Some(&fields))
+}
+
+/// An attribute that is a mapping by names; empty where it is missing or None.
+fn mapping<'py, T>(person: &Bound<'py, PyAny>, attribute: &str) -> PyResult<HashMap<String, T>>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+{
+    let Some(found) = person.getattr_opt(attribute)?.filter(|found| !found.is_none()) else {
+        return Ok(HashMap::new());
+    };
+    let pairs = found.call_method0("items").and_then(|items| items.try_iter()?.collect::<PyResult<Vec<_>>>());
+    let entry = |pair: &Bound<'py, PyAny>| -> PyResult<(String, T)> {
+        let value = pair.get_item(1)?.extract::<T>().map_err(Into::into)?;
+        Ok((pair.get_item(0)?.extract()?, value))
+    };
+    pairs
+        .and_then(|pairs| pairs.iter().map(entry).collect())
+        .map_err(|_| wrong_argument(person.py(), attribute, "a mapping from names", &found))
+}
+
+/// An attribute that is one number, or a mapping with one for every joint.
+fn of_each(person: &Bound<'_, PyAny>, attribute: &str, default: f64) -> PyResult<impl Fn(&str) -> f64> {
+    let found = person.getattr_opt(attribute)?.filter(|found| !found.is_none());
+    let one = found.as_ref().map_or(Some(default), |found| found.extract::<f64>().ok());
+    let each: HashMap<String, f64> = if one.is_some() { HashMap::new() } else { mapping(person, attribute)? };
+    Ok(move |name: &str| one.or_else(|| each.get(name).copied()).unwrap_or(default))
+}
+
+/// Log odds of an attribute that is a probability, or None.
+fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>> {
+    let Some(found) = person.getattr_opt(attribute)?.filter(|found| !found.is_none()) else { return Ok(None) };
+    let probability = found.extract::<f64>().ok().filter(|value| (0.0..=1.0).contains(value));
+    let probability = probability
+        .ok_or_else(|| wrong_argument(person.py(), attribute, "a probability, from 0 to 1", &found))?
+        .clamp(LEAST, 1.0 - LEAST);
+    Ok(Some((probability / (1.0 - probability)).ln()))
+}
+
+/// The attribute `floor`: normal and offset, or None.
+fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
+    let Some(found) = person.getattr_opt("floor")?.filter(|found| !found.is_none()) else { return Ok(None) };
+    let wrong = |_| wrong_argument(person.py(), "floor", "a unit normal and an offset in metres", &found);
+    let (normal, offset): (Bound<'_, PyAny>, f64) = found.extract().map_err(wrong)?;
+    let normal: Vec3 = vector("floor[0]", &normal)?;
+    Ok(normal.try_normalize().map(|normal| Ground { normal, offset }))
+}
+
+/// The attribute `mask` (height, width) bool, as indices; none where it is missing or None.
+fn pixels(person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Vec<usize>> {
+    let Some(found) = person.getattr_opt("mask")?.filter(|found| !found.is_none()) else { return Ok(Vec::new()) };
+    let array = contiguous(&found).ok().and_then(|array| array.cast_into::<PyArray2<bool>>().ok());
+    let [height, width] = [image.camera.height(), image.camera.width()];
+    let array = array.filter(|array| array.shape() == [height, width]).ok_or_else(|| {
+        let expected = format!("an array of shape ({height}, {width}) and dtype bool");
+        wrong_argument(person.py(), "mask", &expected, &found)
+    })?;
+    let view = array.readonly();
+    Ok(view.as_slice()?.iter().enumerate().filter(|(_, shown)| **shown).map(|(index, _)| index).collect())
+}

@@ -1,0 +1,81 @@
+"""The table of lab/experiments/disturbed_starts.py."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import voodoo
+from lab_scripts import load_experiment
+
+ROOT = Path(__file__).resolve().parents[2]
+BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
+
+
+@pytest.fixture
+def disturbed():
+    return load_experiment("disturbed_starts")
+
+
+def test_the_first_start_is_the_recordings_own_and_the_others_are_near_it(disturbed, monkeypatch, capsys):
+    started = []
+    reset = voodoo.Tracker.reset
+
+    def noted(self, *, joints, **how):
+        started.append(np.array(list(joints.values())))
+        return reset(self, joints=joints, **how)
+
+    monkeypatch.setattr(voodoo.Tracker, "reset", noted)
+    monkeypatch.setattr(sys, "argv", ["disturbed_starts.py", str(BUNDLED), "--starts", "2"])
+    disturbed.main()
+    own = voodoo.open_recording(BUNDLED).start["joints"]
+    assert np.array_equal(started[0], np.array(list(own.values())))
+    assert 0.002 < (started[1] - started[0]).std() < 0.006
+    row, _, total, far, near, *calibration = capsys.readouterr().out.strip().splitlines()[2:]
+    errors = [float(word) for word in row.split("|")[2].split()]
+    assert len(errors) == 2 and 0.5 < min(errors) <= max(errors) < 6.0, row
+    assert "of 2 runs end with a joint lost" in total
+    assert "limbs off by 10 cm: " in far
+    assert int(near.split()[0]) > 100 and 0.0 <= float(near.split("nearer: ")[1].split()[0]) < 25.0
+    assert "## Standard deviations against exact truth" in calibration
+
+
+def test_a_lost_joint_is_named(disturbed, monkeypatch):
+    class Still(voodoo.Tracker):
+        """It stays where it started: nothing is near enough to be matched."""
+
+        def __init__(self, body):
+            blind = voodoo.Config(
+                gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, outline=False
+            )
+            super().__init__(body, config=blind)
+
+    monkeypatch.setattr(voodoo, "Tracker", Still)
+    recording = voodoo.open_recording(BUNDLED, use=("depth",))
+    error, kind, lost, (far, near), _ = disturbed.run(recording, np.random.default_rng(0), 0.0)
+    assert error > 0.10 and kind == 0
+    assert 0 < far[0] <= far[1] and near[1] > 0
+    assert "l_wrist" in lost or "r_wrist" in lost, lost
+
+
+def test_a_recording_without_truth_is_refused(disturbed):
+    class Bare:
+        name, start, reference = "bare", None, None
+
+    with pytest.raises(SystemExit, match="bare: expected a recording with a start and a reference, found none"):
+        disturbed.run(Bare(), np.random.default_rng(0), 0.0)
+
+
+def test_a_recording_played_backwards_is_tracked_from_its_end(disturbed):
+    """Its truth is mirrored with it: from the same place the error stays small, and frames come in the order of time."""
+    recording = voodoo.open_recording(BUNDLED, use=("depth",))
+    played = disturbed.Played(recording, backwards=True, every=2)
+    stamps = [frame.stamp for frame in played]
+    assert len(stamps) == (len(recording) + 1) // 2 and (np.diff(stamps) > 0).all()
+    last = recording.reference.positions[-1]
+    names = recording.reference.names
+    assert np.array_equal(played.start["joints"]["l_wrist"], last[names.index("l_wrist")])
+    error, _, lost, _, found = disturbed.run(played, np.random.default_rng(0), 0.0)
+    assert error < 0.06 and not lost, (error, lost)
+    assert np.linalg.norm(found.errors, axis=2).mean() == pytest.approx(error) and np.isfinite(found.sigma).all()

@@ -1,0 +1,58 @@
+"""The figures of the pages are those of lab/figures/runs.json."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from lab.figures import PAGES, load, rendered, updated
+from lab.figures.pages import BLOCK, HERE, ROOT, VALUE
+
+MACHINES, RUNS = load()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_a_page_shows_the_figures_of_the_runs(page: Path):
+    text = page.read_text(encoding="utf-8")
+    assert BLOCK.search(text), f"{page} has no block of figures"
+    assert updated(text, MACHINES, RUNS) == text, "change runs.json, then run: python -m lab.figures"
+
+
+def test_a_number_that_a_hand_has_changed_is_found():
+    text = PAGES[0].read_text(encoding="utf-8")
+    shown = f"{RUNS['rendered'].values['mean_cm']} cm mean joint error"
+    assert shown in text
+    assert updated(text.replace(shown, "1.1 cm mean joint error"), MACHINES, RUNS) == text
+
+
+def test_every_block_is_shown_and_every_run_is_used():
+    blocks = {path.stem for path in (HERE / "blocks").glob("*.md")} | {"runs"}
+    shown = {name for page in PAGES for name, _ in BLOCK.findall(page.read_text(encoding="utf-8"))}
+    assert shown == blocks
+    used = {run for path in (HERE / "blocks").glob("*.md") for run, *_ in VALUE.findall(path.read_text("utf-8"))}
+    assert used == set(RUNS)
+
+
+def test_numbers_keep_their_digits(monkeypatch, tmp_path):
+    (tmp_path / "blocks").mkdir()
+    (tmp_path / "blocks" / "some.md").write_text("{rendered.mean_cm}; {rendered.mean_cm:.2f}; {rendered.lost}\n")
+    monkeypatch.setattr("lab.figures.pages.HERE", tmp_path)
+    assert rendered("some", MACHINES, RUNS) == "2.4; 2.40; 0\n"
+    (tmp_path / "blocks" / "some.md").write_text("{rendered.nothing}")
+    with pytest.raises(KeyError, match="nothing"):
+        rendered("some", MACHINES, RUNS)
+
+
+def test_commits_and_scripts_of_the_runs_are_there():
+    for run in RUNS.values():
+        for path in re.findall(r"(?:lab|benches|examples|scripts)/[\w/.]+", run.command):
+            assert (ROOT / path).exists(), f"{run.id}: {path}"
+    git = ["git", "-C", str(ROOT)]
+    if (
+        subprocess.run([*git, "rev-parse", "--is-shallow-repository"], capture_output=True, text=True).stdout.strip()
+        != "false"
+    ):
+        pytest.skip("no history")
+    for run in RUNS.values():
+        shown = subprocess.run([*git, "show", "-s", "--format=%as", run.commit], capture_output=True, text=True)
+        assert shown.stdout.strip() == run.date, f"{run.id}: {run.commit} {shown.stderr}"

@@ -1,0 +1,32 @@
+"""The body carried by rays alone: lab/experiments/fusion_pose2sim.py."""
+
+import fusion_pose2sim
+import pytest
+
+from voodoo.recordings import open_recording
+
+
+@pytest.fixture(scope="module")
+def folder(voodoo_data):
+    path = voodoo_data / "pose2sim"
+    if not path.is_dir():
+        pytest.skip(f"the Pose2Sim recording is not at {path}")
+    return path
+
+
+@pytest.mark.parametrize("solver", ["limbwise", "chain"])
+def test_rays_alone_follow_the_balancing_trial(folder, solver):
+    run = fusion_pose2sim.track(folder, "all", fusion_pose2sim.CONFIG.model_copy(update={"solver": solver}))
+    assert run.errors.shape == (100, 12)
+    assert run.errors.mean() < 0.03
+
+
+def test_a_camera_less_and_random_pixels(folder):
+    config = fusion_pose2sim.CONFIG
+    names = [camera.name for camera in open_recording(folder).cameras]
+    for missing in names:
+        kept = tuple(name for name in names if name != missing)
+        assert fusion_pose2sim.track(folder, missing, config, cameras=kept).errors.mean() < 0.045, missing
+    wrong = fusion_pose2sim.track(folder, "20 %", config, outliers=0.2)
+    assert wrong.errors[-10:].mean() < 0.05
+    assert all(estimate.status == "tracking" for estimate in wrong.estimates)

@@ -1,0 +1,48 @@
+"""Somebody walks by in front of the person of a recording: the table of lab/experiments/passer_by.py."""
+
+from itertools import cycle
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lab_scripts import load_experiment
+from voodoo.recordings import open_recording, sample_path
+from voodoo.synthetic.passer_by import WithPasserBy
+
+
+@pytest.fixture(scope="module")
+def both():
+    recording = open_recording(sample_path())
+    return recording, WithPasserBy(recording, speed=1.2)
+
+
+def test_wrong_frames_are_those_called_tracking_far_from_the_person(both):
+    example = load_experiment("passer_by")
+    _, passed = both
+    begin, end = passed.passes
+    truth = passed.people
+    roots = truth.of("humanoid_root")[
+        np.abs(truth.stamps[:, None] - [frame.stamp for frame in passed]).argmin(axis=0), 0
+    ]
+    near, far = np.array([0.0, 0.4, 0.0]), np.array([0.0, 0.7, 0.0])
+
+    def said(root, shift, status):
+        return SimpleNamespace(joints={"humanoid_root": root + shift}, status=status)
+
+    turns = [(near, "tracking"), (far, "tracking"), (far, "lost"), None]
+    estimates = [turn and said(root, *turn) for turn, root in zip(cycle(turns), roots, strict=False)]
+    told = example.passed(passed, estimates)
+    inside = [index % 4 for index, frame in enumerate(passed) if begin <= frame.stamp <= end]
+    assert told.frames == len(inside) > 20
+    assert (told.wrong, told.without) == (inside.count(1), inside.count(3))
+    assert told.far == inside.count(1) + inside.count(2)
+    assert told.greatest == pytest.approx(0.7)
+
+
+def test_whoever_is_hidden_in_a_cartwheel_is_not_taken_for_the_one_in_front(voodoo_data):
+    """Everything that could lead there did once: the search, the detector's place, and hypotheses of limbs where it saw them."""
+    example = load_experiment("passer_by")
+    passed = WithPasserBy(open_recording(voodoo_data / "rendered" / "dev_06_cartwheel"), speed=0.6)
+    told = example.passed(passed, example.alone(passed))
+    assert told.frames > 80 and told.wrong == 0

@@ -1,0 +1,97 @@
+"""From a frame to what the network learns from: the product's own candidates, each with its truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.training.scenes import Frame, Person
+from voodoo import Camera, _core
+
+Array = NDArray[np.float64]
+PERSON_SHARE = (0.1, 0.45)  # of a candidate's pixels: below the first it is nobody, above the second somebody
+PERSON_COVER = 0.5  # of the person's pixels that a candidate must hold
+LEAST_JOINTS = 5  # seen, for a person to be worth learning from
+NEAREST = 0.3  # m; joints nearer to the camera's plane have no place in the picture
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One candidate: picture (96, 96) float16 and mask bits, and its truth; joints in the picture's coordinates, m."""
+
+    depth: NDArray[np.float16]
+    mask: NDArray[np.uint8]
+    middle: Array
+    person: bool
+    joints: Array
+    weight: Array
+    seen: NDArray[np.bool_]
+    facing: float
+    lengths: Array
+    share: float
+    cover: float
+    up_known: bool
+
+
+def place(points: Array, middle: Array, roll: float) -> Array:
+    """Points of the camera's frame in the coordinates of a picture: right, down and behind its middle, m."""
+    c, s = np.cos(roll), np.sin(roll)
+    x, y, z = (
+        c * points[:, 0] - s * points[:, 1],
+        s * points[:, 0] + c * points[:, 1],
+        np.maximum(points[:, 2], NEAREST),
+    )
+    return np.stack([(x / z - middle[0]) * middle[2], (y / z - middle[1]) * middle[2], z - middle[2]], 1)
+
+
+def lifted(places: Array, middle: Array) -> Array:
+    """The inverse of `place`, in the turned camera's frame; any leading axes."""
+    z = places[..., 2] + middle[..., None, 2]
+    xy = places[..., :2] / middle[..., None, 2:3] + middle[..., None, :2]
+    return np.concatenate([xy * z[..., None], z[..., None]], -1)
+
+
+def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sample]:
+    """At most so many candidates of a frame that show a person, and as many (one, beside people) that show none."""
+    floor = None if frame.floor is None else (list(frame.floor[0]), float(frame.floor[1]))
+    up = None if frame.up is None else list(frame.up)
+    height, width = frame.depth.shape
+    found = _core.person_candidates(frame.depth, camera=Camera(width, height, *frame.intrinsics), up=up, floor=floor)
+    counts = {p.label: int((frame.labels == p.label).sum()) for p in frame.people}
+    yes: list[Sample] = []
+    no: list[Sample] = []
+    for i in rng.permutation(len(found)):
+        candidate = found[i]
+        inside = frame.labels[candidate.mask]
+        total = max(len(inside), 1)
+        held = {label: int((inside == label).sum()) for label in counts}
+        if sum(held.values()) < PERSON_SHARE[0] * total:
+            if len(no) < (1 if frame.people else most) and (not frame.people or rng.random() < 0.5):
+                no.append(_sample(candidate, None, 0.0, 0.0, up is not None))
+            continue
+        for person in frame.people:
+            share, cover = held[person.label] / total, held[person.label] / max(counts[person.label], 1)
+            fits = share > PERSON_SHARE[1] and cover > PERSON_COVER and person.seen.sum() >= LEAST_JOINTS
+            if fits and len(yes) < most:
+                yes.append(_sample(candidate, person, share, cover, up is not None))
+                break
+    return yes + no
+
+
+def _sample(candidate: _core.PersonCandidate, person: Person | None, share: float, cover: float, up: bool) -> Sample:
+    crop, middle = candidate.crop, np.array(candidate.middle)
+    picture, mask = crop[0].astype(np.float16), np.packbits(crop[1] > 0.5, axis=-1)
+    if person is None:
+        nothing = np.zeros(17)
+        return Sample(
+            picture, mask, middle, False, np.zeros((17, 3)), nothing, nothing > 0, 0.0, np.ones(9), 0.0, 0.0, up
+        )
+    joints = place(person.joints, middle, candidate.roll)
+    weight = np.where(person.seen, 1.0, np.where(person.inside, 0.4, 0.15))
+    weight[(person.joints[:, 2] < NEAREST) | (np.abs(joints) > 2.0).any(1)] = 0.0
+    towards = -person.joints[2] / np.linalg.norm(person.joints[2])
+    facing = float(person.forward @ towards)
+    joints = np.clip(joints, -2.0, 2.0)
+    return Sample(picture, mask, middle, True, joints, weight, person.seen, facing, person.lengths, share, cover, up)

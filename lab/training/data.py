@@ -1,0 +1,77 @@
+"""Makes training data: `python -m lab.training.data --out DIR`; seeded, in several processes, in files of 1,000 pictures."""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import time
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from lab.training.bodies import Bodies
+from lab.training.crops import Sample, samples
+from lab.training.poses import load
+from lab.training.scenes import Scenes
+
+SHARD = 1000  # pictures in a file
+
+
+def save(path: Path, batch: list[Sample]) -> None:
+    """Write pictures and truths; the file appears when it is whole."""
+    columns = {f.name: np.stack([np.asarray(getattr(s, f.name)) for s in batch]) for f in fields(Sample)}
+    for name, column in columns.items():
+        if column.dtype == np.float64:
+            columns[name] = column.astype(np.float32)
+    part = path.with_suffix(".part.npz")
+    np.savez(part, **columns)
+    part.rename(path)
+
+
+def make(out: Path, data: Path, *, seed: int, worker: int, count: int, held_out: bool) -> None:
+    """One process' share: files `NAME_worker_number.npz` with `count` pictures in all."""
+    os.nice(5)
+    scenes = Scenes(Bodies(data / "bodies", held_out=held_out), load(data / "mocap", held_out))
+    number, made = 0, 0
+    while made < count:
+        path = out / f"{'held' if held_out else 'train'}_{seed}_{worker}_{number:04d}.npz"
+        rng = np.random.default_rng([seed, worker, number, int(held_out)])
+        batch: list[Sample] = []
+        size = min(SHARD, count - made)
+        start = time.monotonic()
+        while len(batch) < size and not path.exists():
+            batch += samples(scenes.frame(rng), rng)
+        if batch:
+            save(path, batch[:size])
+            people = sum(s.person for s in batch[:size])
+            print(f"{path.name}: {people} people, {size - people} others, {time.monotonic() - start:.0f} s", flush=True)
+        made, number = made + size, number + 1
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("VOODOO_DATA", "../shared/data")))
+    parser.add_argument("--count", type=int, default=80_000, help="pictures")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--held-out", action="store_true", help="bodies and motions that training does not see")
+    a = parser.parse_args()
+    a.out.mkdir(parents=True, exist_ok=True)
+    share = -(-a.count // a.processes)
+    workers = []
+    for i in range(a.processes):
+        options = {"seed": a.seed, "worker": i, "count": share, "held_out": a.held_out}
+        workers.append(multiprocessing.get_context("spawn").Process(target=make, args=(a.out, a.data), kwargs=options))
+        workers[-1].start()
+    for w in workers:
+        w.join()
+    if any(w.exitcode for w in workers):
+        raise SystemExit("a process failed")
+
+
+if __name__ == "__main__":
+    main()

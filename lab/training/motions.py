@@ -1,0 +1,137 @@
+"""Motion of held-out people for `lab.training.unseen`: captured clips, and ways through captured poses and those made by rule."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.training import poses
+from lab.training.bodies import JOINTS, Body
+from lab.training.poses import Pose
+from lab.training.rotations import about, part, shortest, unit
+
+Array = NDArray[np.float64]
+Rng = np.random.Generator
+RATE = 30.0
+MILLIMETRE = 1000.0
+Clips = dict[str, tuple[list[Pose], Array]]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A surface (V, 3) and joints (17, 3) a frame [m], on the floor, and what they are."""
+
+    surfaces: list[Array]
+    joints: Array
+    words: str
+    seat: float | None = None
+
+
+def clips_of(data: Path) -> Clips:
+    """Held-out clips: poses turned as they were captured, and places of the root (F, 3)."""
+    stored = np.load(data / "mocap" / "sequences.npz")
+    names = [str(name) for name in stored["joint_names"]]
+    kept = sorted(set(stored["clip"].tolist()))[poses.HELD_OUT_CLIPS // 2 :: poses.HELD_OUT_CLIPS]
+    found = {}
+    for clip in kept:
+        positions = stored["positions_m"][stored["clip"] == clip] / MILLIMETRE
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # clips in which nobody stands upright give nothing
+            made = poses.from_positions(positions, names)
+        if len(made) < 3 * RATE / 2 or not all(np.isfinite(pose.pelvis).all() for pose in made):
+            continue
+        across = positions[:, names.index("l_hip")] - positions[:, names.index("r_hip")]
+        heading = np.arctan2(-across[:, 0], across[:, 1])
+        turned = [pose.turned(about("z", float(angle))) for pose, angle in zip(made, heading, strict=True)]
+        found[clip] = (turned, positions[:, names.index("root")])
+    return found
+
+
+def walk(rng: Rng, body: Body, dress: int, clips: Clips) -> Motion:
+    """A part of a captured clip; in turn to and fro where it is short."""
+    clip = str(rng.choice(sorted(clips)))
+    made, roots = clips[clip]
+    count = min(len(made), int(rng.integers(90, 160)))
+    first = int(rng.integers(len(made) - count + 1))
+    part_of = made[first : first + count]
+    places = roots[first : first + count] * body.stature / 1.75
+    if rng.random() < 0.5:
+        part_of, places = [pose.mirrored() for pose in part_of], places * [1.0, -1.0, 1.0]
+    if count < 90:
+        part_of, places = part_of + part_of[-2::-1], np.concatenate([places, places[-2::-1]])
+    surfaces, joints = [], []
+    for pose, place in zip(part_of, places, strict=True):
+        surface, at = body.posed(pose, np.random.default_rng(dress))
+        surfaces.append(surface + place)
+        joints.append([at[name] + place for name in JOINTS])
+    lowest = np.array([surface[:, 2].min() for surface in surfaces])
+    # Legs of another length would sink into the floor; who jumps stays in the air.
+    lift = np.maximum(-np.median(lowest), -lowest)
+    surfaces = [surface + [0, 0, up] for surface, up in zip(surfaces, lift, strict=True)]
+    return Motion(surfaces, np.array(joints) + lift[:, None, None] * [0, 0, 1.0], f"clip {clip}")
+
+
+def story(rng: Rng, body: Body, dress: int, still: list[Pose]) -> Motion:
+    """From pose to pose by rule and from motion capture, with the feet at one place; at times on a chair."""
+    kinds = [
+        str(rng.choice(["squat", "bend", "kneel", "lunge", "kick", "captured", "captured", "stand"])) for _ in range(3)
+    ]
+    sits = rng.random() < 0.25
+    if sits:
+        kinds = ["sit", "sit", "sit"]
+    turn = rng.normal(0, 0.2, 4)
+    keys = [poses.standing(rng)]
+    for kind in kinds:
+        if kind == "stand":
+            keys.append(poses.standing(rng))
+        elif kind == "captured":
+            keys.append(still[int(rng.integers(len(still)))])
+        else:
+            keys.append(poses._crouch(rng, kind))
+    if sits:  # one seat, of which the arms and the trunk move
+        keys = [keys[1], *(_legs_of(keys[1], key) for key in keys[2:])]
+    keys = [key.turned(about("z", float(angle))) for key, angle in zip(keys, turn, strict=False)]
+    surfaces, joints = [], []
+    seat = None
+    for number, key in enumerate(keys):
+        other = keys[min(number + 1, len(keys) - 1)]
+        rest, move = int(rng.integers(6, 20)), int(rng.integers(18, 38))
+        for step in range(rest + (move if other is not key else 0)):
+            share = max(step - rest, 0) / move
+            pose = _between(key, other, share * share * (3 - 2 * share))
+            surface, at = body.posed(pose, np.random.default_rng(dress))
+            feet = 0.5 * (at["l_ankle"] + at["r_ankle"])
+            shift = -np.array([feet[0], feet[1], surface[:, 2].min()])
+            surfaces.append(surface + shift)
+            joints.append([at[name] + shift for name in JOINTS])
+    if sits:
+        seat = float(joints[0][2][2] - 0.09 * body.stature / 1.7)
+    return Motion(surfaces, np.array(joints), "story " + " ".join(kinds), seat)
+
+
+def _legs_of(pose: Pose, other: Pose) -> Pose:
+    """`other` with pelvis and legs of `pose`."""
+    limbs = other.limbs.copy()
+    limbs[:, 3:] = pose.limbs[:, 3:]
+    return Pose(pose.pelvis, other.chest, other.head, limbs, other.clavicle)
+
+
+def _between(a: Pose, b: Pose, share: float) -> Pose:
+    """A pose on the way from one to another: limbs turn relative to the trunk."""
+
+    def turned(one: Array, other: Array) -> Array:
+        return one @ part(one.T @ other, share)
+
+    pelvis, chest, head = turned(a.pelvis, b.pelvis), turned(a.chest, b.chest), turned(a.head, b.head)
+    limbs = np.zeros((2, 6, 3))
+    for side in range(2):
+        for bone in range(6):
+            which = ("chest", chest) if bone < 3 else ("pelvis", pelvis)
+            one, other = (unit(getattr(p, which[0]).T @ p.limbs[side, bone]) for p in (a, b))
+            limbs[side, bone] = which[1] @ part(shortest(one, other), share) @ one
+    clavicle = np.stack([turned(a.clavicle[k], b.clavicle[k]) for k in range(2)])
+    return Pose(pelvis, chest, head, limbs, clavicle)

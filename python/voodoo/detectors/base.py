@@ -1,0 +1,163 @@
+"""What a detector is given, what it returns, and a function as a detector."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.errors import ConfigError
+
+if TYPE_CHECKING:
+    from voodoo._core import Detector
+    from voodoo.model.camera import Camera
+
+JOINTS = (
+    "head_center", "vc7", "humanoid_root",
+    *(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hand", "hip", "knee", "ankle") for side in "lr"),
+)  # fmt: skip
+"""The joints that the shipped detector reports, in its order (H-Anim names, ISO/IEC 19774)."""
+
+LENGTHS = ("upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck", "stature")
+"""Lengths that mean something to the tracker: distances between joints, the mean of both sides, and the stature.
+
+`trunk` is the distance from humanoid_root to vc7, `neck` that from vc7 to head_center.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class DetectorImage:
+    """A depth image as a detector sees it.
+
+    Args:
+        depth: (H, W) float32 [m] along the optical axis; 0 where nothing returned, and where it is known that what returned is
+            not asked for: boxes that were left out, the learnt background, persons who are tracked already.
+        camera: its calibration.
+        world_from_sensor: (4, 4) pose of its optical frame (x right, y down, z forward).
+        floor: unit normal (3,) upwards and height along it [m], in the world, if it is known.
+        query: "all": everybody; "any" or "new": one person will do; "near": the one at `near`. A detector may always return
+            everybody.
+        near: (3,) place in the world [m] at which a person is expected, with the query "near".
+    """
+
+    depth: npt.NDArray[np.float32]
+    camera: Camera
+    world_from_sensor: npt.NDArray[np.float64]
+    floor: tuple[Sequence[float], float] | None = None
+    query: Literal["all", "any", "new", "near"] = "all"
+    near: npt.NDArray[np.float64] | None = None
+
+    def points(self) -> npt.NDArray[np.float64]:
+        """The point (H, W, 3) of every pixel in the sensor's frame [m]; the origin where depth is 0."""
+        depth = self.depth.astype(np.float64)[..., None]
+        rays = np.nan_to_num(self.camera.rays().astype(np.float64))
+        return np.concatenate([depth * rays, depth], axis=-1)
+
+    def to_world(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Points (..., 3) [m] of the sensor's frame in the world."""
+        rotation, translation = self.world_from_sensor[:3, :3], self.world_from_sensor[:3, 3]
+        return np.asarray(points, dtype=np.float64) @ rotation.T + translation
+
+
+@dataclass(frozen=True, eq=False)
+class DetectedPerson:
+    """What a detector reports of a person. World frame, metres; probabilities from 0 to 1.
+
+    A `voodoo.Detection` has the same attributes and can be returned instead.
+
+    Args:
+        joints: name -> position (3,). Any of the detector's `joints`; those that were not found are left out.
+        confidence: probability that it is a person. One look of 0.994 is enough to follow somebody, or two of 0.96; below 0.74
+            it never is.
+        joint_sigma: standard deviation along each axis, one for all or name -> number.
+        visible: probability that a joint is in the image and not hidden, one for all or name -> number.
+        facing: probability that the front of the trunk shows; None where the detector does not tell.
+        lengths: name -> length, all of the detector's `lengths` or none.
+        length_sigma: name -> standard deviation of it.
+        mask: (H, W) bool, the pixels that show the person; None: all within 0.2 m of the box about the joints.
+        floor: unit normal (3,) upwards and height along it, if the detector found the floor.
+    """
+
+    joints: Mapping[str, Sequence[float] | npt.NDArray[np.float64]]
+    confidence: float
+    joint_sigma: float | Mapping[str, float] = 0.05
+    visible: float | Mapping[str, float] = 1.0
+    facing: float | None = None
+    lengths: Mapping[str, float] = field(default_factory=dict)
+    length_sigma: Mapping[str, float] = field(default_factory=dict)
+    mask: npt.NDArray[np.bool_] | None = None
+    floor: tuple[Sequence[float], float] | None = None
+
+
+class PersonDetector(Protocol):
+    """Any object that a tracker can ask about depth images.
+
+    A step has released the GIL, and takes it again for each call. One object serves all persons of a `People`.
+    """
+
+    @property
+    def joints(self) -> Sequence[str]:
+        """Names of the joints that it reports: those of sites of the body; others are ignored."""
+
+    @property
+    def lengths(self) -> Sequence[str]:
+        """Names of the lengths that it reports, of `LENGTHS`; others are ignored."""
+
+    def detect(self, image: DetectorImage) -> Iterable[Any]:
+        """The persons in an image, each with the attributes of `DetectedPerson`.
+
+        An exception does not end the tracker's step: it goes on without detections and warns (`voodoo.DetectorWarning`).
+        """
+
+
+AnyDetector: TypeAlias = "Literal['shipped'] | Detector | PersonDetector | None"
+"""What trackers take: the detector that comes with the package, one with other weights, one of one's own, or none."""
+
+
+class CallableDetector:
+    """A function as a detector.
+
+    Args:
+        function: takes a `DetectorImage`, returns the persons in it, each a `DetectedPerson`.
+        joints: names of the joints that it reports, such as those of `Body.site_names`.
+        lengths: names of the lengths that it reports, of `LENGTHS`.
+    """
+
+    def __init__(
+        self,
+        function: Callable[[DetectorImage], Iterable[Any]],
+        *,
+        joints: Sequence[str],
+        lengths: Sequence[str] = (),
+    ) -> None:
+        """See the class.
+
+        Raises:
+            ConfigError: no function, or names that are none.
+        """
+        if not callable(function):
+            raise ConfigError(f"function: expected something that can be called, found {type(function).__name__}")
+        self._function = function
+        self.joints = names_of("joints", joints)
+        self.lengths = names_of("lengths", lengths)
+
+    def detect(self, image: DetectorImage) -> Iterable[Any]:
+        """What the function returns."""
+        return self._function(image)
+
+
+def names_of(what: str, names: object) -> tuple[str, ...]:
+    """Names, checked.
+
+    Raises:
+        ConfigError: something else, or a name twice; it says of what.
+    """
+    if isinstance(names, str) or not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise ConfigError(f"{what}: expected a sequence of names, found {names!r:.80}")
+    twice = sorted({name for name in names if list(names).count(name) > 1})
+    if twice:
+        raise ConfigError(f"{what}: expected each name once, found {twice[0]!r} twice")
+    return tuple(names)

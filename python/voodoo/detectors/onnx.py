@@ -1,0 +1,156 @@
+"""A network in an ONNX file as a detector."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.detectors.base import JOINTS, DetectedPerson, DetectorImage, names_of
+from voodoo.errors import ConfigError, a_path
+
+if TYPE_CHECKING:
+    from voodoo._core import PersonCandidate
+
+SIZE = 96
+"""Pixels along an edge of the pictures that a network is given."""
+
+
+class OnnxDetector:
+    """A network that looks at pictures of what may be a person, run by ONNX Runtime (`pip install 'voodoo-tracker[onnx]'`).
+
+    What may be a person is cut out of the depth image as for the shipped network. The file's only input is a batch of pictures
+    (N, 2, 96, 96), float32, 2.6 m wide at the depth z0 of the person's median pixel, turned so that up is up. Channel 0 is
+    (z - z0) / 1.2 m, clipped to -1 ... 1, and 1 beside the person; channel 1 is 1 on the person and 0 beside. Two outputs are
+    read, others are ignored: `p` (N, J, 3), metres from the picture's middle to the right, downwards and backwards; and `vis`
+    (N, J + 2), the log odds that each joint is in the image, that the trunk faces the camera, and that it is a person.
+
+    Args:
+        path: the file.
+        joints: names of its J joints, in its order.
+        joint_sigma: standard deviation of a joint along each axis [m].
+        outputs: names of the two outputs.
+        most: so many pictures of an image are looked at.
+        threads: of ONNX Runtime. With one, results do not depend on the machine's load.
+    """
+
+    lengths: tuple[str, ...] = ()
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        *,
+        joints: Sequence[str] = JOINTS,
+        joint_sigma: float = 0.05,
+        outputs: tuple[str, str] = ("p", "vis"),
+        most: int = 4,
+        threads: int = 1,
+    ) -> None:
+        """See the class.
+
+        Raises:
+            ConfigError: onnxruntime is missing, the file cannot be read, or its input and outputs are others.
+        """
+        try:
+            import onnxruntime
+        except ImportError:
+            raise ConfigError(
+                "OnnxDetector: expected onnxruntime, found none; pip install 'voodoo-tracker[onnx]'"
+            ) from None
+        self.joints = names_of("joints", joints)
+        self._sigma, self._most = float(joint_sigma), int(most)
+        self.path = a_path(path, error=ConfigError)
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads, options.inter_op_num_threads = int(threads), 1
+        try:
+            self._session = onnxruntime.InferenceSession(str(self.path), options, providers=["CPUExecutionProvider"])
+        except Exception as cause:  # ONNX Runtime's errors share no other class
+            raise ConfigError(f"{self.path}: expected an ONNX file, found: {cause}") from cause
+        self._outputs = list(outputs)
+        self._input = self._checked()
+
+    def _checked(self) -> str:
+        """The input's name, if a picture of nothing gives outputs of the right shapes."""
+        (first, *rest), names = self._session.get_inputs(), [output.name for output in self._session.get_outputs()]
+        if rest or not set(self._outputs) <= set(names):
+            raise ConfigError(
+                f"{self.path}: expected one input and the outputs {', '.join(self._outputs)}, "
+                f"found {1 + len(rest)} and {', '.join(names)}"
+            )
+        try:
+            found = self._session.run(self._outputs, {first.name: np.zeros((1, 2, SIZE, SIZE), dtype=np.float32)})
+        except Exception as cause:
+            raise ConfigError(f"{self.path}: expected an input (N, 2, {SIZE}, {SIZE}), found: {cause}") from cause
+        count = len(self.joints)
+        expected, shapes = [(1, count, 3), (1, count + 2)], [np.shape(output) for output in found]
+        if shapes != expected:
+            raise ConfigError(f"{self.path}: expected outputs of shape {expected} for {count} joints, found {shapes}")
+        return str(first.name)
+
+    def detect(self, image: DetectorImage) -> Iterator[DetectedPerson]:
+        """The persons in an image."""
+        candidates = self._candidates(image)
+        if not candidates:
+            return
+        pictures = np.stack([candidate.crop for candidate in candidates])
+        places, odds = self._session.run(self._outputs, {self._input: pictures})
+        taken = np.zeros(image.depth.shape, dtype=bool)
+        # Of candidates that share pixels the surest stays.
+        for number in sorted(range(len(candidates)), key=lambda number: -float(odds[number][-1])):
+            candidate, log_odds = candidates[number], odds[number].astype(np.float64)
+            if log_odds[-1] <= 0.0 or (taken & candidate.mask).any():
+                continue
+            taken |= candidate.mask
+            yield self._person(image, candidate, places[number].astype(np.float64), log_odds)
+
+    def _candidates(self, image: DetectorImage) -> list[PersonCandidate]:
+        from voodoo._core import person_candidates
+
+        camera, sensor_from_world = image.camera, np.linalg.inv(image.world_from_sensor)
+        floor = None
+        if image.floor is not None:
+            normal, offset = np.asarray(image.floor[0], dtype=np.float64), image.floor[1]
+            height = offset - float(normal @ image.world_from_sensor[:3, 3])
+            floor = ((sensor_from_world[:3, :3] @ normal).tolist(), height)
+        return person_candidates(
+            image.depth,
+            camera=camera,
+            floor=floor,
+            most=self._most,
+        )
+
+    def _person(
+        self,
+        image: DetectorImage,
+        candidate: PersonCandidate,
+        places: npt.NDArray[np.float64],
+        log_odds: npt.NDArray[np.float64],
+    ) -> DetectedPerson:
+        probabilities = 1.0 / (1.0 + np.exp(-np.clip(log_odds, -50.0, 50.0)))
+        points = image.to_world(in_camera(candidate, places))
+        floor: Any = None
+        if candidate.floor is not None:
+            normal = image.world_from_sensor[:3, :3] @ np.asarray(candidate.floor[0])
+            floor = (normal, candidate.floor[1] + float(normal @ image.world_from_sensor[:3, 3]))
+        return DetectedPerson(
+            joints=dict(zip(self.joints, points, strict=True)),
+            confidence=float(probabilities[-1]),
+            facing=float(probabilities[-2]),
+            joint_sigma=self._sigma,
+            visible=dict(zip(self.joints, probabilities[:-2].tolist(), strict=True)),
+            mask=candidate.mask,
+            floor=floor,
+        )
+
+
+def in_camera(candidate: PersonCandidate, places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Places (J, 3) of a candidate's picture as points (J, 3) in the camera's frame [m]."""
+    x0, y0, z0 = candidate.middle
+    z = z0 + places[:, 2]
+    x, y = z * (x0 + places[:, 0] / z0), z * (y0 + places[:, 1] / z0)
+    sin, cos = math.sin(candidate.roll), math.cos(candidate.roll)
+    return np.stack([cos * x + sin * y, cos * y - sin * x, z], axis=-1)

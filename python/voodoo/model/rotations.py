@@ -1,0 +1,131 @@
+"""Rotations as matrices, quaternions (x, y, z, w), turns (axis times angle) and Euler angles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+_NO_TURN = 1e-3
+"""Below this angle [rad] a series stands for what divides by it."""
+_LOCKED = 1e-7
+"""The middle angle is so near to where the first and third have one axis [rad]."""
+_SKEWED = 1e-12
+"""Products of rows may be so far from those of unit vectors at right angles."""
+
+
+def quaternions(rotations: FloatArray) -> FloatArray:
+    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), by the greatest of four divisors (Markley, "Unit quaternion
+    from rotation matrix", JGCD 2008); a matrix that is only nearly one counts as the nearest one."""
+    matrices = np.asarray(rotations, dtype=np.float64)
+    skewed = np.any(
+        np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)) > _SKEWED, axis=(-2, -1), keepdims=True
+    )
+    if skewed.any():
+        left, _, right = np.linalg.svd(matrices)
+        matrices = np.where(skewed, left @ right, matrices)
+    flat = matrices.reshape(-1, 3, 3)
+    trace = np.trace(flat, axis1=1, axis2=2)
+    choice = np.column_stack([np.diagonal(flat, axis1=1, axis2=2), trace]).argmax(axis=1)
+    found = np.empty((len(flat), 4))
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        own = choice == i
+        m = flat[own]
+        found[own, i] = 1.0 - trace[own] + 2.0 * m[:, i, i]
+        found[own, j] = m[:, j, i] + m[:, i, j]
+        found[own, k] = m[:, k, i] + m[:, i, k]
+        found[own, 3] = m[:, k, j] - m[:, j, k]
+    own = choice == 3
+    m = flat[own]
+    found[own, :3] = np.column_stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]])
+    found[own, 3] = 1.0 + trace[own]
+    x, y, z, w = found.T
+    found /= np.sqrt(x * x + y * y + z * z + w * w)[:, None]
+    return found.reshape(*matrices.shape[:-2], 4)
+
+
+def matrix_of_quaternion(quaternion: tuple[float, float, float, float]) -> FloatArray:
+    """The rotation matrix (3, 3) of a unit quaternion."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [x * x - y * y - z * z + w * w, 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), -x * x + y * y - z * z + w * w, 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), -x * x - y * y + z * z + w * w],
+        ]
+    )
+
+
+def matrix_of_turn(turn: npt.ArrayLike) -> FloatArray:
+    """The rotation matrix (3, 3) of an axis times an angle (3,) [rad]."""
+    return matrix_of_quaternion(_quaternion_of_turn(*(float(value) for value in np.asarray(turn))))
+
+
+def _quaternion_of_turn(x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    angle = math.sqrt(x * x + y * y + z * z)
+    squared = angle * angle
+    scale = 0.5 - squared / 48.0 + squared * squared / 3840.0 if angle <= _NO_TURN else math.sin(angle / 2.0) / angle
+    return scale * x, scale * y, scale * z, math.cos(angle / 2.0)
+
+
+def _turn_of_quaternion(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
+    # Of the two quaternions of a rotation the one whose turn is less than half a circle.
+    if w < 0.0 or (w == 0.0 and (x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0))))):
+        x, y, z, w = -x, -y, -z, -w
+    angle = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
+    squared = angle * angle
+    scale = (
+        2.0 + squared / 12.0 + 7.0 * squared * squared / 2880.0 if angle <= _NO_TURN else angle / math.sin(angle / 2.0)
+    )
+    return scale * x, scale * y, scale * z
+
+
+def _product(
+    p: tuple[float, float, float, float], q: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    px, py, pz, pw = p
+    qx, qy, qz, qw = q
+    x = pw * qx + qw * px + (py * qz - pz * qy)
+    y = pw * qy + qw * py + (pz * qx - px * qz)
+    z = pw * qz + qw * pz + (px * qy - py * qx)
+    w = pw * qw - px * qx - py * qy - pz * qz
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return x / length, y / length, z / length, w / length
+
+
+def turned_between(first: FloatArray, second: FloatArray, share: float) -> FloatArray:
+    """The rotation (3, 3) at a share, 0 to 1, of the way from one to another, turning evenly about one axis."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = quaternions(np.array([first, second])).tolist()
+    turn = _turn_of_quaternion(*_product((-ax, -ay, -az, aw), (bx, by, bz, bw)))
+    x, y, z = (value * share for value in turn)
+    return matrix_of_quaternion(_product((ax, ay, az, aw), _quaternion_of_turn(x, y, z)))
+
+
+def euler_angles(rotations: FloatArray, order: str) -> FloatArray:
+    """Angles (N, 3) [rad] about moving axes, such as "ZXY", of rotation matrices (N, 3, 3) (Bernardes and Viollet, "Quaternion to
+    Euler angles conversion: a direct, general and computationally efficient method", PLOS ONE 2022).
+
+    Where first and third axis are the same line only their sum is known: the third angle is then zero.
+    """
+    i, j, k = ("XYZ".index(axis) for axis in reversed(order))
+    proper = i == k
+    if proper:
+        k = 3 - i - j
+    sign = (i - j) * (j - k) * (k - i) // 2
+    q = quaternions(rotations)
+    if proper:
+        a, b, c, d = q[:, 3], q[:, i], q[:, j], q[:, k] * sign
+    else:
+        a, b, c, d = q[:, 3] - q[:, j], q[:, i] + q[:, k] * sign, q[:, j] + q[:, 3], q[:, k] * sign - q[:, i]
+    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
+    middle = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b))
+    low, high = np.abs(middle) <= _LOCKED, np.abs(middle - np.pi) <= _LOCKED
+    first = np.select([low, high], [2.0 * half_sum, 2.0 * half_difference], half_sum + half_difference)
+    third = np.where(low | high, 0.0, half_sum - half_difference)
+    if not proper:
+        first, middle = sign * first, middle - np.pi / 2.0
+    angles = np.column_stack([first, middle, third])
+    return np.where(angles > np.pi, angles - 2.0 * np.pi, np.where(angles < -np.pi, angles + 2.0 * np.pi, angles))
