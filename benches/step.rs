@@ -34,7 +34,7 @@ impl Bench<'_> {
         let (clouds, images) = self.instants[self.frames % 2];
         self.frames += 1;
         // As often as a camera measures: a detector looks by time.
-        let frame = Frame { clouds, images, ..Frame::empty(self.frames as f64 / 30.0) };
+        let frame = Frame::empty(self.frames as f64 / 30.0).with_clouds(clouds).with_images(images);
         black_box(self.tracker.step(&frame).unwrap()).steps
     }
 
@@ -66,9 +66,11 @@ fn human(model: HumanModel) -> Body {
 
 /// ICP steps forced; every point used.
 fn every_point(max_steps: usize, threads: usize) -> Config {
-    let solver = SolverKind::Limbwise;
-    let (max_limb_points, max_points) = (100_000, 10_000_000);
-    Config { solver, max_steps, threads, min_change: 0.0, max_limb_points, max_points, ..Config::default() }
+    let mut config = Config::default();
+    config.solver = SolverKind::Limbwise;
+    (config.max_steps, config.threads, config.min_change) = (max_steps, threads, 0.0);
+    (config.max_limb_points, config.max_points) = (100_000, 10_000_000);
+    config
 }
 
 fn tracker(config: Config) -> Tracker {
@@ -196,7 +198,8 @@ fn images(criterion: &mut Criterion) {
                 (SolverKind::Chain, "chain", 2),
             ] {
                 let instants: [(&[_], &[_]); 2] = [(&[], &first), (&[], &second)];
-                let config = Config { solver, threads, min_change: 0.0, ..Config::default() };
+                let mut config = Config::default();
+                (config.solver, config.threads, config.min_change) = (solver, threads, 0.0);
                 let mut bench = Bench { tracker: tracker_of(&body, config), instants, frames: 0 };
                 let (time, steps) = bench.typical(201);
                 println!(

@@ -2,7 +2,24 @@
 //!
 //! The Python package builds its validated `Config` class and the commented TOML from [`Config::fields`].
 
-use crate::error::ConfigError;
+/// A configuration entry that is unknown or outside its range.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// No such key.
+    #[error("unknown configuration key {0:?}")]
+    UnknownKey(String),
+    /// Wrong value.
+    #[error("{key}: expected {expected}, found {found:?}")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What would be right.
+        expected: String,
+        /// What was given.
+        found: RawValue,
+    },
+}
 
 /// A value of a configuration entry.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +130,7 @@ macro_rules! words {
     ($(#[$meta:meta])* $name:ident { $($(#[doc = $doc:literal])* $variant:ident = $word:literal),+ $(,)? }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
         pub enum $name { $($(#[doc = $doc])* $variant),+ }
         impl Entry for $name {
             const WORDS: &'static [&'static str] = &[$($word),+];
@@ -135,7 +153,13 @@ macro_rules! words {
 macro_rules! config {
     ($($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:expr, $unit:literal $(, $low:literal ..= $high:literal)?;)+) => {
         /// The parameters of the tracker. Defaults are the measured ones.
+        ///
+        /// ```
+        /// let mut config = voodoo_core::Config::default();
+        /// config.threads = 2;
+        /// ```
         #[derive(Clone, Debug, PartialEq)]
+        #[non_exhaustive]
         pub struct Config { $($(#[doc = $doc])+ pub $name: $kind),+ }
 
         impl Default for Config {
@@ -172,7 +196,7 @@ macro_rules! config {
                         self.$name = parsed.ok_or_else(|| ConfigError::Value {
                             key: stringify!($name),
                             expected: <$kind as Entry>::expected(range),
-                            found: format!("{value:?}"),
+                            found: value.clone(),
                         })?;
                         Ok(())
                     })+

@@ -1,9 +1,10 @@
-//! The errors of the core: each says what was expected and what was found.
+//! The errors of bodies and of tracking: each says what was expected and what was found.
 
 use crate::shape::ShapeError;
 
 /// A body description that cannot be tracked. `key` is the path of the offending entry.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BodyError {
     /// No limb at all.
     #[error("body: expected at least one limb, found none")]
@@ -17,7 +18,7 @@ pub enum BodyError {
         name: String,
     },
     /// A name that is not in the body.
-    #[error("{key}: unknown {what} {name:?}; known are: {known}")]
+    #[error("{key}: unknown {what} {name:?}; known are: {}", known.join(", "))]
     Unknown {
         /// Where the name was used.
         key: String,
@@ -26,7 +27,7 @@ pub enum BodyError {
         /// The name that was asked for.
         name: String,
         /// The names there are.
-        known: String,
+        known: Vec<String>,
     },
     /// A value outside its domain.
     #[error("{key}: expected {expected}, found {found}")]
@@ -34,6 +35,16 @@ pub enum BodyError {
         /// Where it stands.
         key: String,
         /// What would be right.
+        expected: &'static str,
+        /// What was there.
+        found: String,
+    },
+    /// A limb, joint or site with a name of the human's that contradicts the others ([`crate::body::Roles`]).
+    #[error("{key}: expected {expected}, found {found}")]
+    Role {
+        /// Where it stands.
+        key: String,
+        /// What its name demands.
         expected: &'static str,
         /// What was there.
         found: String,
@@ -50,6 +61,7 @@ pub enum BodyError {
 
 /// A calibration that no camera can have.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 #[error("camera {what}: expected {expected}, found {found}")]
 pub struct CameraError {
     /// Which of its numbers.
@@ -66,26 +78,9 @@ impl CameraError {
     }
 }
 
-/// A configuration entry that is unknown or outside its range.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ConfigError {
-    /// No such key.
-    #[error("unknown configuration key {0:?}")]
-    UnknownKey(String),
-    /// Wrong value.
-    #[error("{key}: expected {expected}, found {found}")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// What would be right.
-        expected: String,
-        /// What was given.
-        found: String,
-    },
-}
-
 /// Why the tracker refused a call. The tracker is unchanged afterwards.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// `step` before `reset`.
     #[error("the tracker has no pose yet: call reset first")]
@@ -112,8 +107,11 @@ pub enum TrackError {
         found: String,
     },
     /// The given joint positions do not fix the pose.
-    #[error("joints: {0}")]
-    Underdetermined(String),
+    #[error("joints: expected at least three positions that do not lie on a line, found {found} position(s)")]
+    Underdetermined {
+        /// How many positions were given.
+        found: usize,
+    },
     /// A problem with the body.
     #[error(transparent)]
     Body(#[from] BodyError),

@@ -41,7 +41,7 @@
 //!
 //! let mut tracker = Tracker::new(body, Config::default())?;
 //! tracker.reset(&start, true)?;
-//! let estimate = tracker.step(&Frame { clouds: &[cloud], ..Frame::empty(0.0) })?;
+//! let estimate = tracker.step(&Frame::empty(0.0).with_clouds(&[cloud]))?;
 //! assert_eq!(estimate.status, Status::Tracking);
 //! assert!(estimate.mean_squared_distance.sqrt() < 0.01);
 //! # Ok(())
@@ -91,9 +91,9 @@ pub mod kinematics {
 
 pub use body::{Body, HumanModel, Joint, JointKind, Limb, Site};
 pub use camera::{Camera, Lens};
-pub use config::{Config, Overlap, RawValue, SolverKind, Value};
+pub use config::{Config, ConfigError, Overlap, RawValue, SolverKind, Value};
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
-pub use error::{BodyError, CameraError, ConfigError, TrackError};
+pub use error::{BodyError, CameraError, TrackError};
 pub use observation::frame::{
     Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };

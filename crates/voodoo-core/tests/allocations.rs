@@ -39,13 +39,11 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     for index in 0..WARM_UP + COUNTED {
         let (pixels, points) = &frames[index % frames.len()];
         let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);
-        let frame = Frame {
-            clouds: &clouds,
-            images: &images,
-            positions: &positions,
-            rays: &rays,
-            ..Frame::empty(index as f64)
-        };
+        let frame = Frame::empty(index as f64)
+            .with_clouds(&clouds)
+            .with_images(&images)
+            .with_positions(&positions)
+            .with_rays(&rays);
         let before = allocations_so_far();
         tracker.step(&frame).unwrap();
         if index >= WARM_UP {
@@ -74,7 +72,7 @@ fn people_allocations() -> [usize; 2] {
     let mut counts = [0, 0];
     for index in 0..200 {
         let images = [camera.image(&pixels)];
-        let frame = Frame { images: &images, ..Frame::empty(index as f64 / 100.0) };
+        let frame = Frame::empty(index as f64 / 100.0).with_images(&images);
         let before = allocations_so_far();
         people.step(&frame, &[]).unwrap();
         if index >= 140 {
@@ -116,7 +114,7 @@ fn region_allocations(cameras: usize) -> usize {
         let stamp = index as f64;
         let colors = [0, 1, 2, 3].map(|camera| color_scene::picture(&pictures[index % 2][camera], camera, stamp));
         let before = allocations_so_far();
-        tracker.step(&Frame { colors: &colors[..cameras], ..Frame::empty(stamp) }).unwrap();
+        tracker.step(&Frame::empty(stamp).with_colors(&colors[..cameras])).unwrap();
         if index >= WARM_UP / 2 {
             count += allocations_so_far() - before;
         }
@@ -144,17 +142,16 @@ fn a_warm_step_or_rendering_allocates_nothing() {
     // Lost for a while, and found again.
     let nothing = vec![0; frames[0].0.len()];
     frames.extend(std::iter::repeat_n((nothing, Vec::new()), 4));
-    for config in scene::every_solver()
-        .into_iter()
-        .flat_map(|config| [false, true].map(|hypotheses| Config { hypotheses, ..config.clone() }))
-    {
+    for config in scene::every_solver().into_iter().flat_map(|config| {
+        [false, true].map(|hypotheses| scene::with(config.clone(), |config| config.hypotheses = hypotheses))
+    }) {
         assert_eq!(allocations(config.clone(), &frames), 0, "{config:?}");
         // The step itself allocates nothing here either; the queue through which rayon hands work to its threads takes a
         // new block for every 63 jobs, and a frame hands over at most one job an ICP step and one more, or a hundred when a
         // lost body is searched.
         let searched = if config.relocalization { COUNTED / 4 * 100 } else { 0 };
         let jobs = COUNTED * (config.max_steps + 1) + searched;
-        let many = allocations(Config { threads: 2, ..config.clone() }, &frames);
+        let many = allocations(scene::with(config.clone(), |config| config.threads = 2), &frames);
         assert!(many <= jobs / 63 + 1, "{many} allocations in {COUNTED} frames, {config:?}");
     }
 }

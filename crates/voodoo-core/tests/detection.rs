@@ -79,7 +79,7 @@ fn farthest(tracker: &Tracker, body: &Body, poses: &[Pose]) -> f64 {
 fn show(tracker: &mut Tracker, pixels: &[u16], frames: std::ops::Range<i32>) {
     let images = [CAMERA.image(pixels)];
     for frame in frames {
-        tracker.step(&Frame { images: &images, ..Frame::empty(f64::from(frame) / 30.0) }).unwrap();
+        tracker.step(&Frame::empty(f64::from(frame) / 30.0).with_images(&images)).unwrap();
     }
 }
 
@@ -131,7 +131,10 @@ fn lengths_that_are_reported_set_the_sizes_and_others_stay_as_they_were_given() 
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let poses = scene::standing(&body);
     let (pixels, _) = CAMERA.shoot(&body, &poses, 0.005, &mut scene::Noise(3));
-    let config = Config { fit_lengths: false, fit_girths: false, ..Config::default() };
+    let config = scene::with(Config::default(), |config| {
+        config.fit_lengths = false;
+        config.fit_girths = false;
+    });
     let started = |lengths: &[(&str, f64)]| {
         let mut detector =
             Fixed::of(&["l_shoulder", "r_shoulder", "l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle"]);
@@ -170,7 +173,7 @@ fn a_detector_that_fails_leaves_the_step_as_it_would_be_without_detections_and_s
         let mut bits = Vec::new();
         let mut errors = Vec::new();
         for frame in 0..4 {
-            tracker.step(&Frame { images: &images, ..Frame::empty(f64::from(frame)) }).unwrap();
+            tracker.step(&Frame::empty(f64::from(frame)).with_images(&images)).unwrap();
             bits.push(scene::bits(tracker.estimate()));
             errors.push(tracker.detector_error().map(ToString::to_string));
         }
@@ -227,7 +230,7 @@ fn several_persons_are_found_by_any_detector_and_without_one_who_is_added_is_fol
     let images = [CAMERA.image(&pixels)];
     let step = |people: &mut People, frames: i32| {
         for frame in 0..frames {
-            people.step(&Frame { images: &images, ..Frame::empty(f64::from(frame) / 15.0) }, &[]).unwrap();
+            people.step(&Frame::empty(f64::from(frame) / 15.0).with_images(&images), &[]).unwrap();
         }
     };
     let roots = |people: &People| -> Vec<Vec3> {

@@ -14,7 +14,7 @@ fn run(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> Vec<Vec<u64>> {
     tracker.reset_pose(&scene::standing(&body)).unwrap();
     let step = |(index, (pixels, points)): (usize, &(Vec<u16>, Vec<[f64; 3]>))| {
         let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);
-        let frame = Frame { clouds: &clouds, images: &images, ..Frame::empty(index as f64) };
+        let frame = Frame::empty(index as f64).with_clouds(&clouds).with_images(&images);
         let estimate = tracker.step(&frame).unwrap();
         assert!(estimate.limb_points.iter().sum::<usize>() > 1000, "the frame is not seen at all");
         scene::bits(estimate)
@@ -27,10 +27,10 @@ fn estimates_are_equal_bit_by_bit_for_any_number_of_threads() {
     let frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);
     for config in scene::every_solver() {
         for overlap in [Overlap::Exclusive, Overlap::Adjacent, Overlap::Shared] {
-            let config = Config { overlap, ..config.clone() };
+            let config = scene::with(config.clone(), |config| config.overlap = overlap);
             let alone = run(config.clone(), &frames);
             for threads in [2, 3] {
-                let many = run(Config { threads, ..config.clone() }, &frames);
+                let many = run(scene::with(config.clone(), |config| config.threads = threads), &frames);
                 assert_eq!(alone, many, "{threads} threads, {config:?}");
             }
         }

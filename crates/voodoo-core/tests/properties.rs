@@ -16,8 +16,10 @@ fn human() -> Body {
 
 /// The published solver with steps enough to settle and no sampling.
 fn settled() -> Config {
-    let solver = SolverKind::Limbwise;
-    Config { solver, max_steps: 60, min_change: 0.0, max_limb_points: 100_000, ..Config::default() }
+    let mut config = Config::default();
+    (config.solver, config.max_steps) = (SolverKind::Limbwise, 60);
+    (config.min_change, config.max_limb_points) = (0.0, 100_000);
+    config
 }
 
 fn tracker(config: Config, poses: &[Pose]) -> Tracker {
@@ -186,7 +188,7 @@ proptest! {
         let ray = [RayRelation { site, origin, direction, weight: 1.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
         for stamp in 0..10 {
-            tracker.step(&Frame { rays: &ray, ..Frame::empty(f64::from(stamp)) }).unwrap();
+            tracker.step(&Frame::empty(f64::from(stamp)).with_rays(&ray)).unwrap();
         }
         let found = tracker.estimate().sites[site] - origin;
         prop_assert!(found.reject_from(direction).length() < 1e-3, "{} m off", found.reject_from(direction).length());
@@ -201,7 +203,7 @@ proptest! {
         let relation = [PositionRelation { site, position, weight: 1.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
         for stamp in 0..10 {
-            tracker.step(&Frame { positions: &relation, ..Frame::empty(f64::from(stamp)) }).unwrap();
+            tracker.step(&Frame::empty(f64::from(stamp)).with_positions(&relation)).unwrap();
         }
         prop_assert!((tracker.estimate().sites[site] - position).length() < 1e-3);
         prop_assert!(tracker.estimate().joint_gaps.iter().all(|gap| *gap < 2e-3));
@@ -216,7 +218,7 @@ proptest! {
         // Where on the line the ray starts does not matter, as long as the site is before it.
         let ray = [RayRelation { site, origin: target - direction * (2.0 + along), direction, weight: 5.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
-        tracker.step(&Frame { rays: &ray, ..Frame::empty(0.0) }).unwrap();
+        tracker.step(&Frame::empty(0.0).with_rays(&ray)).unwrap();
         prop_assert!(largest_distance(&tracker.estimate().sites, &sites(&human(), &poses)) < 1e-6);
     }
 
@@ -269,8 +271,8 @@ proptest! {
             let cloud = [Cloud { weight: factor, ..scene::cloud(&points) }];
             let position = sites(&human(), &before)[site] + Vec3::Y * 0.02;
             let positions = [PositionRelation { site, position, weight: 20.0 * factor, bias: 0.0, source: 1 }];
-            let mut tracker = tracker(Config { max_steps: 6, ..settled() }, &before);
-            tracker.step(&Frame { clouds: &cloud, positions: &positions, ..Frame::empty(0.0) }).unwrap().sites.clone()
+            let mut tracker = tracker(scene::with(settled(), |config| config.max_steps = 6), &before);
+            tracker.step(&Frame::empty(0.0).with_clouds(&cloud).with_positions(&positions)).unwrap().sites.clone()
         };
         prop_assert!(largest_distance(&run(1.0), &run(factor)) < 1e-5);
     }
@@ -281,7 +283,7 @@ proptest! {
         let points = scene::surface_points(&human(), &moved(&before, &motion), 300, 0.005, &mut scene::Noise(seed));
         let (heavy, light) = points.split_at(100);
         let run = |clouds: &[Cloud]| {
-            let mut tracker = tracker(Config { max_steps: 6, ..settled() }, &before);
+            let mut tracker = tracker(scene::with(settled(), |config| config.max_steps = 6), &before);
             tracker.step(&scene::with_cloud(0.0, clouds)).unwrap().sites.clone()
         };
         let repeated = heavy.repeat(times);
@@ -302,7 +304,7 @@ proptest! {
         let run = |other: Pose| {
             // Known to be on the body: the box of the whole body lies along the axes of the world.
             let clouds = [Cloud { scope: Scope::Body, world_from_sensor: other, ..scene::cloud(&points) }];
-            let mut tracker = tracker(Config { max_steps: 6, ..settled() }, &moved(&before, &other));
+            let mut tracker = tracker(scene::with(settled(), |config| config.max_steps = 6), &moved(&before, &other));
             let estimate = tracker.step(&scene::with_cloud(0.0, &clouds)).unwrap();
             estimate.sites.iter().map(|site| other.inverse_transform_point(*site)).collect::<Vec<_>>()
         };
@@ -316,7 +318,7 @@ proptest! {
         let before = scene::standing(&human());
         let points = scene::surface_points(&human(), &before, 1000, 0.005, &mut noise);
         let clouds = [scene::cloud(&points)];
-        let mut tracker = tracker(Config { solver: SolverKind::Limbwise, ..Config::default() }, &before);
+        let mut tracker = tracker(scene::with(Config::default(), |config| config.solver = SolverKind::Limbwise), &before);
         let mut stamp = 0.0;
         let mut last = Status::Tracking;
         // A limb of which nothing is seen, and two of the others by which few of the points lie, are a quarter of them.

@@ -92,7 +92,7 @@ fn bad_images_are_refused() {
             "depth[0].world_from_sensor",
         ),
     ] {
-        refused(&Frame { images: &[image], ..Frame::empty(2.0) }, what);
+        refused(&Frame::empty(2.0).with_images(&[image]), what);
     }
 }
 
@@ -105,7 +105,7 @@ fn bad_sites_and_floors_are_refused() {
         (PositionRelation { position: Vec3::NAN, ..position }, "positions[0].position"),
         (PositionRelation { weight: f64::NAN, ..position }, "positions[0].weight"),
     ] {
-        refused(&Frame { positions: &[bad], ..Frame::empty(2.0) }, what);
+        refused(&Frame::empty(2.0).with_positions(&[bad]), what);
     }
     let ray = RayRelation { site: 0, origin: Vec3::ZERO, direction: Vec3::X, weight: 1.0, bias: 0.0, source: 0 };
     for (bad, what) in [
@@ -115,10 +115,10 @@ fn bad_sites_and_floors_are_refused() {
         (RayRelation { direction: Vec3::NAN, ..ray }, "rays[0].direction"),
         (RayRelation { weight: 0.0, bias: 0.0, ..ray }, "rays[0].weight"),
     ] {
-        refused(&Frame { rays: &[bad], ..Frame::empty(2.0) }, what);
+        refused(&Frame::empty(2.0).with_rays(&[bad]), what);
     }
     for (normal, offset) in [(Vec3::Z * 2.0, 0.0), (Vec3::NAN, 0.0), (Vec3::Z, f64::NAN)] {
-        refused(&Frame { ground: Some(Ground { normal, offset }), ..Frame::empty(2.0) }, "ground");
+        refused(&Frame::empty(2.0).with_ground(Ground { normal, offset }), "ground");
     }
 }
 
@@ -146,9 +146,9 @@ fn a_refused_reset_changes_nothing() {
     tracker.step(&scene::with_cloud(1.0, &[scene::cloud(&points)])).unwrap();
     let before = scene::bits(tracker.estimate());
     let body = tracker.body().clone();
-    assert!(matches!(tracker.reset(&[(0, Vec3::ZERO)], true), Err(TrackError::Underdetermined(_))));
+    assert!(matches!(tracker.reset(&[(0, Vec3::ZERO)], true), Err(TrackError::Underdetermined { .. })));
     let line = [0, 1, 2].map(|index| (index, Vec3::Z * index as f64));
-    assert!(matches!(tracker.reset(&line, true), Err(TrackError::Underdetermined(_))));
+    assert!(matches!(tracker.reset(&line, true), Err(TrackError::Underdetermined { .. })));
     assert!(tracker.reset(&[(99, Vec3::ZERO)], true).unwrap_err().to_string().contains("99"));
     assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
     let millimetres: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();

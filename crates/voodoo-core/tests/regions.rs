@@ -1,7 +1,7 @@
 //! Pose from colour regions alone: followed, told, refused and the same every time.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use crate::color_scene;
+use crate::{color_scene, scene};
 use color_scene::{CAMERAS, HEIGHT, WIDTH, depth_of, depth_picture, picture, shoot, standing, world_from_camera};
 use voodoo_core::HumanModel;
 use voodoo_core::LimbStatus;
@@ -68,7 +68,7 @@ fn followed(config: Config, late: [f64; CAMERAS], told: bool, grey: bool) -> Est
                 if grey { ColorImage { pixels: ColorPixels::Grey(&greys[camera]), ..image } } else { image }
             })
             .collect();
-        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+        tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
     }
     tracker.estimate().clone()
 }
@@ -87,7 +87,7 @@ fn a_body_is_followed_by_colours_or_grey_alone_and_its_limbs_are_measured() {
         }
     }
     // Without regions the pictures say nothing: the body stays where it was.
-    let still = followed(Config { regions: false, ..Config::default() }, [0.0; CAMERAS], true, false);
+    let still = followed(scene::with(Config::default(), |config| config.regions = false), [0.0; CAMERAS], true, false);
     assert!(off(&body, &still, (FRAMES - 1) as f64).1 > 0.1);
 }
 
@@ -110,7 +110,7 @@ fn a_body_that_is_not_in_the_pictures_is_not_tracked() {
         let stamp = frame as f64 / RATE;
         let shown = if frame < 4 { &seen } else { &empty };
         let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&shown[camera], camera, stamp)).collect();
-        let status = tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap().status;
+        let status = tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap().status;
         assert!(frame >= 4 || status == Status::Tracking, "{status:?} in frame {frame}");
     }
     assert_eq!(tracker.estimate().status, Status::Lost);
@@ -139,7 +139,7 @@ fn after_a_swing(config: Config, limbs: [&str; 3], turn: Quat, frames: usize) ->
         let stamp = frame as f64 / RATE;
         let seen = &shots[usize::from(frame >= 4)];
         let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, stamp)).collect();
-        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+        tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
     }
     let end = body.limb_index(limbs[1]).unwrap();
     let place = Vec3::Z * body.limbs()[end].shape.length();
@@ -151,8 +151,9 @@ fn an_arm_or_leg_that_is_lost_in_colours_is_looked_for_and_found() {
     let arm = (["l_upperarm", "l_forearm", "l_hand"], Quat::from_rotation_x(1.6));
     let leg = (["r_thigh", "r_calf", "r_foot"], Quat::from_rotation_y(-0.9));
     for (limbs, turn) in [arm, leg] {
-        let [with, without] =
-            [true, false].map(|hypotheses| after_a_swing(Config { hypotheses, ..Config::default() }, limbs, turn, 8));
+        let [with, without] = [true, false].map(|hypotheses| {
+            after_a_swing(scene::with(Config::default(), |config| config.hypotheses = hypotheses), limbs, turn, 8)
+        });
         assert!(with < 0.05 && without > 0.15, "{limbs:?}: {with} m, and {without} m where nothing is looked for");
     }
 }
@@ -172,7 +173,7 @@ fn edges_beside_depth(body: &Body, before_arm: bool) -> usize {
     let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
     tracker.reset_pose(&poses).unwrap();
     let (colors, images) = ([picture(&pixels, 0, 0.0)], [depth_picture(&depth, 0)]);
-    tracker.step(&Frame { colors: &colors, images: &images, ..Frame::empty(0.0) }).unwrap();
+    tracker.step(&Frame::empty(0.0).with_colors(&colors).with_images(&images)).unwrap();
     tracker.region_lines(0).filter(|line| arm.contains(&line.limb) && line.sigma.is_finite()).count()
 }
 
@@ -195,14 +196,15 @@ fn after_a_change_of_step(hypotheses: bool) -> f64 {
         poses
     };
     let (before, after) = (stride(0.3), stride(-0.3));
-    let mut tracker = Tracker::new(body.clone(), Config { hypotheses, ..Config::default() }).unwrap();
+    let mut tracker =
+        Tracker::new(body.clone(), scene::with(Config::default(), |config| config.hypotheses = hypotheses)).unwrap();
     tracker.reset_pose(&before).unwrap();
     let shots = [&before, &after].map(|poses| (0..CAMERAS).map(|n| shoot(Some((&body, poses)), n)).collect::<Vec<_>>());
     for frame in 0..12 {
         let stamp = frame as f64 / RATE;
         let seen = &shots[usize::from(frame >= 4)];
         let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, stamp)).collect();
-        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+        tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
     }
     let calf = body.limb_index("l_calf").unwrap();
     let ankle = Vec3::Z * body.limbs()[calf].shape.length();
@@ -218,7 +220,7 @@ fn legs_that_change_places_between_two_frames_are_exchanged() {
 #[test]
 fn the_same_pictures_give_the_same_bits() {
     let first = followed(Config::default(), [0.0; CAMERAS], true, false);
-    let again = followed(Config { threads: 2, ..Config::default() }, [0.0; CAMERAS], true, false);
+    let again = followed(scene::with(Config::default(), |config| config.threads = 2), [0.0; CAMERAS], true, false);
     assert_eq!(first.world_from_limb, again.world_from_limb);
 }
 
@@ -228,12 +230,12 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
     let mut tracker = started(&body, Config::default());
     let seen = pictures(&body, |_| 0.0);
     let good: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, 0.0)).collect();
-    tracker.step(&Frame { colors: &good, ..Frame::empty(0.0) }).unwrap();
+    tracker.step(&Frame::empty(0.0).with_colors(&good)).unwrap();
     let small = [[0_u8; 3]; 6];
     tracker.set_background(0, &[(ColorPixels::Color(&small), [2, 3])]).unwrap();
     let before = format!("{tracker:?}");
     let refused = |tracker: &mut Tracker, pictures: &[ColorImage]| {
-        tracker.step(&Frame { colors: pictures, ..Frame::empty(0.1) }).unwrap_err().to_string()
+        tracker.step(&Frame::empty(0.1).with_colors(pictures)).unwrap_err().to_string()
     };
     let at = |camera: usize, stamp: f64| picture(&seen[camera], camera, stamp);
     assert!(refused(&mut tracker, &[at(0, 0.1)]).contains("color[0].image: expected a picture like those"));
@@ -246,7 +248,7 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
     assert_eq!(format!("{tracker:?}"), before);
     tracker.set_background(0, &[]).unwrap();
     let next: Vec<ColorImage> = (0..CAMERAS).map(|camera| at(camera, 0.1)).collect();
-    assert!(tracker.step(&Frame { colors: &next, ..Frame::empty(0.1) }).is_ok());
+    assert!(tracker.step(&Frame::empty(0.1).with_colors(&next)).is_ok());
 }
 
 #[test]
@@ -274,7 +276,7 @@ fn pictures_of_the_empty_scene_help_where_clothes_are_as_the_room() {
             all.iter_mut().zip(&rooms).for_each(|(pixels, room)| dye(pixels, room));
             let stamp = frame as f64 / RATE;
             let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&all[camera], camera, stamp)).collect();
-            tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
+            tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
         }
         off(&body, tracker.estimate(), (FRAMES - 1) as f64).1
     });

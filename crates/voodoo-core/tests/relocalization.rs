@@ -32,7 +32,7 @@ fn cover_and_move(config: Config) -> (Body, Vec<Estimate>) {
             pixels.fill(0);
         }
         let images = [CAMERA.image(&pixels)];
-        let frame = Frame { images: &images, ..Frame::empty(f64::from(index) / 30.0) };
+        let frame = Frame::empty(f64::from(index) / 30.0).with_images(&images);
         found.push(tracker.step(&frame).unwrap().clone());
     }
     (body, found)
@@ -51,7 +51,7 @@ fn lost_at_once_and_found_at_once_elsewhere() {
         assert!(off < 0.05, "{name} is off by {off} m");
     }
     // Without the search it stays where it was, and says so.
-    let (_, without) = cover_and_move(Config { relocalization: false, ..Config::default() });
+    let (_, without) = cover_and_move(scene::with(Config::default(), |config| config.relocalization = false));
     assert_eq!(without[29].status, Status::Lost);
 }
 
@@ -60,7 +60,7 @@ fn finding_is_the_same_on_every_run_and_for_any_number_of_threads() {
     let bits = |config| -> Vec<Vec<u64>> { cover_and_move(config).1.iter().map(scene::bits).collect() };
     let first = bits(Config::default());
     assert_eq!(first, bits(Config::default()));
-    assert_eq!(first, bits(Config { threads: 2, ..Config::default() }));
+    assert_eq!(first, bits(scene::with(Config::default(), |config| config.threads = 2)));
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn sizes_of_a_second_reset_start_from_the_body_as_given() {
         (0..body.sites().len()).map(|site| (site, body.site_position(&poses, site))).collect();
     let (pixels, _) = CAMERA.shoot(&thick, &poses, 0.005, &mut noise);
     let images = [CAMERA.image(&pixels)];
-    let frame = Frame { images: &images, ..Frame::empty(0.0) };
+    let frame = Frame::empty(0.0).with_images(&images);
     let mut tracker = crate::tracker(body.clone(), Config::default()).unwrap();
     tracker.reset(&positions, true).unwrap();
     let given = tracker.body().clone();
@@ -123,7 +123,7 @@ fn left_over_right(real: f64, set: f64, config: Config) -> [f64; 2] {
     let images = [CAMERA.image(&pixels)];
     let mut tracker = crate::tracker(body, config).unwrap();
     tracker.reset(&positions, true).unwrap();
-    tracker.step(&Frame { images: &images, ..Frame::empty(0.0) }).unwrap();
+    tracker.step(&Frame::empty(0.0).with_images(&images)).unwrap();
     let body = tracker.body();
     let length = |name: &str| body.limbs()[body.limb_index(name).unwrap()].shape.length();
     [length("l_thigh") / length("r_thigh"), length("l_calf") / length("r_calf")]
@@ -134,7 +134,7 @@ fn a_leg_set_too_long_or_too_short_takes_the_lengths_of_the_other() {
     for set in [1.25, 0.78] {
         let ratios = left_over_right(1.0, set, Config::default());
         assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.02), "set {set}: {ratios:?}");
-        let without = left_over_right(1.0, set, Config { fit_lengths: false, ..Config::default() });
+        let without = left_over_right(1.0, set, scene::with(Config::default(), |config| config.fit_lengths = false));
         assert!(without.iter().all(|ratio| (ratio / set - 1.0).abs() < 0.02), "set {set}: {without:?}");
     }
     // Someone whose legs differ so much keeps them.

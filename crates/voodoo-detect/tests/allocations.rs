@@ -33,7 +33,7 @@ fn people_allocations() -> [usize; 2] {
     let mut counts = [0, 0];
     for index in 0..200 {
         let images = [camera.image(&pixels)];
-        let frame = Frame { images: &images, ..Frame::empty(index as f64 / 100.0) };
+        let frame = Frame::empty(index as f64 / 100.0).with_images(&images);
         let before = allocations_so_far();
         people.step(&frame, &[]).unwrap();
         if index >= 140 {

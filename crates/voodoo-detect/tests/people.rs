@@ -50,13 +50,14 @@ fn crossing() -> (Vec<Vec<u16>>, Vec<[Vec3; 2]>) {
 }
 
 fn people(options: Options, threads: usize) -> People {
-    let people = People::new(body(1.75), Config { threads, ..Config::default() }, options).unwrap();
+    let people =
+        People::new(body(1.75), scene::with(Config::default(), |config| config.threads = threads), options).unwrap();
     people.with_detector(Box::new(Detector::new()))
 }
 
 fn show(people: &mut People, pixels: &[u16], frame: usize) -> Vec<(usize, Status, Vec3)> {
     let images = [CAMERA.image(pixels)];
-    let input = Frame { images: &images, ..Frame::empty(frame as f64 / RATE) };
+    let input = Frame::empty(frame as f64 / RATE).with_images(&images);
     people.step(&input, &[]).unwrap();
     let place = |tracker: &voodoo_core::Tracker| tracker.estimate().world_from_limb[0].translation;
     people.there().map(|(id, tracker)| (id, tracker.estimate().status, place(tracker))).collect()
@@ -121,10 +122,10 @@ fn a_refused_frame_changes_nothing() {
     }
     let before = format!("{people:?}");
     let (pictures, none) = ([CAMERA.image(&images[6])], [CAMERA.image(&[])]);
-    let good = Frame { images: &pictures, ..Frame::empty(1.0) };
-    assert!(people.step(&Frame { images: &pictures, ..Frame::empty(0.1) }, &[]).is_err(), "time ran backwards");
-    assert!(people.step(&Frame { images: &none, ..Frame::empty(1.0) }, &[]).is_err(), "no pixels");
-    assert!(people.step(&good, &[(1, Frame { images: &none, ..Frame::empty(1.0) })]).is_err(), "one person's");
+    let good = Frame::empty(1.0).with_images(&pictures);
+    assert!(people.step(&Frame::empty(0.1).with_images(&pictures), &[]).is_err(), "time ran backwards");
+    assert!(people.step(&Frame::empty(1.0).with_images(&none), &[]).is_err(), "no pixels");
+    assert!(people.step(&good, &[(1, Frame::empty(1.0).with_images(&none))]).is_err(), "one person's");
     let short = [[0_u8; 3]; 5];
     let picture = ColorImage {
         pixels: ColorPixels::Color(&short),
@@ -134,7 +135,7 @@ fn a_refused_frame_changes_nothing() {
         number: 0,
         source: 0,
     };
-    assert!(people.step(&Frame { colors: &[picture], ..good }, &[]).is_err(), "a pixel is missing");
+    assert!(people.step(&good.with_colors(&[picture]), &[]).is_err(), "a pixel is missing");
     assert_eq!(format!("{people:?}"), before);
     assert!(people.step(&good, &[]).is_ok());
 }
@@ -166,7 +167,10 @@ fn who_comes_back_has_the_number_again_and_who_is_taller_or_forgotten_has_a_new_
     let any = Options::default;
     assert_eq!(numbers([1.72, 1.72], 3.0, any()), [vec![1], vec![], vec![1]]);
     assert_eq!(numbers([1.60, 1.88], 3.0, any()), [vec![1], vec![], vec![2]]);
-    assert_eq!(numbers([1.72, 1.72], 3.0, Options { forget_after: 1.0, ..any() }), [vec![1], vec![], vec![2]]);
+    assert_eq!(
+        numbers([1.72, 1.72], 3.0, scene::with(any(), |options| options.forget_after = 1.0)),
+        [vec![1], vec![], vec![2]]
+    );
 }
 
 #[test]
@@ -177,12 +181,18 @@ fn only_some_are_followed() {
         images.iter().take(8).enumerate().map(|(frame, pixels)| show(&mut people, pixels, frame)).last().unwrap()
     };
     let any = Options::default;
-    let nearest = there(Options { limit: Some(1), nearest: true, ..any() });
+    let nearest = there(scene::with(any(), |options| {
+        options.limit = Some(1);
+        options.nearest = true;
+    }));
     assert!(nearest.len() == 1 && (nearest[0].2.x - WAYS[0]).abs() < 0.2, "{nearest:?}");
     let behind = Aabb::new(Vec3::new(2.6, -2.0, 0.0), Vec3::new(4.0, 2.0, 2.0));
-    let far = there(Options { region: Some(behind), ..any() });
+    let far = there(scene::with(any(), |options| options.region = Some(behind)));
     assert!(far.len() == 1 && (far[0].2.x - WAYS[0] - WAYS[1]).abs() < 0.2, "{far:?}");
     let two = there(any());
     assert_eq!(two.len(), 2);
-    assert_eq!(there(Options { only: Some(vec![1]), ..any() }).iter().map(|one| one.0).collect::<Vec<_>>(), [1]);
+    assert_eq!(
+        there(scene::with(any(), |options| options.only = Some(vec![1]))).iter().map(|one| one.0).collect::<Vec<_>>(),
+        [1]
+    );
 }

@@ -200,7 +200,8 @@ proptest! {
     fn lower_levels_never_disturb_higher_ones(start in values(6, 0.4), hand in values(3, 0.9), elbow in values(3, 0.9)) {
         let (body, model) = arm();
         let shoulder = model.parts()[0].parent_from_joint.translation;
-        let options = Options { steps: 400, tolerance: 1e-12, still: 1e-12, ..Options::default() };
+        let mut options = Options::default();
+        (options.steps, options.tolerance, options.still) = (400, 1e-12, 1e-12);
         let top = goal(&body, &model, "l_hand", Aim::Position(shoulder + Vec3::new(hand[0], hand[1], hand[2])), 0);
         let low = goal(&body, &model, "l_elbow", Aim::Position(shoulder + Vec3::new(elbow[0], elbow[1], elbow[2])), 1);
         let third = goal(&body, &model, "l_wrist", Aim::Position(Vec3::ZERO), 2);

@@ -9,7 +9,11 @@ use voodoo_ik::{
     Aim, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, View, bones, level_cost, level_rows, trunk,
 };
 
-const LONG: Options = Options { steps: 400, tolerance: 1e-12, still: 1e-9, gain: 1.0, caution: 0.3, largest_turn: 0.5 };
+fn long() -> Options {
+    let mut options = Options::default();
+    (options.steps, options.tolerance, options.still) = (400, 1e-12, 1e-9);
+    options
+}
 
 struct Arm {
     body: Body,
@@ -54,7 +58,8 @@ impl Arm {
 
     fn solve(&self, goals: &[Goal], criterion: Option<&Criterion>, start: &[f64], rest: Vec<Rest>) -> Vec<f64> {
         let mut angles = start.to_vec();
-        let report = Solver::with_rest(rest).solve(&self.model, &Pose::IDENTITY, goals, criterion, &LONG, &mut angles);
+        let report =
+            Solver::with_rest(rest).solve(&self.model, &Pose::IDENTITY, goals, criterion, &long(), &mut angles);
         let h = criterion.map_or(0.0, |criterion| self.h(criterion, &angles));
         assert!((report.h - h).abs() < 1e-9, "{} {h}", report.h);
         for (angle, [low, high]) in angles.iter().zip(self.model.limits()) {

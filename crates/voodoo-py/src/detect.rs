@@ -47,7 +47,7 @@ impl PyDetector {
         let borrowed = frame.borrow_images(py, &any)?;
         let images = borrowed.images()?;
         let input =
-            Frame { images: &images, ground: frame.ground, excluded: &frame.excluded, ..Frame::empty(frame.stamp) };
+            Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
         input.check(&any, None).map_err(|error| error.into_py(py))?;
         let up = match up {
             Some(up) => Some(

@@ -71,23 +71,6 @@ fn rows<'py, 'a>(
     Ok(PyMappingProxy::new(all.py(), dict.as_mapping()))
 }
 
-pub(crate) fn status_word(status: Status) -> &'static str {
-    match status {
-        Status::Tracking => "tracking",
-        Status::Degraded => "degraded",
-        Status::Lost => "lost",
-        Status::Searching => "searching",
-    }
-}
-
-fn limb_status_word(status: LimbStatus) -> &'static str {
-    match status {
-        LimbStatus::Measured => "measured",
-        LimbStatus::Inferred => "inferred",
-        LimbStatus::Lost => "lost",
-    }
-}
-
 /// Stamp, status, mean squared distance, steps.
 type Head = (f64, String, f64, usize);
 /// Of limbs, sites, joints and sources.
@@ -141,32 +124,25 @@ pub(crate) fn _estimate(
     let (stamp, status, mean_squared_distance, steps) = head;
     let (limbs, sites, joints, sources) = names;
     let (limb_status, poses, places, limb_points, limb_residual, joint_gaps, reports) = found;
-    let known = [Status::Tracking, Status::Degraded, Status::Lost, Status::Searching];
-    let limb_known = [LimbStatus::Measured, LimbStatus::Inferred, LimbStatus::Lost];
-    let limb_of = |word: &String| limb_known.into_iter().find(|status| limb_status_word(*status) == word);
-    let estimate = Estimate {
-        stamp,
-        status: known.into_iter().find(|known| status_word(*known) == status).ok_or_else(|| wrong(&status))?,
-        limb_status: limb_status
-            .iter()
-            .map(|word| limb_of(word).ok_or_else(|| wrong(word)))
-            .collect::<PyResult<_>>()?,
-        world_from_limb: poses
-            .into_iter()
-            .map(|(position, rotation)| Pose::from_parts(Vec3::from_array(position), Quat::from_array(rotation)))
-            .collect(),
-        sites: places.into_iter().map(Vec3::from_array).collect(),
-        mean_squared_distance,
-        steps,
-        limb_points,
-        limb_residual,
-        joint_gaps,
-        sources: reports
-            .into_iter()
-            .map(|(count, inliers, weight, residual)| SourceReport { count, inliers, weight, residual })
-            .collect(),
-        covariances: spread.map(covariances).unwrap_or_default(),
+    let limb_of = |word: &String| LimbStatus::ALL.iter().find(|status| status.name() == word).copied();
+    let report = |(count, inliers, weight, residual)| {
+        let mut report = SourceReport::default();
+        (report.count, report.inliers, report.weight, report.residual) = (count, inliers, weight, residual);
+        report
     };
+    let mut estimate = Estimate::default();
+    (estimate.stamp, estimate.mean_squared_distance, estimate.steps) = (stamp, mean_squared_distance, steps);
+    estimate.status = Status::ALL.iter().find(|known| known.name() == status).copied().ok_or_else(|| wrong(&status))?;
+    estimate.limb_status =
+        limb_status.iter().map(|word| limb_of(word).ok_or_else(|| wrong(word))).collect::<PyResult<_>>()?;
+    estimate.world_from_limb = poses
+        .into_iter()
+        .map(|(position, rotation)| Pose::from_parts(Vec3::from_array(position), Quat::from_array(rotation)))
+        .collect();
+    estimate.sites = places.into_iter().map(Vec3::from_array).collect();
+    (estimate.limb_points, estimate.limb_residual, estimate.joint_gaps) = (limb_points, limb_residual, joint_gaps);
+    estimate.sources = reports.into_iter().map(report).collect();
+    estimate.covariances = spread.map(covariances).unwrap_or_default();
     Ok(PyEstimate { estimate, names: Arc::new(Names::new(limbs, sites, joints)), sources })
 }
 
@@ -181,13 +157,13 @@ impl PyEstimate {
     #[doc = stub!("Estimate.status")]
     #[getter]
     fn status(&self) -> &'static str {
-        status_word(self.estimate.status)
+        self.estimate.status.name()
     }
 
     #[doc = stub!("Estimate.limb_status")]
     #[getter]
     fn limb_status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_status.iter().copied().map(limb_status_word)))
+        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_status.iter().map(|status| status.name())))
     }
 
     #[doc = stub!("Estimate.steps")]
@@ -347,7 +323,7 @@ impl PyEstimate {
         let head = (found.stamp, self.status().to_owned(), found.mean_squared_distance, found.steps);
         let all = (names.limbs.clone(), names.sites.clone(), names.joints.clone(), self.sources.clone());
         let rest = (
-            found.limb_status.iter().map(|status| limb_status_word(*status).to_owned()).collect(),
+            found.limb_status.iter().map(|status| status.name().to_owned()).collect(),
             found.world_from_limb.iter().map(pose).collect(),
             found.sites.iter().map(Vec3::to_array).collect(),
             found.limb_points.clone(),
@@ -362,7 +338,7 @@ impl PyEstimate {
         format!(
             "Estimate(stamp={}, status={:?}, residual={:.4} m, steps={}, points={})",
             self.estimate.stamp,
-            status_word(self.estimate.status),
+            self.estimate.status.name(),
             self.residual(),
             self.estimate.steps,
             self.estimate.limb_points.iter().sum::<usize>()

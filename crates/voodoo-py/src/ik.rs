@@ -35,7 +35,10 @@ fn resting(rest: &[(usize, f64)]) -> Solver {
 }
 
 fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> Options {
-    Options { steps, tolerance, still, gain, caution, largest_turn }
+    let mut options = Options::default();
+    (options.steps, options.tolerance, options.still) = (steps, tolerance, still);
+    (options.gain, options.caution, options.largest_turn) = (gain, caution, largest_turn);
+    options
 }
 
 impl PyChain {

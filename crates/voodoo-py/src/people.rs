@@ -65,7 +65,8 @@ impl PyPeople {
         region: Option<([f64; 3], [f64; 3])>,
     ) -> PyResult<Self> {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
-        let options = Options { limit, nearest, forget_after, region, only: None };
+        let mut options = Options::default();
+        (options.limit, options.nearest, options.forget_after, options.region) = (limit, nearest, forget_after, region);
         let mut people =
             People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
         if let Some(found) = self::detector(detector)? {
@@ -88,16 +89,14 @@ impl PyPeople {
         let views = frame.color_views(py);
         let numbered = views.iter().zip(0..);
         let colors = numbered.map(|(view, camera)| view.image(camera)).collect::<PyResult<Vec<_>>>()?;
-        let input = Frame {
-            stamp: frame.stamp,
-            clouds: &clouds,
-            images: &images,
-            colors: &colors,
-            positions: &all.positions,
-            rays: &all.rays,
-            ground: all.ground,
-            excluded: &frame.excluded,
-        };
+        let input = Frame::empty(frame.stamp)
+            .with_clouds(&clouds)
+            .with_images(&images)
+            .with_colors(&colors)
+            .with_positions(&all.positions)
+            .with_rays(&all.rays)
+            .with_ground(all.ground)
+            .with_excluded(&frame.excluded);
         // A person's own measurements come after what all have in common; their sources are numbered on.
         let owned = own.iter().map(|(_, frame)| frame.borrow_for(py, body)).collect::<PyResult<Vec<_>>>()?;
         let parts =
@@ -171,6 +170,8 @@ impl<'a> Parts<'a> {
     }
 
     fn frame<'b>(&'b self, all: &Frame<'b>, stamp: f64) -> Frame<'b> {
-        Frame { stamp, clouds: &self.clouds, positions: &self.positions, rays: &self.rays, ..*all }
+        let mut frame = all.with_clouds(&self.clouds).with_positions(&self.positions).with_rays(&self.rays);
+        frame.stamp = stamp;
+        frame
     }
 }

@@ -154,16 +154,14 @@ impl PyTracker {
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
         let colors = self.pictures(py, frame, &views)?;
-        let input = Frame {
-            stamp: frame.stamp,
-            clouds: &clouds,
-            images: &images,
-            colors: &colors,
-            positions: &borrowed.positions,
-            rays: &borrowed.rays,
-            ground: borrowed.ground,
-            excluded: &frame.excluded,
-        };
+        let input = Frame::empty(frame.stamp)
+            .with_clouds(&clouds)
+            .with_images(&images)
+            .with_colors(&colors)
+            .with_positions(&borrowed.positions)
+            .with_rays(&borrowed.rays)
+            .with_ground(borrowed.ground)
+            .with_excluded(&frame.excluded);
         let tracker = &mut self.tracker;
         py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
         self.sources.clone_from(&frame.sources);
@@ -197,7 +195,7 @@ impl PyTracker {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
         let views = frame.color_views(py);
         let colors = self.pictures(py, frame, &views)?;
-        let input = Frame { colors: &colors, ..Frame::empty(frame.stamp) };
+        let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
         let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(|error| error.into_py(py))?;
         let likely = PyDict::new(py);
@@ -222,7 +220,7 @@ impl PyTracker {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
         let views = frame.color_views(py);
         let colors = self.pictures(py, frame, &views)?;
-        let input = Frame { colors: &colors, ..Frame::empty(frame.stamp) };
+        let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
         py.detach(|| tracker.learn_colors(&input, poses.as_deref())).map_err(|error| error.into_py(py))
     }

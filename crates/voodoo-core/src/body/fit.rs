@@ -189,10 +189,7 @@ impl Body {
                 }
             }
         }
-        Err(TrackError::Underdetermined(format!(
-            "expected at least three positions that do not lie on a line, found {} position(s)",
-            positions.len()
-        )))
+        Err(TrackError::Underdetermined { found: positions.len() })
     }
 
     fn orient_limb(

@@ -255,17 +255,11 @@ fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
     Ok(())
 }
 
-fn find<'a>(
-    what: &'static str,
-    name: &str,
-    mut names: impl Iterator<Item = &'a str> + Clone,
-) -> Result<usize, BodyError> {
-    names.clone().position(|known| known == name).ok_or_else(|| {
-        let mut known = names.next().unwrap_or_default().to_owned();
-        for name in names {
-            known.push_str(", ");
-            known.push_str(name);
-        }
-        BodyError::Unknown { key: what.into(), what, name: name.into(), known }
+fn find<'a>(what: &'static str, name: &str, names: impl Iterator<Item = &'a str> + Clone) -> Result<usize, BodyError> {
+    names.clone().position(|known| known == name).ok_or_else(|| BodyError::Unknown {
+        key: what.into(),
+        what,
+        name: name.into(),
+        known: names.map(String::from).collect(),
     })
 }

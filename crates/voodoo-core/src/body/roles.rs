@@ -173,7 +173,7 @@ impl Roles {
     /// Resolves the names of a body whose parents stand before their children.
     ///
     /// # Errors
-    /// [`BodyError::Value`] when a limb and its joint are named after different sides, or when an arm's or a leg's joint does
+    /// [`BodyError::Role`] when a limb and its joint are named after different sides, or when an arm's or a leg's joint does
     /// not follow the one before it: detections and statistics of human joints would be taken for the wrong limbs.
     pub(super) fn resolve<'a>(body: &str, limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
@@ -208,7 +208,7 @@ impl Roles {
         for (index, limb) in limbs.iter().enumerate() {
             let (Some((hangs_on, joint)), Some(role)) = (&limb.parent, self.joints[index]) else { continue };
             let wrong = |expected, found| {
-                Err(BodyError::Value { key: format!("limbs.{}.joint.name", limb.name), expected, found })
+                Err(BodyError::Role { key: format!("limbs.{}.joint.name", limb.name), expected, found })
             };
             if opposite(index, role) {
                 return wrong("a joint of the limb's own side", joint.name.clone());
@@ -222,7 +222,7 @@ impl Roles {
         }
         for (site, role) in sites.iter().zip(&self.sites) {
             if role.is_some_and(|role| opposite(site.limb, role)) {
-                return Err(BodyError::Value {
+                return Err(BodyError::Role {
                     key: format!("sites.{}.limb", site.name),
                     expected: "a limb of the site's own side",
                     found: limbs[site.limb].name.clone(),
@@ -421,7 +421,11 @@ mod tests {
 
     #[test]
     fn a_body_that_is_named_wrongly_is_refused() {
-        let refused = |names: &[[&str; 2]]| chain(names).unwrap_err().to_string();
+        let refused = |names: &[[&str; 2]]| {
+            let error = chain(names).unwrap_err();
+            assert!(matches!(error, BodyError::Role { .. }));
+            error.to_string()
+        };
         assert_eq!(
             refused(&[["torso", ""], ["l_upperarm", "l_shoulder"], ["r_forearm", "l_elbow"]]),
             "limbs.r_forearm.joint.name: expected a joint of the limb's own side, found l_elbow"

@@ -184,7 +184,10 @@ impl Ground {
 }
 
 /// All measurements of one instant.
+///
+/// [`Frame::empty`] makes one without any; what was measured is added with the `with_` methods, or set field by field.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Frame<'a> {
     /// Seconds.
     pub stamp: f64,
@@ -208,6 +211,48 @@ impl<'a> Frame<'a> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
         Self { stamp, clouds: &[], images: &[], colors: &[], positions: &[], rays: &[], ground: None, excluded: &[] }
+    }
+
+    /// The frame with these 3-D points.
+    #[must_use]
+    pub fn with_clouds(self, clouds: &'a [Cloud<'a>]) -> Self {
+        Self { clouds, ..self }
+    }
+
+    /// The frame with these depth images.
+    #[must_use]
+    pub fn with_images(self, images: &'a [DepthImage<'a>]) -> Self {
+        Self { images, ..self }
+    }
+
+    /// The frame with these color pictures.
+    #[must_use]
+    pub fn with_colors(self, colors: &'a [ColorImage<'a>]) -> Self {
+        Self { colors, ..self }
+    }
+
+    /// The frame with these positions of sites.
+    #[must_use]
+    pub fn with_positions(self, positions: &'a [PositionRelation]) -> Self {
+        Self { positions, ..self }
+    }
+
+    /// The frame with these rays on which sites were seen.
+    #[must_use]
+    pub fn with_rays(self, rays: &'a [RayRelation]) -> Self {
+        Self { rays, ..self }
+    }
+
+    /// The frame with this floor, or without one.
+    #[must_use]
+    pub fn with_ground(self, ground: impl Into<Option<Ground>>) -> Self {
+        Self { ground: ground.into(), ..self }
+    }
+
+    /// The frame with these boxes of the world in which nothing belongs to anybody.
+    #[must_use]
+    pub fn with_excluded(self, excluded: &'a [Aabb]) -> Self {
+        Self { excluded, ..self }
     }
 
     /// Refuses what cannot be used: nothing of it may reach the tracker's state.

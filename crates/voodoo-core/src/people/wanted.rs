@@ -6,8 +6,9 @@ use crate::observation::frame::Frame;
 /// Somebody takes the place of another when they are nearer to a camera by this, metres: two at one distance do not take turns.
 const CLEARLY_NEARER: f64 = 0.3;
 
-/// Who is looked for.
+/// Who is looked for. [`Options::default`] is everybody everywhere.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Options {
     /// Persons that are followed at the same time, at most; none: any number.
     pub limit: Option<usize>,

@@ -43,6 +43,7 @@ pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
 
 /// Why a shape was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ShapeError {
     /// A length or semi-axis is not a number, infinite, negative or absurdly large.
     #[error("{name} must be between {min} and {MAX_SIZE} m, found {value}")]

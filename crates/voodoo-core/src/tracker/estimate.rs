@@ -5,6 +5,7 @@ use crate::uncertainty::Covariances;
 
 /// How much a pose can be relied on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Status {
     /// Measurements support the pose.
     Tracking,
@@ -17,8 +18,24 @@ pub enum Status {
     Searching,
 }
 
+impl Status {
+    /// All there are.
+    pub const ALL: &[Self] = &[Self::Tracking, Self::Degraded, Self::Lost, Self::Searching];
+
+    /// Its name in results and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracking => "tracking",
+            Self::Degraded => "degraded",
+            Self::Lost => "lost",
+            Self::Searching => "searching",
+        }
+    }
+}
+
 /// How much the pose of one limb can be relied on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LimbStatus {
     /// Measurements support it.
     Measured,
@@ -30,8 +47,23 @@ pub enum LimbStatus {
     Lost,
 }
 
+impl LimbStatus {
+    /// All there are.
+    pub const ALL: &[Self] = &[Self::Measured, Self::Inferred, Self::Lost];
+
+    /// Its name in results and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Inferred => "inferred",
+            Self::Lost => "lost",
+        }
+    }
+}
+
 /// What one source gave to a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct SourceReport {
     /// Measurements of the source that were candidates.
     pub count: usize,
@@ -45,6 +77,7 @@ pub struct SourceReport {
 
 /// Pose and quality of one frame. World frame, metres, seconds.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Estimate {
     /// Time of the frame; NaN after a reset and before the first one.
     pub stamp: f64,

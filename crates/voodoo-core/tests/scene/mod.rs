@@ -95,7 +95,7 @@ pub(crate) fn surface_points(
 
 /// A frame with one free cloud.
 pub(crate) fn with_cloud<'a>(stamp: f64, clouds: &'a [Cloud<'a>]) -> Frame<'a> {
-    Frame { clouds, ..Frame::empty(stamp) }
+    Frame::empty(stamp).with_clouds(clouds)
 }
 
 /// Free points of weight 1 in the world frame.
@@ -178,6 +178,12 @@ pub(crate) fn bits(estimate: &Estimate) -> Vec<u64> {
         .chain(estimate.joint_gaps.iter().copied())
         .map(f64::to_bits)
         .collect()
+}
+
+/// A value with changes.
+pub(crate) fn with<T>(mut value: T, change: impl FnOnce(&mut T)) -> T {
+    change(&mut value);
+    value
 }
 
 /// The default configuration with each solver there is.

@@ -29,6 +29,7 @@ const STALLED_STEPS: usize = 3;
 
 /// How to solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Options {
     /// Most steps; J10 uses 15.
     pub steps: usize,
@@ -53,6 +54,7 @@ impl Default for Options {
 
 /// How it went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Steps used.
     pub steps: usize,
